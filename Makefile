@@ -1,0 +1,55 @@
+# Two commands do everything on a bare machine: `make demo` and `make test`.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+# A CPU build where pip finds one locally, else the index's own: outside the lock, never hashed.
+TORCH  := torch==2.13.0
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-all chaos lint format bench lock clean
+
+help: ## Show the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
+
+setup: $(STAMP) ## Make .venv and install everything, from the lock
+
+$(STAMP): requirements/dev.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/pip install -q $(TORCH)
+	$(BIN)/pip install -q --no-deps --require-hashes -r requirements/dev.lock
+	$(BIN)/pip install -q --no-deps --no-build-isolation -e .
+	touch $@
+
+demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
+	$(BIN)/python -m services.cli.demo
+
+test: $(STAMP) lint ## Everything but slow and gpu tests: under ten minutes on two cores
+	$(BIN)/pytest -q
+
+test-all: $(STAMP) lint ## Every test
+	$(BIN)/pytest -q -m ''
+
+chaos: $(STAMP) ## The long chaos run
+	$(BIN)/pytest -q -m '' tests/chaos
+
+lint: $(STAMP) ## ruff, basedpyright, import-linter
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/basedpyright
+	$(BIN)/lint-imports
+
+format: $(STAMP) ## Format and fix
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(STAMP) ## Benchmarks; results belong in docs/performance.md
+	$(BIN)/python -m benchmarks
+
+lock: $(STAMP) ## Write requirements/dev.lock anew
+	$(BIN)/uv pip compile --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	  --extra dev --override requirements/torch-free.txt pyproject.toml requirements/torch-deps.in -o requirements/dev.lock
+
+clean: ## Remove what the targets made
+	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,112 @@
+"""The one tree of errors.
+
+A message says what was wrong, where (file, line, field) and what to do about it. The command line prints an
+expected error verbatim and exits with `exit_code`; the API answers an RFC 9457 problem with `status` and
+`problem_type`. Anything outside this tree is a bug and shows a traceback (or a 500).
+"""
+
+from __future__ import annotations
+
+
+class MareyError(Exception):
+    """An expected failure, told to a person.
+
+    Args:
+        message: what was wrong, one sentence.
+        where: file, line, field, row or identifier the message is about.
+        hint: what to do about it.
+    """
+
+    exit_code = 1
+    status = 500
+    problem_type = "internal"
+
+    def __init__(self, message: str, *, where: str | None = None, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.where = where
+        self.hint = hint
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.message}" if self.where else self.message
+        return f"{text}\n  {self.hint}" if self.hint else text
+
+
+class InvalidInput(MareyError):
+    """What came in cannot be used: a prompt, a file, an option, a bundle."""
+
+    exit_code = 2
+    status = 422
+    problem_type = "invalid-input"
+
+
+class TooLarge(InvalidInput):
+    """The input is over a limit that is written down."""
+
+    status = 413
+    problem_type = "too-large"
+
+
+class InvalidFile(InvalidInput):
+    """A file is broken, foreign or truncated."""
+
+    problem_type = "invalid-file"
+
+
+class InvalidBundle(InvalidFile):
+    """A model bundle is corrupt, foreign, of another version, or its licence is not allowed here."""
+
+    problem_type = "invalid-bundle"
+
+
+class Conflict(InvalidInput):
+    """The request contradicts what already stands: an illegal transition, an existing different file."""
+
+    status = 409
+    problem_type = "conflict"
+
+
+class NotFound(MareyError):
+    """There is no such job, motion, bundle or file (or it belongs to somebody else)."""
+
+    exit_code = 3
+    status = 404
+    problem_type = "not-found"
+
+
+class Unreachable(MareyError):
+    """A server, database, queue or store did not answer; trying again later may work."""
+
+    exit_code = 4
+    status = 503
+    problem_type = "unreachable"
+
+
+class Refused(MareyError):
+    """Not allowed: the key lacks the scope, or a quota or rate is used up."""
+
+    exit_code = 5
+    status = 403
+    problem_type = "refused"
+
+
+class Unauthenticated(Refused):
+    """No key, or not a valid one."""
+
+    status = 401
+    problem_type = "unauthenticated"
+
+
+class ItemsFailed(MareyError):
+    """The work ended, but some items failed, died or were cancelled."""
+
+    exit_code = 6
+    problem_type = "items-failed"
+
+
+class TimedOut(MareyError):
+    """The time the caller allowed (`--timeout`) has passed."""
+
+    exit_code = 7
+    status = 504
+    problem_type = "timed-out"

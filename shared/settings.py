@@ -1,0 +1,86 @@
+"""Every setting of the product, read once from the environment (prefix `MAREY_`).
+
+Secrets may come by file: `MAREY_DATABASE_URL_FILE=/run/secrets/db` is read where `MAREY_DATABASE_URL` is unset.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from platformdirs import user_data_path
+from pydantic import Field, SecretStr, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+class Settings(BaseSettings):
+    """Settings of every process; the defaults are those of the embedded profile."""
+
+    model_config = SettingsConfigDict(env_prefix="MAREY_", extra="ignore")
+
+    home: Path = Field(default_factory=lambda: user_data_path("marey", appauthor=False))
+    """Database, assets, logs, lock and `server.json` of the embedded server."""
+
+    models: Path = REPOSITORY / "models"
+    """Folder of the model bundles."""
+
+    database_url: SecretStr | None = None
+    """`postgresql+psycopg://…`; unset = the embedded Postgres of `home`."""
+
+    queue_url: SecretStr | None = None
+    """`redis://…` or `redis+socket://…`; unset = the embedded Valkey of `home`."""
+
+    store: str | None = None
+    """`s3://bucket` or a folder; unset = `home/assets`."""
+
+    s3_endpoint: str = "objectstore:9000"
+    s3_public_endpoint: str | None = None
+    """Endpoint that stands in presigned URLs, where clients reach the store under another name."""
+    s3_access_key: SecretStr | None = None
+    s3_secret_key: SecretStr | None = None
+    s3_region: str = "us-east-1"  # set, else the client asks the network for it before every presigned URL
+    s3_secure: bool = False
+
+    host: str = "127.0.0.1"
+    port: int = 8400
+    allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
+
+    require_licence: Literal["any", "commercial"] = "any"
+    """`commercial` refuses bundles whose weights carry non-commercial terms."""
+
+    device: str = "auto"
+    """`auto`, `cpu`, `cuda`, `cuda:1`, …"""
+    threads: int = 0
+    """Torch threads of one worker; 0 = cores divided by the torch children of this machine."""
+
+    lease_seconds: float = 10.0
+    heartbeat_seconds: float = 2.5
+    stall_seconds: float = 120.0
+    """A decode loop without progress for this long loses its lease (first load and compile excepted)."""
+    sweep_seconds: float = 2.0
+    relay_seconds: float = 0.5
+    max_attempts: int = 3
+    drain_seconds: float = 300.0
+    """A drain task claims nothing after this long and returns."""
+
+    log_level: str = "INFO"
+    log_json: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _secrets_by_file(cls, values: dict[str, object]) -> dict[str, object]:
+        for name in ("database_url", "queue_url", "s3_access_key", "s3_secret_key"):
+            path = os.environ.get(f"MAREY_{name.upper()}_FILE")
+            if path and name not in values:
+                values[name] = Path(path).read_text(encoding="utf-8").strip()
+        return values
+
+
+@lru_cache(maxsize=1)
+def settings() -> Settings:
+    """The settings of this process."""
+    return Settings()
