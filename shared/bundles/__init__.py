@@ -1,0 +1,16 @@
+"""Model bundles: a folder with `manifest.json`, safetensors shards and a model card. No pickle, ever."""
+
+from shared.bundles.bundle import Bundle, find_bundle, list_bundles
+from shared.bundles.manifest import BundleManifest, DataSource, FileEntry, TextSpec
+from shared.bundles.writer import BundleWriter
+
+__all__ = [
+    "Bundle",
+    "BundleManifest",
+    "BundleWriter",
+    "DataSource",
+    "FileEntry",
+    "TextSpec",
+    "find_bundle",
+    "list_bundles",
+]

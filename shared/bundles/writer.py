@@ -1,0 +1,117 @@
+"""Writing a bundle: fp16 safetensors in shards, a manifest with a hash of each file, all or nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors.numpy import save as save_safetensors
+
+from shared.bundles.bundle import STATISTICS, Bundle, Tensors
+from shared.bundles.manifest import MANIFEST_NAME, BundleManifest, FileEntry
+from shared.errors import Conflict, InvalidInput
+
+MAX_SHARD_BYTES = 15 * 2**20
+"""Under the size at which hosts of git repositories begin to refuse or warn."""
+
+
+class BundleWriter:
+    """Collects parts in a temporary folder and moves it into place when the manifest is written.
+
+    ```python
+    with BundleWriter(Path("models/hgm3-starter")) as writer:
+        writer.add_part("masked", tensors)
+        writer.add_statistics(mean, std)
+        bundle = writer.finish(name="hgm3-starter", kind="generator", …)
+    ```
+    """
+
+    def __init__(self, path: Path, *, overwrite: bool = False, max_shard_bytes: int = MAX_SHARD_BYTES) -> None:
+        if path.exists() and not overwrite:
+            raise Conflict("is there already", where=str(path), hint="Choose another name, or allow overwriting.")
+        self.path = path
+        self.max_shard_bytes = max_shard_bytes
+        self._parts: dict[str, tuple[str, ...]] = {}
+        self._files: dict[str, FileEntry] = {}
+
+    def __enter__(self) -> BundleWriter:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._folder = Path(tempfile.mkdtemp(prefix=f".{self.path.name}-", dir=self.path.parent))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def add_part(
+        self, part: str, tensors: Mapping[str, NDArray[Any]], *, dtype: type[np.floating] | None = np.float16
+    ) -> None:
+        """Add one part's tensors; floating ones are stored as `dtype` (None = as they are).
+
+        Raises:
+            InvalidInput: a tensor is not finite, or overflows `dtype`.
+        """
+        converted: Tensors = {name: _convert(part, name, value, dtype) for name, value in tensors.items()}
+        shards = list(_shards(converted, self.max_shard_bytes))
+        names = [f"{part}.safetensors"]
+        if len(shards) > 1:
+            names = [f"{part}-{i + 1:05}-of-{len(shards):05}.safetensors" for i in range(len(shards))]
+        for name, shard in zip(names, shards, strict=True):
+            self._add_file(name, save_safetensors(shard))
+        self._parts[part] = tuple(names)
+
+    def add_statistics(self, mean: NDArray[np.float32], std: NDArray[np.float32]) -> None:
+        """Mean and standard deviation (D,), kept in float32."""
+        self.add_part(STATISTICS, {"mean": mean, "std": std}, dtype=np.float32)
+
+    def add_card(self, text: str) -> None:
+        """The model card, `README.md`. It is no part of the weights: it may be edited later."""
+        (self._folder / "README.md").write_text(text, encoding="utf-8")
+
+    def finish(self, **fields: Any) -> Bundle:
+        """Write the manifest from `fields` (see `BundleManifest`) and move the bundle into place."""
+        manifest = BundleManifest(parts=self._parts, files=self._files, **fields)
+        (self._folder / MANIFEST_NAME).write_text(manifest.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        self._folder.chmod(0o755)  # mkdtemp makes it private
+        if self.path.exists():
+            old = self._folder.with_name(f"{self._folder.name}.old")
+            self.path.rename(old)
+            self._folder.rename(self.path)
+            shutil.rmtree(old)
+        else:
+            self._folder.rename(self.path)
+        return Bundle(self.path, manifest)
+
+    def _add_file(self, name: str, content: bytes) -> None:
+        (self._folder / name).write_bytes(content)
+        self._files[name] = FileEntry(sha256=hashlib.sha256(content).hexdigest(), bytes=len(content))
+
+
+def _convert(part: str, name: str, value: NDArray[Any], dtype: type[np.floating] | None) -> NDArray[Any]:
+    if np.issubdtype(value.dtype, np.floating):
+        with np.errstate(over="ignore"):
+            value = value.astype(dtype) if dtype is not None else value
+        if not np.isfinite(value).all():
+            raise InvalidInput(f"holds values that are not finite as {value.dtype}", where=f"{part}: {name}")
+    return np.ascontiguousarray(value)
+
+
+def _shards(tensors: Tensors, limit: int) -> Iterator[Tensors]:
+    """Cut `tensors` into groups of at most `limit` bytes, in order (a larger single tensor stands alone)."""
+    shard: Tensors = {}
+    size = 0
+    for name, value in tensors.items():
+        if shard and size + value.nbytes > limit:
+            yield shard
+            shard, size = {}, 0
+        shard[name] = value
+        size += value.nbytes
+    yield shard
