@@ -1,0 +1,132 @@
+"""What the claim loop knows of the work it does: one protocol and the data that crosses it.
+
+A handler turns claimed items into outcomes. It never sees the database, the queue or the store: the loop claims,
+keeps the lease alive, stores files, commits, releases and retries. The rules a handler may rely on:
+
+- `run` is called on one thread, one batch at a time; every item of a batch has the same bundle and settings.
+- `run` yields one outcome per item, in any order, as soon as it is known; items in `control.dropped()` need none.
+- `Done.export` is called once, later, on the store thread, while the next batch runs: decoding, clean-up and file
+  formats belong there, not into `run`.
+- An exception out of `run` concerns every item of the batch that has no outcome yet: a `MareyError` fails them with
+  its message (`Unreachable` releases them uncounted), out of memory halves the batch in place, anything else is a
+  bug and is retried until the attempts are used up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeAlias
+from uuid import UUID
+
+from shared.errors import MareyError
+from shared.jobs.claims import Claim, ClaimedItem
+
+
+@dataclass(frozen=True)
+class MotionFile:
+    """One file of a motion, in memory: it goes to the asset store under its sha256."""
+
+    format: str
+    """`npz`, `bvh`, …: the name under which `motions/{id}/files/{format}` serves it."""
+    content: bytes
+    media_type: str = "application/octet-stream"
+
+
+@dataclass(frozen=True)
+class Export:
+    """What a finished item leaves behind: its files and the columns of its motion row."""
+
+    files: tuple[MotionFile, ...]
+    frames: int
+    """Poses in the exported clip, at `fps`."""
+    fps: float
+    manifest: Mapping[str, Any]
+    """The JSON of the npz's `manifest`: prompt, rewritten prompt, graph, bundle, weights, seed, settings, licence."""
+
+
+@dataclass(frozen=True)
+class Done:
+    """A generated item; `export` makes its files and is called once, on the store thread.
+
+    Raises (from `export`): `MareyError` fails the item; anything else retries it.
+    """
+
+    item: UUID
+    export: Callable[[], Export]
+    elapsed: float
+    """Seconds of computing this item took: its batch's time divided by the items in it."""
+
+
+@dataclass(frozen=True)
+class TextDone:
+    """A parsed prompt: `blob` (safetensors) goes to `text_features` under `key`; the item moves on to `generate`."""
+
+    item: UUID
+    key: str
+    blob: bytes
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An item that has no result. `retryable`: it runs again after a pause; else it ends `failed`, now."""
+
+    item: UUID
+    problem: MareyError
+    retryable: bool = False
+
+
+Outcome: TypeAlias = Done | TextDone | Failed
+
+
+class BatchControl(Protocol):
+    """The loop's side of a running batch; both methods cost microseconds and may be called at every decode step."""
+
+    def progress(self, done: int, total: int) -> None:
+        """Say that the batch is alive: `done` of `total` steps. A batch silent for 120 s loses its lease."""
+        ...
+
+    def dropped(self) -> frozenset[UUID]:
+        """Items whose result nobody wants any more: cancelled, or all of them when the lease is lost or the
+        worker is told to stop. Leave their rows out of the next step; return when none is left."""
+        ...
+
+
+class Handler(Protocol):
+    """The work of one queue. Made in the worker's child; the parent never imports its module."""
+
+    queue: str
+    """`hgm3`, `text`: which items it claims."""
+    batch_size: int
+    """Items of one claim, at most."""
+
+    def load(self, bundle: str) -> None:
+        """Make `bundle` ready to run; may take minutes (its lease is kept alive). Called when the bundle changes.
+
+        Raises: `InvalidBundle`, `NotFound`: every claimed item of that bundle fails with the message.
+        """
+        ...
+
+    def buckets(self, claim: Claim) -> Sequence[Sequence[ClaimedItem]]:
+        """The claim in the order and grouping it should run: items of one forward together. Every item once."""
+        ...
+
+    def run(self, batch: Claim, control: BatchControl) -> Iterator[Outcome]:
+        """Run one bucket (`batch.items`) and yield an outcome for each item that was not dropped."""
+        ...
+
+
+HandlerFactory: TypeAlias = Callable[[], Handler]
+
+
+@dataclass(frozen=True)
+class Role:
+    """What one worker process serves: its name and the handlers of its one child, in order of precedence.
+
+    `handlers` maps a queue to `module:attribute` of a `HandlerFactory`, a string, so that only the child imports it.
+    """
+
+    name: str
+    handlers: Mapping[str, str]
+    preload: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Bundle to load before the worker is ready, by queue."""
