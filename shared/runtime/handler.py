@@ -20,11 +20,22 @@ from typing import Any, Protocol, TypeAlias
 from uuid import UUID
 
 from shared.errors import MareyError
-from shared.jobs.claims import Claim, ClaimedItem
+from shared.jobs.types import Claim, ClaimedItem
 
 
 @dataclass(frozen=True)
-class MotionFile:
+class Batch:
+    """Claimed items to run together, all of one bundle and the same settings, with what they need from the tables."""
+
+    claim: Claim
+    items: tuple[ClaimedItem, ...]
+    """The items of the claim, or of one bucket of it."""
+    features: Mapping[str, bytes]
+    """Text features (`TextFeatures.to_blob`) by the items' `text_key`; empty in the text stage."""
+
+
+@dataclass(frozen=True)
+class ExportedFile:
     """One file of a motion, in memory: it goes to the asset store under its sha256."""
 
     format: str
@@ -37,10 +48,12 @@ class MotionFile:
 class Export:
     """What a finished item leaves behind: its files and the columns of its motion row."""
 
-    files: tuple[MotionFile, ...]
+    files: tuple[ExportedFile, ...]
     frames: int
     """Poses in the exported clip, at `fps`."""
     fps: float
+    licence: str
+    """SPDX name or short text of the terms of the weights."""
     manifest: Mapping[str, Any]
     """The JSON of the npz's `manifest`: prompt, rewritten prompt, graph, bundle, weights, seed, settings, licence."""
 
@@ -107,11 +120,11 @@ class Handler(Protocol):
         """
         ...
 
-    def buckets(self, claim: Claim) -> Sequence[Sequence[ClaimedItem]]:
-        """The claim in the order and grouping it should run: items of one forward together. Every item once."""
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        """The items of a claim in the order and grouping to run them: one forward a group, every item once."""
         ...
 
-    def run(self, batch: Claim, control: BatchControl) -> Iterator[Outcome]:
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
         """Run one bucket (`batch.items`) and yield an outcome for each item that was not dropped."""
         ...
 

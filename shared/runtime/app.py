@@ -1,0 +1,85 @@
+"""The Celery app: every process that publishes or consumes hints makes it here, with the same settings.
+
+A message is only a hint that a queue has work; the rows in Postgres are the truth. Losing one, or getting one twice,
+must not matter, and each setting below is there because something that did matter went wrong without it.
+"""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+from __future__ import annotations
+
+from typing import Any
+
+from celery import Celery
+
+DRAIN = "marey.drain"
+"""Name of the one task: `drain(queue)` claims, runs and commits until nothing is left or 300 s have passed."""
+
+TIME_LIMIT = 1200
+"""Seconds until the parent kills a child that hangs in a task; its leases are long gone by then."""
+
+VISIBILITY_TIMEOUT = 3600
+"""Redis hands an unacknowledged message to another worker after this long, running or not (celery #5935): more than
+twice the time limit, so that it never happens to a living task; the lease makes a duplicate harmless even so."""
+
+SOCKET_TIMEOUT = 30
+CONNECT_TIMEOUT = 5
+HEALTH_CHECK_INTERVAL = 25  # below the socket timeout: a dead connection is found before a read hangs on it
+
+PUBLISH_RETRY = {"max_retries": 2, "interval_start": 0.1, "interval_step": 0.2, "interval_max": 0.5}
+"""Bounded: the relay must come round again rather than hang on a broker that is down (celery #4296, #6911)."""
+
+
+def transport_options() -> dict[str, Any]:
+    """Options of the Redis transport, shared by workers and publishers."""
+    return {
+        "visibility_timeout": VISIBILITY_TIMEOUT,
+        # The restore sweep runs only every ~100 s by default (kombu #2558).
+        "unacked_restore_interval": 5,
+        "unacked_restore_throttle": 1,
+        # redis-py waits for ever on a half-open connection (redis-py #2243, celery #8030, #8384, #10205).
+        "socket_timeout": SOCKET_TIMEOUT,
+        "socket_connect_timeout": CONNECT_TIMEOUT,
+        "socket_keepalive": True,  # kombu drops it for a Unix socket, where redis-py would raise TypeError
+        "health_check_interval": HEALTH_CHECK_INTERVAL,
+        "retry_on_timeout": True,
+    }
+
+
+def create_app(queue_url: str) -> Celery:
+    """The app on `queue_url` (`redis://…`, `rediss://…` or `redis+socket:///path`). Connects to nothing yet."""
+    app = Celery("marey", broker=queue_url, include=["shared.runtime.tasks"])
+    app.conf.update(
+        broker_transport_options=transport_options(),
+        result_backend_transport_options={"visibility_timeout": VISIBILITY_TIMEOUT},
+        visibility_timeout=VISIBILITY_TIMEOUT,
+        broker_connection_retry_on_startup=True,
+        broker_connection_max_retries=None,  # a worker outlives any outage of the queue
+        broker_pool_limit=2,
+        # No results: the outcome stands in the rows, and result keys leak (celery #3812, #4824, #6963).
+        result_backend=None,
+        task_ignore_result=True,
+        task_store_errors_even_if_ignored=False,
+        # A killed child gives its hint back (celery #1628, #3541); the attempts column stops a toxic loop.
+        task_acks_late=True,
+        task_reject_on_worker_lost=True,
+        task_acks_on_failure_or_timeout=True,  # but an exception does not: the rows say what remains
+        task_time_limit=TIME_LIMIT,
+        task_create_missing_queues=True,
+        task_serializer="json",
+        accept_content=["json"],  # never pickle
+        # Prefetched hints would wait behind a long drain (celery #2788, #6500).
+        worker_prefetch_multiplier=1,
+        # One child = one device. CUDA does not survive fork (celery #6036), nor do torch's threads.
+        worker_pool="prefork",
+        worker_concurrency=1,
+        worker_pool_start_method="spawn",
+        worker_proc_alive_timeout=300,  # importing torch and loading a bundle happen before the child reports
+        worker_cancel_long_running_tasks_on_connection_loss=False,  # losing the hint must not stop the work
+        worker_max_tasks_per_child=None,  # the model stays loaded
+        worker_send_task_events=False,
+        worker_enable_remote_control=False,  # liveness is the age of the last tick, not `inspect ping`
+        worker_hijack_root_logger=False,  # structlog has it
+        worker_redirect_stdouts=False,
+        enable_utc=True,
+    )
+    return app

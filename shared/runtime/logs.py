@@ -1,0 +1,70 @@
+"""Structured logs: JSON lines for machines, readable lines for people, never a prompt or a secret.
+
+Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import structlog
+from structlog.stdlib import BoundLogger
+from structlog.typing import EventDict, Processor, WrappedLogger
+
+FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
+"""Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""
+
+
+def _drop_forbidden(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
+    for name in FORBIDDEN & event.keys():
+        event[name] = "(withheld)"
+    return event
+
+
+def _add_service(service: str) -> Processor:
+    def add(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:  # threads have no context variables
+        event.setdefault("service", service)
+        return event
+
+    return add
+
+
+def configure_logging(service: str, *, level: str = "INFO", json: bool = False) -> None:
+    """Send structlog and the standard library's loggers to stderr, one line an event, with `service` in each."""
+    shared: list[Processor] = [
+        structlog.contextvars.merge_contextvars,
+        _add_service(service),
+        structlog.stdlib.add_log_level,
+        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        _drop_forbidden,
+    ]
+    renderer: list[Processor] = (
+        [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
+        if json
+        else [structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty())]
+    )
+    structlog.configure(
+        processors=[*shared, structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
+        logger_factory=structlog.stdlib.LoggerFactory(),
+        wrapper_class=structlog.stdlib.BoundLogger,
+        cache_logger_on_first_use=True,
+    )
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(
+        structlog.stdlib.ProcessorFormatter(
+            foreign_pre_chain=shared,
+            processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *renderer],
+        )
+    )
+    root = logging.getLogger()
+    root.handlers[:] = [handler]
+    root.setLevel(level)
+    # One INFO line per hint and per connection tells nothing; the loop logs its own.
+    for noisy in ("celery.worker.strategy", "celery.app.trace", "kombu", "amqp", "urllib3"):
+        logging.getLogger(noisy).setLevel(max(logging.WARNING, root.level))
+
+
+def logger(name: str) -> BoundLogger:
+    """A logger of `name`; call it with an event and keywords: `log.info("claimed", items=32)`."""
+    return structlog.stdlib.get_logger(name)
