@@ -1,0 +1,323 @@
+"""Feature layouts: the vectors that models read and write, to joints and back.
+
+A layout is a parameter everywhere. `HeadingLayout` is HumanML3D's representation (Guo et al. 2022, section 4.1), with
+263 numbers a frame on 22 joints and 251 on KIT's 21: root yaw rate, root velocity and height, joint positions and
+velocities in the frame of the heading, 6D rotations, foot contacts. Its traps, all of which the code below minds:
+
+- The yaw rate is HALF the yaw step (the angle inside the quaternion); the heading in the world turns by -2 x the sum.
+- The root velocity of step t is turned by the heading of t + 1, the joint velocities by the heading of t.
+- Joint positions lose the root's X and Z, but keep their height over the floor.
+- The 6D block turns raw bone directions, not a T-pose, and every chain starts again from the root: it is not a set of
+  local rotations of any rig, and no decoder here reads it. Poses come from positions (`pose.py`).
+- T poses make T - 1 feature frames.
+
+HumanML3D's own script takes the yaw step from the sine of half quaternions kept at w >= 0, which has the wrong sign
+at the frame where the body passes facing -Z; here the angle is unwrapped, so decoding gives back the joints there too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput, NotFound
+from shared.motion.kinematics import across, facing
+from shared.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
+from shared.motion.skeleton import HUMANML3D, KIT, Skeleton
+
+Float32 = NDArray[np.float32]
+
+
+@runtime_checkable
+class FeatureLayout(Protocol):
+    """What a model's vectors mean."""
+
+    @property
+    def name(self) -> str:
+        """Short name, `humanml3d-263` for instance: what manifests write down."""
+        ...
+
+    @property
+    def dim(self) -> int:
+        """D, numbers a frame."""
+        ...
+
+    @property
+    def fps(self) -> float:
+        """Frames a second of the features."""
+        ...
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The joints that the features describe."""
+        ...
+
+    @property
+    def slices(self) -> Mapping[str, slice]:
+        """The groups of the vector, in order; statistics are averaged within a group."""
+        ...
+
+    def encode(self, joints: Array) -> Float32:
+        """(T, J, 3) metres to (T - 1, D); the motion is put into canonical place first."""
+        ...
+
+    def decode(self, features: Array) -> Float32:
+        """(..., Tf, D) to joints (..., Tf, J, 3) in metres."""
+        ...
+
+    def contacts(self, features: Array) -> NDArray[np.bool_]:
+        """(..., Tf, D) to foot contacts (..., Tf, 4): L ankle, L toe, R ankle, R toe."""
+        ...
+
+    def mirror_joints(self, joints: Array) -> Array:
+        """The motion in a mirror: left and right exchanged, (..., J, 3)."""
+        ...
+
+
+def canonicalize(joints: Array, skeleton: Skeleton) -> Array:
+    """Move and turn a motion: facing +Z in frame 0, root over the origin in frame 0, lowest point at y = 0.
+
+    Args:
+        joints: (T, J, 3) metres, Y up.
+
+    Returns:
+        (T, J, 3) float64.
+    """
+    joints = np.array(joints, np.float64)
+    joints -= [joints[0, 0, 0], joints[..., 1].min(), joints[0, 0, 2]]
+    forward = facing(joints[0], skeleton)
+    return rotate(about("Y", -np.arctan2(forward[0], forward[2])), joints)
+
+
+def mirror_joints(joints: Array, skeleton: Skeleton) -> Array:
+    """Left and right exchanged: x changes sign, and each joint takes the other side's place. (..., J, 3)."""
+    return joints[..., list(skeleton.mirror), :] * np.array([-1, 1, 1], joints.dtype)
+
+
+def gaussian_smooth(values: Array, sigma: float) -> Array:
+    """Gaussian filter over axis 0 of (T, C), ends repeated, cut at four sigma."""
+    if sigma <= 0:
+        return values
+    radius = int(4 * sigma + 0.5)
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
+    kernel /= kernel.sum()
+    return np.stack([np.convolve(padded[:, c], kernel, mode="valid") for c in range(values.shape[1])], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class HeadingLayout:
+    """HumanML3D's layout for any skeleton: 1 + 2 + 1 + 3 (J - 1) + 6 (J - 1) + 3 J + 4 numbers a frame.
+
+    Attributes:
+        name, fps, skeleton: see `FeatureLayout`.
+        directions: (J, 3) raw direction of the bone from the parent, for the 6D block alone.
+        contact_threshold: squared displacement a frame, in units squared, under which a foot stands.
+        facing_sigma: frames of Gaussian smoothing of the facing; 0 leaves it as measured.
+        facing_hips: weight of the hips beside the shoulders in the smoothed facing. The published vectors have -1: the
+            script that made them unpacks (r_hip, l_hip) as (l_hip, r_hip) there, though not where it places frame 0.
+        facing_start: which facing is +Z in frame 0. The published vectors take the measured one and then call the
+            smoothed one of frame 0 zero too, which leaves a jump of the heading after frame 0 (12 degrees in clip
+            012314); with `smoothed` there is none.
+        unit: metres in one unit of the features (KIT-ML counts millimetres).
+    """
+
+    name: str
+    fps: float
+    skeleton: Skeleton
+    directions: Array = field(repr=False)
+    contact_threshold: float
+    facing_sigma: float = 20.0
+    facing_hips: float = 1.0
+    facing_start: Literal["measured", "smoothed"] = "measured"
+    unit: float = 1.0
+
+    @property
+    def dim(self) -> int:
+        """D."""
+        return 12 * len(self.skeleton) - 1
+
+    @property
+    def slices(self) -> Mapping[str, slice]:
+        """yaw, velocity, height, positions, rotations, velocities, contacts."""
+        joints = len(self.skeleton)
+        sizes = {
+            "yaw": 1,
+            "velocity": 2,
+            "height": 1,
+            "positions": 3 * (joints - 1),
+            "rotations": 6 * (joints - 1),
+            "velocities": 3 * joints,
+            "contacts": 4,
+        }
+        ends = np.cumsum(list(sizes.values())).tolist()
+        return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+
+    def with_facing(
+        self, *, sigma: float, hips: float = 1.0, start: Literal["measured", "smoothed"] = "smoothed"
+    ) -> HeadingLayout:
+        """The same layout with the heading found in another way; decoding is the same."""
+        return replace(self, facing_sigma=sigma, facing_hips=hips, facing_start=start)
+
+    def canonicalize(self, joints: Array) -> Array:
+        """The motion (T, J, 3) in the place that `encode` gives it: see `canonicalize` and `facing_start`."""
+        return self._place(joints)[0]
+
+    def _place(self, joints: Array) -> tuple[Array, Array]:
+        """Joints (T, J, 3) in canonical place, and half the yaw (T,) that turns the smoothed facing to +Z: unwrapped,
+        zero in frame 0."""
+        places = canonicalize(joints, self.skeleton)
+        right = across(places, self.skeleton, hips=self.facing_hips)
+        right = gaussian_smooth(right[:, [0, 2]], self.facing_sigma)  # a shorter vector in the plane weighs less
+        half_yaw = -0.5 * np.unwrap(np.arctan2(right[:, 1], -right[:, 0]))  # forward = up x right
+        if self.facing_start == "smoothed":
+            places = rotate(about("Y", 2 * half_yaw[0]), places)
+            half_yaw -= half_yaw[0]
+        half_yaw[0] = 0.0
+        return places, half_yaw
+
+    def encode(self, joints: Array) -> Float32:
+        """Features of a motion.
+
+        Args:
+            joints: (T, J, 3) metres, Y up, at `fps`, anywhere and facing anywhere; T at least 2.
+
+        Returns:
+            (T - 1, D) float32. `decode` of it equals `self.canonicalize(joints)[:-1]` to rounding.
+
+        Raises:
+            InvalidInput: wrong shape, fewer than two frames, or numbers that are not finite.
+        """
+        if joints.ndim != 3 or joints.shape[1:] != (len(self.skeleton), 3) or len(joints) < 2:
+            wanted = f"(T >= 2, {len(self.skeleton)}, 3)"
+            raise InvalidInput(f"joints have shape {joints.shape}, not {wanted}", where=self.name)
+        if not np.isfinite(joints).all():
+            raise InvalidInput("joints hold NaN or infinite numbers", where=self.name)
+        places, half_yaw = self._place(joints)
+        places /= self.unit
+        heading = np.zeros((len(places), 1, 4))  # (T, 1, 4): world to heading
+        heading[:, 0, 0], heading[:, 0, 2] = np.cos(half_yaw), np.sin(half_yaw)
+        steps = places[1:] - places[:-1]
+        local = places.copy()
+        local[..., [0, 2]] -= places[:, :1, [0, 2]]
+        local = rotate(heading, local)
+        squared = np.einsum("tji,tji->tj", *[steps[:, list(self.skeleton.feet)]] * 2)
+        frames = len(steps)
+        return np.concatenate(
+            [
+                np.diff(half_yaw)[:, None],
+                rotate(heading[1:, 0], steps[:, 0])[:, [0, 2]],
+                places[:-1, 0, 1:2],
+                local[:-1, 1:].reshape(frames, -1),
+                to_6d(self._bone_rotations(places[:-1], heading[:-1]))[:, 1:].reshape(frames, -1),
+                rotate(heading[:-1], steps).reshape(frames, -1),
+                squared < self.contact_threshold,
+            ],
+            axis=1,
+        ).astype(np.float32)
+
+    def _bone_rotations(self, places: Array, heading: Array) -> Array:
+        """(T, J, 4) rotation of each bone from its raw direction, relative to the bone before it in its chain; chains
+        begin at the root's children and wherever a joint branches off, each again from the root rotation."""
+        skeleton = self.skeleton
+        parents = np.array([max(p, 0) for p in skeleton.parents])
+        directions = np.array(self.directions, np.float64)
+        directions[0] = [0, 0, 1]  # any: the root has no bone
+        bones = places - places[:, parents]
+        bones[:, 0] = [0, 0, 1]
+        world = between(directions, bones)
+        before = world[:, parents]
+        begins = [j for j, p in enumerate(skeleton.parents) if p <= 0 or skeleton.children[p][0] != j]
+        before[:, begins] = heading
+        return multiply(conjugate(before), world)
+
+    def root_trajectory(self, features: Array) -> tuple[Array, Array]:
+        """Half yaw (..., Tf) and root position (..., Tf, 3) in metres, by summing up the first four numbers."""
+        values = np.asarray(features[..., :4], np.float64)
+        half_yaw = np.zeros(values.shape[:-1])
+        half_yaw[..., 1:] = np.cumsum(values[..., :-1, 0], axis=-1)
+        root = np.zeros((*values.shape[:-1], 3))
+        # the step of t - 1 was turned by the heading of t; back to the world: about Y by -2 half_yaw
+        cos, sin = np.cos(2 * half_yaw[..., 1:]), -np.sin(2 * half_yaw[..., 1:])
+        x, z = values[..., :-1, 1], values[..., :-1, 2]
+        root[..., 1:, 0] = np.cumsum(cos * x + sin * z, axis=-1)
+        root[..., 1:, 2] = np.cumsum(cos * z - sin * x, axis=-1)
+        root[..., 1] = values[..., 3]
+        return half_yaw, root * self.unit
+
+    def decode(self, features: Array) -> Float32:
+        """Joints of features, from the root's motion and the positions.
+
+        Args:
+            features: (..., Tf, D), not normalized.
+
+        Returns:
+            (..., Tf, J, 3) float32, metres, facing +Z in frame 0.
+
+        Raises:
+            InvalidInput: wrong width or no frames.
+        """
+        if features.ndim < 2 or features.shape[-1] != self.dim or not features.shape[-2]:
+            raise InvalidInput(f"features have shape {features.shape}, not (..., Tf >= 1, {self.dim})", where=self.name)
+        half_yaw, root = self.root_trajectory(features)
+        local = np.asarray(features[..., self.slices["positions"]], np.float64)
+        local = local.reshape(*local.shape[:-1], -1, 3) * self.unit
+        cos, sin = np.cos(2 * half_yaw)[..., None], -np.sin(2 * half_yaw)[..., None]
+        joints = np.empty((*local.shape[:-2], len(self.skeleton), 3), np.float32)
+        joints[..., 0, :] = root
+        joints[..., 1:, 0] = cos * local[..., 0] + sin * local[..., 2] + root[..., None, 0]
+        joints[..., 1:, 1] = local[..., 1]
+        joints[..., 1:, 2] = cos * local[..., 2] - sin * local[..., 0] + root[..., None, 2]
+        return joints
+
+    def contacts(self, features: Array) -> NDArray[np.bool_]:
+        """(..., Tf, 4) L ankle, L toe, R ankle, R toe."""
+        return features[..., self.slices["contacts"]] > 0.5
+
+    def mirror_joints(self, joints: Array) -> Array:
+        """See `mirror_joints`."""
+        return mirror_joints(joints, self.skeleton)
+
+
+def _directions(rows: str) -> Array:
+    """One letter a joint: x y z for +, X Y Z for -, o for the root."""
+    axes = {"o": (0, 0, 0), "x": (1, 0, 0), "X": (-1, 0, 0), "y": (0, 1, 0), "Y": (0, -1, 0), "z": (0, 0, 1)}
+    return normalize(np.array([axes[letter] for letter in rows], np.float64))
+
+
+# Raw directions, thresholds and rates: EricGuo5513/momask-codes, utils/paramUtil.py and motion_process.py (MIT).
+HUMANML3D_263 = HeadingLayout(
+    name="humanml3d-263",
+    fps=20.0,
+    skeleton=HUMANML3D,
+    directions=_directions("oxXyYYyYYyzzyxXzYYYYYY"),
+    contact_threshold=0.002,
+    facing_hips=-1.0,
+)
+KIT_251 = HeadingLayout(
+    name="kit-251",
+    fps=12.5,
+    skeleton=KIT,
+    directions=_directions("oyyyyxYYXYYxYYzzXYYzz"),
+    contact_threshold=0.05,
+    facing_hips=-1.0,
+    unit=0.001,
+)
+
+LAYOUTS: Mapping[str, FeatureLayout] = {each.name: each for each in (HUMANML3D_263, KIT_251)}
+
+
+def layout(name: str) -> FeatureLayout:
+    """A layout by its name.
+
+    Raises:
+        NotFound: no such layout here.
+    """
+    try:
+        return LAYOUTS[name]
+    except KeyError:
+        raise NotFound(f"no feature layout `{name}`", hint=f"known: {', '.join(LAYOUTS)}") from None

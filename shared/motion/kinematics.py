@@ -1,0 +1,66 @@
+"""Forward kinematics and what is measured on joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared.motion.rotations import Array, cross, multiply, normalize, rotate
+from shared.motion.skeleton import Skeleton
+
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def global_rotations(skeleton: Skeleton, rotations: Array) -> Array:
+    """Local quaternions (T, J, 4) to world ones, a level of the tree at a time."""
+    world = np.array(rotations, np.float64)
+    parents = np.array(skeleton.parents)
+    for level in skeleton.levels[1:]:
+        world[:, level] = multiply(world[:, parents[level]], world[:, level])
+    return world
+
+
+def forward_kinematics(
+    skeleton: Skeleton, rotations: Array, root: Array, *, positions: Array | None = None, world: Array | None = None
+) -> Array:
+    """Joint positions of a pose.
+
+    Args:
+        skeleton: its offsets are the bones, in metres.
+        rotations: (T, J, 4) local quaternions `w x y z`.
+        root: (T, 3) position of joint 0 in the world (the root's own offset is not added).
+        positions: (T, J, 3) local translations that stand in for the offsets, when bones change length.
+        world: the global rotations, when the caller has them already.
+
+    Returns:
+        (T, J, 3) float64, metres.
+    """
+    world = global_rotations(skeleton, rotations) if world is None else world
+    offsets = np.asarray(skeleton.offsets if positions is None else positions, np.float64)
+    parents = np.array(skeleton.parents)
+    joints = np.empty((*world.shape[:2], 3))
+    joints[:, 0] = root
+    for level in skeleton.levels[1:]:
+        joints[:, level] = joints[:, parents[level]] + rotate(world[:, parents[level]], offsets[..., level, :])
+    return joints
+
+
+def bone_lengths(joints: Array, skeleton: Skeleton) -> Array:
+    """(T, J) distance of each joint from its parent; zero for the root."""
+    parents = np.array([max(p, 0) for p in skeleton.parents])
+    return np.linalg.norm(joints - joints[..., parents, :], axis=-1)
+
+
+def across(joints: Array, skeleton: Skeleton, *, hips: float = 1.0) -> Array:
+    """Unit vectors (..., 3) from the left to the right of the body: shoulders and hips together.
+
+    As in HumanML3D: r_hip - l_hip + r_shoulder - l_shoulder; `hips` weighs the hips' part.
+    """
+    r_hip, l_hip, r_shoulder, l_shoulder = skeleton.facing
+    shoulders = joints[..., r_shoulder, :] - joints[..., l_shoulder, :]
+    return normalize(shoulders + hips * (joints[..., r_hip, :] - joints[..., l_hip, :]))
+
+
+def facing(joints: Array, skeleton: Skeleton) -> Array:
+    """Where the body looks: unit vectors (..., 3) in the floor plane, up x across."""
+    right = across(joints, skeleton)
+    return normalize(cross(np.broadcast_to(UP, right.shape), right))

@@ -1,0 +1,251 @@
+"""Skeletons as data.
+
+A skeleton is a tree of joints with a rest pose: the T-pose, facing +Z, Y up, arms along X (the left hand at +X), feet
+forward, in metres. With all local rotations zero a body stands in exactly that pose.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A tree of joints with its T-pose.
+
+    Attributes:
+        name: short name, `humanml3d` for instance.
+        joint_names: one a joint, unique.
+        parents: index of the parent, -1 for the root; parents come before children.
+        offsets: (J, 3) T-pose, metres, from the parent; the root's own is where it stands over the floor.
+        mirror: joint index of the other side (itself on the midline).
+        feet: L ankle, L toe, R ankle, R toe; empty when the skeleton has no known feet.
+        facing: r_hip, l_hip, r_shoulder, l_shoulder; empty when unknown.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Float32 = field(repr=False)
+    mirror: tuple[int, ...] = field(repr=False)
+    feet: tuple[int, ...] = field(default=(), repr=False)
+    facing: tuple[int, ...] = field(default=(), repr=False)
+
+    def __post_init__(self) -> None:
+        count = len(self.joint_names)
+        if not count or len(self.parents) != count or len(self.mirror) != count:
+            raise InvalidInput("names, parents and mirror of a skeleton must have one entry a joint", where=self.name)
+        if self.offsets.shape != (count, 3):
+            raise InvalidInput(f"offsets have shape {self.offsets.shape}, not ({count}, 3)", where=self.name)
+        if self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents) if j):
+            raise InvalidInput("joint 0 is the root and parents come before children", where=self.name)
+        if len(set(self.joint_names)) != count:
+            raise InvalidInput("two joints have the same name", where=self.name)
+
+    def __len__(self) -> int:
+        return len(self.joint_names)
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Child indices of each joint."""
+        return tuple(tuple(c for c, p in enumerate(self.parents) if p == j) for j in range(len(self)))
+
+    @cached_property
+    def levels(self) -> tuple[NDArray[np.intp], ...]:
+        """Joint indices by depth, the root's level first: what can be computed at once lies in one level."""
+        depth = [0] * len(self)
+        for j, p in enumerate(self.parents[1:], start=1):
+            depth[j] = depth[p] + 1
+        return tuple(np.array([j for j in range(len(self)) if depth[j] == d], np.intp) for d in range(max(depth) + 1))
+
+    @cached_property
+    def rest(self) -> Float32:
+        """(J, 3) joint positions of the T-pose, the root at its own offset."""
+        rest = self.offsets.copy()
+        for j, p in enumerate(self.parents[1:], start=1):
+            rest[j] += rest[p]
+        return rest
+
+    def with_offsets(self, offsets: NDArray[np.floating]) -> Skeleton:
+        """The same tree with other proportions."""
+        return replace(self, offsets=np.asarray(offsets, np.float32))
+
+    def index(self, name: str) -> int:
+        """Index of a joint by name."""
+        return self.joint_names.index(name)
+
+
+def _sided(
+    name: str,
+    rows: str,
+    *,
+    scale: float = 1.0,
+    left: str,
+    right: str,
+    feet: tuple[str, str, str, str],
+    facing: tuple[str, str, str, str],
+) -> Skeleton:
+    """Read a skeleton from lines of `joint parent x y z`; right joints repeat the left ones with x mirrored (`=`)."""
+    names: list[str] = []
+    parents: list[int] = []
+    offsets: dict[str, list[float]] = {}
+    table = [row.split() for row in rows.strip().splitlines()]
+    for joint, parent, *numbers in table:
+        names.append(joint)
+        parents.append(names.index(parent) if parent != "-" else -1)
+        if numbers != ["="]:
+            offsets[joint] = [float(n) * scale for n in numbers]
+    for joint, _, *numbers in table:
+        if numbers == ["="]:
+            x, y, z = offsets[left + joint.removeprefix(right)]
+            offsets[joint] = [-x, y, z]
+
+    def other(joint: str) -> int:
+        if joint.startswith(left):
+            return names.index(right + joint.removeprefix(left))
+        if joint.startswith(right):
+            return names.index(left + joint.removeprefix(right))
+        return names.index(joint)
+
+    return Skeleton(
+        name=name,
+        joint_names=tuple(names),
+        parents=tuple(parents),
+        offsets=np.array([offsets[n] for n in names], np.float32),
+        mirror=tuple(other(n) for n in names),
+        feet=tuple(names.index(n) for n in feet),
+        facing=tuple(names.index(n) for n in facing),
+    )
+
+
+# Joint order of HumanML3D (Guo et al. 2022), which is SMPL's. Proportions: an adult of 1.73 m, the root at 0.94 m,
+# which is the mean root height of the data set (0.9386).
+HUMANML3D = _sided(
+    "humanml3d",
+    """
+    pelvis      -           0       0.940   0
+    L_hip       pelvis      0.080  -0.080   0
+    R_hip       pelvis      =
+    spine1      pelvis      0       0.115   0
+    L_knee      L_hip       0      -0.390   0
+    R_knee      R_hip       =
+    spine2      spine1      0       0.135   0
+    L_ankle     L_knee      0      -0.410   0
+    R_ankle     R_knee      =
+    spine3      spine2      0       0.055   0
+    L_foot      L_ankle     0      -0.060   0.130
+    R_foot      R_ankle     =
+    neck        spine3      0       0.215   0
+    L_collar    spine3      0.075   0.130   0
+    R_collar    spine3      =
+    head        neck        0       0.095   0.025
+    L_shoulder  L_collar    0.105   0.030   0
+    R_shoulder  R_collar    =
+    L_elbow     L_shoulder  0.270   0       0
+    R_elbow     R_shoulder  =
+    L_wrist     L_elbow     0.250   0       0
+    R_wrist     R_elbow     =
+    """,
+    left="L_",
+    right="R_",
+    feet=("L_ankle", "L_foot", "R_ankle", "R_foot"),
+    facing=("R_hip", "L_hip", "R_shoulder", "L_shoulder"),
+)
+
+# Joint order of KIT-ML in HumanML3D's processing; names of the Master Motor Map. Joints 13-15 and 18-20 are ankle,
+# mid-foot and toe. Proportions of the same adult.
+KIT = _sided(
+    "kit",
+    """
+    root    -      0       0.940   0
+    BP      root   0       0.110   0
+    BT      BP     0       0.190   0
+    BLN     BT     0       0.190   0
+    BUN     BLN    0       0.120   0
+    RS      BLN    =
+    RE      RS     =
+    RW      RE     =
+    LS      BLN    0.180   0       0
+    LE      LS     0.270   0       0
+    LW      LE     0.250   0       0
+    RH      root   =
+    RK      RH     =
+    RA      RK     =
+    RMrot   RA     =
+    RF      RMrot  =
+    LH      root   0.080  -0.080   0
+    LK      LH     0      -0.390   0
+    LA      LK     0      -0.410   0
+    LMrot   LA     0      -0.050   0.080
+    LF      LMrot  0      -0.010   0.070
+    """,
+    left="L",
+    right="R",
+    feet=("LMrot", "LF", "RMrot", "RF"),
+    facing=("RH", "LH", "RS", "LS"),
+)
+
+# SnapMoGen's rig (Guo et al. 2025). Its "centimetres" are a rig scale (the character is about 1.1 m high), kept here as
+# they are: scale on export.
+SNAPMOGEN = _sided(
+    "snapmogen",
+    """
+    ROOT            -              0       56.02   -5.659
+    C_spine0001     ROOT           0        1.619   0
+    C_spine0002     C_spine0001    0        4.942   0
+    C_spine0003     C_spine0002    0        4.8606  0
+    C_neck0001      C_spine0003    0       17.026   0
+    C_neck0002      C_neck0001     0        3.25    0
+    C_head          C_neck0002     0        5.278   0
+    L_clavicle      C_spine0003    4.59    12.067   0.834
+    L_armUpper0001  L_clavicle     7.8296  -0.0005 -3.4524
+    L_armLower0001  L_armUpper0001 16.585   0       0.0015
+    L_hand0001      L_armLower0001 16.988   0       0.0015
+    R_clavicle      C_spine0003    =
+    R_armUpper0001  R_clavicle     =
+    R_armLower0001  R_armUpper0001 =
+    R_hand0001      R_armLower0001 =
+    C_pelvis0001    ROOT           0        0       0
+    L_legUpper0001  C_pelvis0001   6.6     -6.027   0.539
+    L_legLower0001  L_legUpper0001 -0.143 -19.187   0.040
+    L_foot0001      L_legLower0001 -0.134 -18.034  -1.045
+    L_foot0002      L_foot0001     0       -5.392   9.603
+    R_legUpper0001  C_pelvis0001   =
+    R_legLower0001  R_legUpper0001 =
+    R_foot0001      R_legLower0001 =
+    R_foot0002      R_foot0001     =
+    """,
+    scale=0.01,
+    left="L_",
+    right="R_",
+    feet=("L_foot0001", "L_foot0002", "R_foot0001", "R_foot0002"),
+    facing=("R_legUpper0001", "L_legUpper0001", "R_armUpper0001", "L_armUpper0001"),
+)
+
+SKELETONS: dict[str, Skeleton] = {s.name: s for s in (HUMANML3D, KIT, SNAPMOGEN)}
+
+
+_SIDE = re.compile(r"(?<![a-z])(left|right|l|r)(?![a-z])|(left|right)", re.IGNORECASE)
+_OTHER = {"left": "right", "right": "left", "l": "r", "r": "l"}
+
+
+def mirror_by_name(names: tuple[str, ...]) -> tuple[int, ...]:
+    """Pair left and right joints by name (`LeftArm`, `hand_l`, `L_Thigh`); unpaired joints mirror to themselves."""
+    lowered = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", n).replace("__", "_").lower() for n in names]
+    index = {n: j for j, n in enumerate(lowered)}
+
+    def other(j: int) -> int:
+        swapped = _SIDE.sub(lambda m: _OTHER[m.group(0).lower()], lowered[j].replace("_", " "), count=1)
+        return index.get(swapped.replace(" ", "_"), j)
+
+    pairs = [other(j) for j in range(len(names))]
+    return tuple(p if pairs[p] == j else j for j, p in enumerate(pairs))
