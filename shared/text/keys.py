@@ -1,0 +1,65 @@
+"""The key of a prompt's features, computed without loading a model: the API asks for it at submit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from shared.bundles import TextSpec, find_bundle
+from shared.errors import InvalidBundle
+from shared.settings import Settings
+
+PIPELINE_VERSION = 1
+"""Raise it when the graph or the node features of the same prompt change for any reason but weights."""
+REWRITER_VERSIONS = {"none": 1, "rules": 1}
+LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
+NO_LABELLER = "none"
+"""A spec may say so: graphs are the motion node alone."""
+
+
+def feature_key(prompt: str, spec: TextSpec) -> str:
+    """sha256 over the prompt and everything its features depend on, each with version or weights hash.
+
+    Args:
+        prompt: as `check_prompt` returns it.
+        spec: with both hashes (`resolve` fills them).
+
+    Raises:
+        InvalidBundle: a hash is missing.
+    """
+    if spec.encoder_sha256 is None or (spec.labeller_sha256 is None and spec.labeller != NO_LABELLER):
+        raise InvalidBundle(
+            "the bundle does not say which encoder and labeller weights it was trained with",
+            hint="Resolve its text specification first (shared.text.keys.resolve).",
+        )
+    parts = [
+        PIPELINE_VERSION,
+        prompt,
+        [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]],
+        [spec.labeller, spec.labeller_sha256],
+        [spec.encoder, spec.encoder_sha256, spec.width, spec.node_features],
+        [spec.max_actions, spec.max_specifics],
+    ]
+    return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
+
+
+def resolve(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
+    """`spec` with the hashes it leaves open filled from the weights on this machine. Loads no model.
+
+    Raises:
+        NotFound: weights a hash is needed of are not here.
+    """
+    changes: dict[str, str] = {}
+    if spec.encoder_sha256 is None:
+        from shared.text.encoders import find_weights, weights_sha256
+
+        changes["encoder_sha256"] = weights_sha256(find_weights(spec.encoder, config=config))
+    if spec.labeller_sha256 is None and spec.labeller != NO_LABELLER:
+        bundle = find_bundle(labeller_bundle(spec.labeller), config=config, verify=False)
+        changes["labeller_sha256"] = bundle.weights_sha256
+    return spec.model_copy(update=changes)
+
+
+def labeller_bundle(name: str) -> str:
+    """The bundle of a labeller: `light` is `srl-light`; anything else is a bundle's own name or path."""
+    return LABELLER_BUNDLES.get(name, name)

@@ -1,0 +1,45 @@
+"""Finding a labeller by its name in `TextSpec`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shared.bundles import find_bundle
+from shared.errors import InvalidBundle
+from shared.text.keys import NO_LABELLER, labeller_bundle
+from shared.text.roles import Frame, RoleLabeller
+
+
+class NoLabeller:
+    """Finds nothing: every graph is its motion node alone. For ablations; it has to be asked for by name."""
+
+    name = NO_LABELLER
+    sha256 = ""
+
+    def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
+        """No frames."""
+        return [() for _ in sentences]
+
+
+def load_labeller(name: str) -> RoleLabeller:
+    """The labeller `light`, `bert-srl`, `none`, or the bundle of that name or path.
+
+    Raises:
+        NotFound: its bundle is not here.
+        InvalidBundle: the bundle is no labeller.
+    """
+    if name == NO_LABELLER:
+        return NoLabeller()
+    bundle = find_bundle(labeller_bundle(name))
+    model = bundle.manifest.model
+    if bundle.manifest.kind == "labeller" and model == "light":
+        from shared.text.light import LightLabeller
+
+        return LightLabeller(bundle)
+    if bundle.manifest.kind == "labeller" and model == "bert-srl":
+        from shared.text.bert_srl import BertLabeller
+
+        return BertLabeller(bundle)
+    raise InvalidBundle(
+        f"is a {bundle.manifest.kind} ({model}), not a role labeller", where=str(bundle.path), hint="Use 'light'."
+    )

@@ -1,0 +1,158 @@
+"""The one way from a prompt to features: rewriter, labeller, graph, encoder."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.bundles import TextSpec
+from shared.errors import InvalidBundle
+from shared.text.encoders import Encoding, TextEncoder, load_encoder
+from shared.text.features import TextFeatures
+from shared.text.graph import Node, SemanticGraph, build_graph
+from shared.text.keys import NO_LABELLER, feature_key
+from shared.text.labellers import load_labeller
+from shared.text.prompts import check_prompt
+from shared.text.rewriters import PromptRewriter, load_rewriter
+from shared.text.roles import RoleLabeller
+
+CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
+EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
+
+
+class TextPipeline:
+    """Prompts in, graphs and features out.
+
+    A vector depends on its text alone (texts are encoded one by one), so features are equal in any batch.
+    """
+
+    def __init__(
+        self, spec: TextSpec, *, rewriter: PromptRewriter, labeller: RoleLabeller, encoder: TextEncoder
+    ) -> None:
+        """Put a pipeline together from parts; most callers want `load`.
+
+        Raises:
+            InvalidBundle: the weights or the width are not those `spec` names.
+        """
+        _refuse_mismatch("encoder", spec.encoder, spec.encoder_sha256, encoder.name, encoder.sha256)
+        if encoder.width != spec.width:
+            raise InvalidBundle(f"text width {spec.width} is wanted, but {encoder.name} gives {encoder.width}")
+        labeller_sha256 = labeller.sha256 or None
+        if spec.labeller != NO_LABELLER:
+            _refuse_mismatch("labeller", labeller.name, spec.labeller_sha256, labeller.name, labeller.sha256)
+        self.spec = spec.model_copy(update={"encoder_sha256": encoder.sha256, "labeller_sha256": labeller_sha256})
+        self.rewriter = rewriter
+        self.labeller = labeller
+        self.encoder = encoder
+        self._pooled: OrderedDict[str, NDArray[np.float32]] = OrderedDict()
+
+    @classmethod
+    def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
+        """What a bundle's manifest says under `text`, with the weights found on this machine.
+
+        Args:
+            spec: names, hashes and caps. Open hashes are filled in `pipeline.spec`.
+            encoder_path: a folder of encoder weights; None = wherever they are installed.
+
+        Raises:
+            NotFound: weights are not here; the hint says how to get them.
+            InvalidBundle: they are here, but not those `spec` names.
+        """
+        return cls(
+            spec,
+            rewriter=load_rewriter(spec.rewriter),
+            labeller=load_labeller(spec.labeller),
+            encoder=load_encoder(spec.encoder, encoder_path),
+        )
+
+    def key(self, prompt: str) -> str:
+        """Key of the prompt's features: sha256 over the prompt and all that its features depend on."""
+        return feature_key(check_prompt(prompt), self.spec)
+
+    def parse(self, prompts: Sequence[str]) -> list[SemanticGraph]:
+        """The graph of each prompt, rewritten first.
+
+        Raises:
+            InvalidInput: a prompt cannot be used (`check_prompt`).
+        """
+        return self._graphs([self.rewriter.rewrite(check_prompt(prompt)) for prompt in prompts])
+
+    def features(self, prompts: Sequence[str]) -> list[TextFeatures]:
+        """Graph and node vectors of each prompt.
+
+        Raises:
+            InvalidInput: a prompt cannot be used (`check_prompt`).
+        """
+        checked = [check_prompt(prompt) for prompt in prompts]
+        rewritten = [self.rewriter.rewrite(prompt) for prompt in checked]
+        return [
+            TextFeatures(prompt, text, graph, self.encode(graph))
+            for prompt, text, graph in zip(checked, rewritten, self._graphs(rewritten), strict=True)
+        ]
+
+    def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
+        """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states
+        over its words (`TextSpec.node_features`; the latter as in GraphMotion). Row 0 is always the pooled sentence.
+        """
+        if self.spec.node_features == "pooled":
+            rows = [self.pooled(node.text) for node in graph.nodes]
+        else:
+            sentence = self.encoder.encode(_strip(graph.text))
+            starts = _word_starts(graph)
+            rows = [self._span(sentence, graph, starts, node) for node in graph.nodes]
+        return np.stack(rows).astype(np.float16)
+
+    def pooled(self, text: str) -> NDArray[np.float32]:
+        """Pooled encoding (W,) of a text without the punctuation at its ends; the latest few thousand are kept."""
+        text = _strip(text)
+        vector = self._pooled.get(text)
+        if vector is None:
+            vector = self.encoder.encode(text).pooled
+            self._pooled[text] = vector
+            if len(self._pooled) > CACHED_TEXTS:
+                self._pooled.popitem(last=False)
+        else:
+            self._pooled.move_to_end(text)
+        return vector
+
+    def _graphs(self, texts: Sequence[str]) -> list[SemanticGraph]:
+        frames = self.labeller.label([text.split() for text in texts])
+        caps = {"max_actions": self.spec.max_actions, "max_specifics": self.spec.max_specifics}
+        return [build_graph(text, found, **caps) for text, found in zip(texts, frames, strict=True)]
+
+    def _span(self, sentence: Encoding, graph: SemanticGraph, starts: list[int], node: Node) -> NDArray[np.float32]:
+        if node.level == "motion":
+            return sentence.pooled
+        last = node.words[-1]
+        span = sentence.span(starts[node.words[0]], starts[last] + len(graph.words[last]))
+        return self.pooled(node.text) if span is None else span  # past the encoder's limit: its own text
+
+
+def _word_starts(graph: SemanticGraph) -> list[int]:
+    """Offset of each word in the stripped sentence (words are one space apart: `check_prompt`)."""
+    offset = -(len(graph.text) - len(graph.text.lstrip(EDGE_PUNCTUATION)))
+    starts: list[int] = []
+    for word in graph.words:
+        starts.append(offset)
+        offset += len(word) + 1
+    return starts
+
+
+def _strip(text: str) -> str:
+    """Without punctuation at the ends: "left." and "left" are one word (and a text of dots stays what it is)."""
+    return text.strip(EDGE_PUNCTUATION + " ") or text
+
+
+def _refuse_mismatch(what: str, name: str, sha256: str | None, found_name: str, found_sha256: str) -> None:
+    if name != found_name:
+        raise InvalidBundle(f"the text {what} {name!r} is wanted, but {found_name!r} was loaded")
+    if sha256 is not None and sha256 != found_sha256:
+        raise InvalidBundle(
+            f"the model was trained with {what} {name!r} of sha256 {sha256[:12]}, but this machine has "
+            f"{found_sha256[:12]}",
+            hint="Other weights give other features and a motion that ignores the prompt: install the same ones.",
+        )

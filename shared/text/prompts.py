@@ -1,0 +1,75 @@
+"""What may be a prompt. The one place that knows; the command line, the API and the pipeline all ask here."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from shared.errors import InvalidInput
+
+MAX_WORDS = 200
+"""Whitespace words. A detailed caption has 30 to 60; the encoders see at most 128 to 512 sub-words."""
+MAX_CHARACTERS = 2_000
+MAX_WORD_CHARACTERS = 100
+MIN_LATIN_SHARE = 0.5
+"""The encoders and the labeller read English: text mostly in another script would give an arbitrary motion."""
+
+
+def check_prompt(prompt: str, *, where: str | None = None) -> str:
+    """The prompt as it is stored and parsed: Unicode NFC, runs of whitespace made one space, ends trimmed.
+
+    Args:
+        prompt: what the user wrote.
+        where: line or field, for the error (`line 7`, `items.3.prompt`).
+
+    Raises:
+        InvalidInput: empty, too long, with control characters, or without English words.
+    """
+    if "\x00" in prompt:
+        raise InvalidInput("the prompt holds a NUL byte", where=where, hint="Is the file plain UTF-8 text?")
+    if len(prompt) > MAX_CHARACTERS * 10:  # normalising megabytes first would be work for nothing
+        raise _too_long(f"{len(prompt):,} characters", where)
+    if any("\ud800" <= c <= "\udfff" for c in prompt):
+        raise InvalidInput("the prompt holds broken Unicode (a lone surrogate)", where=where, hint="Save it as UTF-8.")
+    text = " ".join(unicodedata.normalize("NFC", prompt).split())
+    if not text:
+        raise InvalidInput("the prompt is empty", where=where, hint="Describe a motion: 'a person waves'.")
+    control = next((c for c in text if unicodedata.category(c) == "Cc"), None)
+    if control is not None:
+        raise InvalidInput(
+            f"the prompt holds the control character U+{ord(control):04X}", where=where, hint="Remove it."
+        )
+    _check_size(text, where)
+    _check_script(text, where)
+    return text
+
+
+def _check_size(text: str, where: str | None) -> None:
+    words = text.split(" ")
+    if len(words) > MAX_WORDS:
+        raise _too_long(f"{len(words):,} words", where)
+    if len(text) > MAX_CHARACTERS:
+        raise _too_long(f"{len(text):,} characters", where)
+    longest = max(words, key=len)
+    if len(longest) > MAX_WORD_CHARACTERS:
+        raise InvalidInput(
+            f"the word {longest[:20]!r}… has {len(longest):,} characters, at most {MAX_WORD_CHARACTERS} are allowed",
+            where=where,
+            hint="Put spaces between the words.",
+        )
+
+
+def _check_script(text: str, where: str | None) -> None:
+    letters = [c for c in text if c.isalpha()]
+    latin = sum(unicodedata.name(c, "").startswith(("LATIN", "FULLWIDTH LATIN")) for c in letters)
+    if not letters or latin < MIN_LATIN_SHARE * len(letters):
+        raise InvalidInput(
+            "the prompt has no English words", where=where, hint="Prompts are read in English: 'a person waves'."
+        )
+
+
+def _too_long(size: str, where: str | None) -> InvalidInput:
+    return InvalidInput(
+        f"the prompt has {size}; at most {MAX_WORDS} words and {MAX_CHARACTERS:,} characters are allowed",
+        where=where,
+        hint="Describe one motion per prompt; split longer scripts into several prompts.",
+    )
