@@ -1,0 +1,41 @@
+"""Times and limits of the queue; every comparison with them is made by the database's clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from shared.settings import settings
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Times in seconds."""
+
+    lease: float = 10.0
+    stall: float = 120.0
+    """A lease without progress for this long is not renewed."""
+    max_attempts: int = 3
+    patience: float = 30.0
+    """A worker keeps to its loaded bundle until the lane that is next in order has waited this long."""
+    backoff: float = 5.0
+    """Delay after the first retryable error; doubles each attempt, up to `backoff_limit`."""
+    backoff_limit: float = 300.0
+    worker_live: float = 10.0
+    """A worker counts as live this long after it was last seen."""
+    worker_kept: float = 86_400.0
+    idempotency: float = 86_400.0
+    asset_grace: float = 3_600.0
+    """Assets still `writing` are stale this long after their lease went."""
+
+
+@lru_cache(maxsize=1)
+def policy() -> Policy:
+    """The policy of this process, from its settings."""
+    chosen = settings()
+    return Policy(
+        lease=chosen.lease_seconds,
+        stall=chosen.stall_seconds,
+        max_attempts=chosen.max_attempts,
+        worker_live=max(4 * chosen.heartbeat_seconds, chosen.lease_seconds),
+    )

@@ -1,0 +1,134 @@
+"""States of items and jobs, and the one table of allowed transitions.
+
+The database holds the same table in the trigger `item_transition` (a test walks every pair against it), and computes
+a job's state from its counters as a generated column with the rule of `job_state`.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Protocol
+
+
+class ItemState(StrEnum):
+    """Where an item stands. `SUCCEEDED` is final; a re-roll is a new item."""
+
+    READY = "ready"
+    LEASED = "leased"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+    """The handler said the item cannot work, however often it is tried."""
+    DEAD = "dead"
+    """The item used up its attempts (retryable errors, or leases lost while it ran alone)."""
+    CANCELLED = "cancelled"
+
+
+class Stage(StrEnum):
+    """What is done to an item next."""
+
+    TEXT = "text"
+    GENERATE = "generate"
+
+
+class JobControl(StrEnum):
+    """What the operator wants of a job."""
+
+    RUN = "run"
+    PAUSED = "paused"
+    CANCELLED = "cancelled"
+
+
+class JobState(StrEnum):
+    """What a job is doing, derived from its control and counters."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSED = "paused"
+    SUCCEEDED = "succeeded"
+    PARTIAL = "partial"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+class Cause(StrEnum):
+    """Why an item changed its state; stands in its event."""
+
+    CLAIMED = "claimed"
+    COMMITTED = "committed"
+    TEXT_READY = "text_ready"
+    RELEASED = "released"
+    LEASE_LOST = "lease_lost"
+    ERROR = "error"
+    ATTEMPTS_USED_UP = "attempts_used_up"
+    OPERATOR = "operator"
+    FAIL_EARLY = "fail_early"
+
+
+TRANSITIONS: dict[tuple[ItemState, ItemState], frozenset[Cause]] = {
+    (ItemState.READY, ItemState.LEASED): frozenset({Cause.CLAIMED}),
+    (ItemState.LEASED, ItemState.SUCCEEDED): frozenset({Cause.COMMITTED}),
+    (ItemState.LEASED, ItemState.READY): frozenset(
+        {Cause.TEXT_READY, Cause.RELEASED, Cause.LEASE_LOST, Cause.ERROR}  # ERROR: retryable, after `run_after`
+    ),
+    (ItemState.LEASED, ItemState.FAILED): frozenset({Cause.ERROR}),
+    (ItemState.LEASED, ItemState.DEAD): frozenset({Cause.ATTEMPTS_USED_UP}),
+    (ItemState.READY, ItemState.CANCELLED): frozenset({Cause.OPERATOR, Cause.FAIL_EARLY}),
+    (ItemState.LEASED, ItemState.CANCELLED): frozenset({Cause.OPERATOR, Cause.FAIL_EARLY}),
+    (ItemState.FAILED, ItemState.READY): frozenset({Cause.OPERATOR}),
+    (ItemState.DEAD, ItemState.READY): frozenset({Cause.OPERATOR}),
+    (ItemState.CANCELLED, ItemState.READY): frozenset({Cause.OPERATOR}),
+}
+"""Allowed transitions and what may cause each."""
+
+OPEN = frozenset({ItemState.READY, ItemState.LEASED})
+"""States of items that still have work ahead."""
+
+RETRYABLE = frozenset({ItemState.FAILED, ItemState.DEAD, ItemState.CANCELLED})
+"""States an operator may send back to `READY`."""
+
+ENDED = frozenset({JobState.SUCCEEDED, JobState.PARTIAL, JobState.FAILED, JobState.CANCELLED})
+"""States of jobs without open items."""
+
+
+def allowed(before: ItemState, after: ItemState) -> bool:
+    """Whether an item may go from `before` to `after`."""
+    return (before, after) in TRANSITIONS
+
+
+class Counters(Protocol):
+    """How many items of a job are in each state; the states add up to `total`."""
+
+    @property
+    def total(self) -> int: ...
+    @property
+    def ready(self) -> int: ...
+    @property
+    def leased(self) -> int: ...
+    @property
+    def succeeded(self) -> int: ...
+    @property
+    def failed(self) -> int: ...
+    @property
+    def dead(self) -> int: ...
+    @property
+    def cancelled(self) -> int: ...
+
+
+def job_state(control: JobControl, counters: Counters) -> JobState:
+    """The state of a job, from what its operator wants and how its items stand.
+
+    Open items left: paused if the operator says so, running once any item was leased or ended, else queued.
+    None left: succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded;
+    else failed.
+    """
+    if counters.ready + counters.leased > 0:
+        if control is JobControl.PAUSED:
+            return JobState.PAUSED
+        return JobState.QUEUED if counters.ready == counters.total else JobState.RUNNING
+    if counters.total == 0:
+        return JobState.QUEUED  # only inside the transaction that submits it
+    if counters.succeeded == counters.total:
+        return JobState.SUCCEEDED
+    if control is JobControl.CANCELLED:
+        return JobState.CANCELLED
+    return JobState.PARTIAL if counters.succeeded > 0 else JobState.FAILED

@@ -1,0 +1,391 @@
+"""What goes into and comes out of the repositories of `shared.jobs`: frozen dataclasses, nothing that knows SQL."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Generic, TypeVar
+from uuid import UUID
+
+from shared.errors import MareyError
+from shared.jobs.states import ItemState, JobControl, JobState, Stage
+
+DEFAULT_TENANT = "default"
+TEXT_QUEUE = "text"
+SEED_LIMIT = 2**31
+"""Seeds are 0 … 2³¹ − 1."""
+PRIORITY_LIMIT = 1000
+"""Priorities are −1000 … 1000; higher first."""
+
+JsonObject = Mapping[str, object]
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Why an item failed, for a person: the shape of `shared.errors.MareyError`."""
+
+    type: str
+    message: str
+    where: str | None = None
+    hint: str | None = None
+
+    @classmethod
+    def of(cls, error: MareyError) -> Problem:
+        """The problem that an expected error describes."""
+        return cls(error.problem_type, error.message, error.where, error.hint)
+
+
+# --- submit ---
+
+
+@dataclass(frozen=True)
+class NewItem:
+    """One motion to make: a prompt in one variant. Expansion into variants and the drawing of seeds is the caller's.
+
+    Args:
+        index: place of the prompt in the input, from 0; variants share it.
+        prompt: what the person wrote, without NUL characters.
+        model: the handler's queue, as "hgm3".
+        bundle: the exact bundle, name and weights hash.
+        batch_key: hash of the bundle and the settings that are uniform in a batch.
+        text_key: key of the text features (`TextPipeline.key`).
+        text_batch_key: hash of the text specification; prompts of one claim of the text stage share it.
+        seed: 0 … 2³¹ − 1.
+        seconds: length wanted; None = the model's estimate.
+        settings: what the handler needs (steps, guidance, fps, formats, …).
+    """
+
+    index: int
+    prompt: str
+    model: str
+    bundle: str
+    batch_key: str
+    text_key: str
+    text_batch_key: str
+    seed: int
+    variant: int = 0
+    name: str | None = None
+    seconds: float | None = None
+    settings: JsonObject = field(default_factory=dict[str, object])
+    tags: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """A job to submit. `items` is read once, in order, and never held as a whole."""
+
+    items: Iterable[NewItem]
+    tenant: str = DEFAULT_TENANT
+    name: str | None = None
+    comment: str | None = None
+    priority: int = 0
+    fail_early: float | None = None
+    """Share of failed and dead items (0 … 1) above which the rest is cancelled; None = never."""
+    idempotency_key: str | None = None
+    body_sha256: str | None = None
+    """Hex digest of the request's body; goes with `idempotency_key`."""
+
+
+@dataclass(frozen=True)
+class SubmittedJob:
+    """A job that stands in the database; `replayed` when an earlier submit with the same key had made it."""
+
+    id: UUID
+    replayed: bool
+    items: int
+
+
+# --- claim and lease ---
+
+
+@dataclass(frozen=True)
+class ClaimedItem:
+    """An item as its worker sees it."""
+
+    id: UUID
+    position: int
+    index: int
+    variant: int
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    text_key: str
+    seed: int
+    seconds: float | None
+    settings: JsonObject
+    tags: tuple[str, ...]
+    attempts: int
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A batch under one lease: items of one job, one stage and one batch key, in input order."""
+
+    lease_token: UUID
+    tenant: str
+    job: UUID
+    queue: str
+    stage: Stage
+    batch_key: str
+    bundle: str
+    solo: bool
+    """The single item of this claim was in a batch whose lease was lost; losing this one costs it an attempt."""
+    items: tuple[ClaimedItem, ...]
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """What the database says to a worker's heartbeat."""
+
+    lost: bool
+    """The lease is gone (expired and swept, or all its items taken away): stop, throw the batch away."""
+    gone: frozenset[UUID]
+    """Items, of those asked about, that the lease no longer holds: cancelled. Drop their rows."""
+
+
+@dataclass(frozen=True)
+class WorkerBeat:
+    """A worker says that it lives."""
+
+    id: str
+    queue: str
+    host: str
+    pid: int
+    device: str
+    bundle: str | None = None
+    """Bundle it has loaded."""
+    batch_key: str | None = None
+
+
+@dataclass(frozen=True)
+class WorkerRow:
+    """A worker that said it lives."""
+
+    id: str
+    queue: str
+    host: str
+    pid: int
+    device: str
+    bundle: str | None
+    started: datetime
+    seen: datetime
+    live: bool
+
+
+# --- results ---
+
+
+@dataclass(frozen=True)
+class AssetDigest:
+    """Content to store: its digest and size."""
+
+    sha256: str
+    size: int
+    media_type: str = "application/octet-stream"
+
+
+@dataclass(frozen=True)
+class NewMotion:
+    """A finished item: its files lie in the asset store already."""
+
+    item: UUID
+    files: Mapping[str, AssetDigest]
+    """By format ("npz", "bvh")."""
+    frames: int
+    fps: float
+    licence: str
+    """SPDX name or short text of the terms of the weights."""
+    elapsed: float
+    """Seconds of work on it."""
+    metadata: JsonObject = field(default_factory=dict[str, object])
+
+
+@dataclass(frozen=True)
+class NewText:
+    """Text features of one item's prompt."""
+
+    item: UUID
+    key: str
+    blob: bytes
+
+
+@dataclass(frozen=True)
+class ItemFailure:
+    """An item that could not be made."""
+
+    item: UUID
+    problem: Problem
+    retryable: bool
+
+
+@dataclass(frozen=True)
+class Committed:
+    """What became of a write under a lease."""
+
+    items: tuple[UUID, ...]
+    """Written now."""
+    lost: tuple[UUID, ...]
+    """Not ours any more (lease lost, cancelled, or committed before): the result is thrown away."""
+
+
+# --- rows ---
+
+
+@dataclass(frozen=True)
+class JobRow:
+    """A job with its counters."""
+
+    id: UUID
+    tenant: str
+    name: str | None
+    comment: str | None
+    priority: int
+    control: JobControl
+    state: JobState
+    total: int
+    ready: int
+    leased: int
+    succeeded: int
+    failed: int
+    dead: int
+    cancelled: int
+    fail_early: float | None
+    event_seq: int
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+
+
+@dataclass(frozen=True)
+class MotionFile:
+    """One file of a motion."""
+
+    format: str
+    sha256: str
+    size: int
+    media_type: str
+
+
+@dataclass(frozen=True)
+class MotionRow:
+    """A motion with its files, newest first in listings."""
+
+    id: UUID
+    tenant: str
+    job: UUID
+    item: UUID
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    licence: str
+    seed: int
+    variant: int
+    frames: int
+    fps: float
+    elapsed: float
+    metadata: JsonObject
+    files: tuple[MotionFile, ...]
+    created: datetime
+
+
+@dataclass(frozen=True)
+class ItemRow:
+    """An item with its motion, if it has one."""
+
+    id: UUID
+    job: UUID
+    position: int
+    """Place in the job: input order, variants within prompt."""
+    index: int
+    variant: int
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    seed: int
+    seconds: float | None
+    settings: JsonObject
+    tags: tuple[str, ...]
+    stage: Stage
+    state: ItemState
+    attempts: int
+    solo: bool
+    run_after: datetime | None
+    reason: str | None
+    """Why it came to this state."""
+    problem: Problem | None
+    created: datetime
+    finished: datetime | None
+    motion: MotionRow | None
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """One event of a job; `seq` counts from 1 without gaps, in the order of commits."""
+
+    job: UUID
+    seq: int
+    kind: str
+    item: UUID | None
+    reason: str
+    data: JsonObject
+    at: datetime
+
+
+@dataclass(frozen=True)
+class Page(Generic[Row]):
+    """One page of a listing; `cursor` asks for the next, None at the end."""
+
+    rows: tuple[Row, ...]
+    cursor: str | None
+
+
+@dataclass(frozen=True)
+class SweepReport:
+    """What a sweep did."""
+
+    leases_lost: int = 0
+    items_returned: int = 0
+    items_dead: int = 0
+    items_due: int = 0
+    """Items whose `run_after` has passed."""
+    stale_assets: int = 0
+    """Assets still `writing` an hour after their lease went; `collect_garbage` removes them."""
+
+
+@dataclass(frozen=True)
+class GarbageReport:
+    """What a garbage collection removed."""
+
+    rows: int
+    """Asset rows that nothing refers to, with their objects."""
+    orphans: int
+    """Objects without a row."""
+    missing: tuple[str, ...]
+    """Keys of rows whose object is not in the store: data loss, told, never hidden."""
+
+
+@dataclass(frozen=True)
+class ApiKey:
+    """An API key without its secret."""
+
+    id: UUID
+    tenant: str
+    name: str
+    prefix: str
+    scopes: tuple[str, ...]
+    created: datetime
+    last_used: datetime | None
+    revoked: datetime | None
+
+
+@dataclass(frozen=True)
+class NewApiKey:
+    """A key just made; `secret` is shown once and stored nowhere."""
+
+    key: ApiKey
+    secret: str
