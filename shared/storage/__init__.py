@@ -1,0 +1,59 @@
+"""Asset stores: one port, a folder and S3 behind it.
+
+store = open_store(settings())
+digest = asset_digest(path)
+store.put(key, path)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shared.errors import InvalidInput
+from shared.settings import Settings
+from shared.storage.folder import FolderStore
+from shared.storage.port import PRESIGN_SECONDS, AssetStore, Digest, Opened, asset_digest
+
+__all__ = [
+    "PRESIGN_SECONDS",
+    "AssetStore",
+    "Digest",
+    "FolderStore",
+    "Opened",
+    "asset_digest",
+    "open_store",
+]
+
+
+def open_store(chosen: Settings) -> AssetStore:
+    """The store that the settings name: `s3://bucket`, a folder, or `home/assets`.
+
+    Raises:
+        InvalidInput: an S3 store without keys, or an unknown kind of URL.
+    """
+    where = chosen.store
+    if where is None:
+        return FolderStore(chosen.home / "assets")
+    if not where.startswith("s3://"):
+        if "://" in where:
+            raise InvalidInput(f"{where!r} is no asset store", where="MAREY_STORE", hint="s3://bucket or a folder.")
+        return FolderStore(Path(where).expanduser())
+    if chosen.s3_access_key is None or chosen.s3_secret_key is None:
+        raise InvalidInput(
+            "an S3 store needs its keys",
+            where="MAREY_STORE",
+            hint="Set MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY (or the _FILE of each).",
+        )
+    from shared.storage.s3 import S3Options, S3Store  # minio costs 0.2 s of import; the folder does without
+
+    return S3Store(
+        S3Options(
+            endpoint=chosen.s3_endpoint,
+            bucket=where.removeprefix("s3://").strip("/"),
+            access_key=chosen.s3_access_key.get_secret_value(),
+            secret_key=chosen.s3_secret_key.get_secret_value(),
+            region=chosen.s3_region,
+            secure=chosen.s3_secure,
+            public_endpoint=chosen.s3_public_endpoint,
+        )
+    )

@@ -1,0 +1,163 @@
+"""The port: what every asset store does. Keys are `t/{tenant}/{sha[:2]}/{sha}`; content never changes under a key."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Protocol, runtime_checkable
+
+from shared.errors import InvalidInput, NotFound
+
+CHUNK = 1 << 20
+PRESIGN_SECONDS = 900
+KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
+
+
+@dataclass(frozen=True)
+class Digest:
+    """What content is: SHA-256 in hex, and its size in bytes."""
+
+    sha256: str
+    size: int
+
+
+@dataclass(frozen=True)
+class Opened:
+    """Content being read: `size` is that of the whole object, `chunks` yields the range asked for.
+
+    Read `chunks` to its end or `close()` it: an S3 store holds a connection until then.
+    """
+
+    size: int
+    chunks: Iterator[bytes]
+
+    def close(self) -> None:
+        """Let go of the connection or file."""
+        close = getattr(self.chunks, "close", None)
+        if close is not None:
+            close()
+
+
+@runtime_checkable
+class AssetStore(Protocol):
+    """A store of immutable objects. Safe to use from several threads.
+
+    Every method raises `Unreachable`, within bounded time, when the store does not answer or refuses the credentials;
+    `InvalidInput` for a key that is not one.
+    """
+
+    def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
+        """Store the bytes, or the content of a file, under `key`: wholly or not at all.
+
+        Raises:
+            InvalidInput: the last part of `key` is a SHA-256, and not that of the content.
+        """
+        ...
+
+    def get(self, key: str) -> bytes:
+        """The whole content.
+
+        Raises:
+            NotFound: no such object.
+        """
+        ...
+
+    def open(self, key: str, start: int = 0, length: int | None = None) -> Opened:
+        """Content from byte `start`, `length` bytes (None = to the end; past the end: what there is), in chunks.
+
+        Raises:
+            NotFound: no such object.
+            InvalidInput: the range begins past the end of the object.
+        """
+        ...
+
+    def exists(self, key: str) -> bool:
+        """Whether there is such an object."""
+        ...
+
+    def size(self, key: str) -> int:
+        """Bytes of an object.
+
+        Raises:
+            NotFound: no such object.
+        """
+        ...
+
+    def delete(self, key: str) -> None:
+        """Remove an object; none there is fine."""
+        ...
+
+    def keys(self, prefix: str = "") -> Iterator[str]:
+        """The keys that begin with `prefix`, in order."""
+        ...
+
+    def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
+        """A URL that gives the object to whoever has it, for `seconds`, as a download called `filename`.
+
+        None where the store has no URLs (a folder): send the content then.
+        """
+        ...
+
+    def check(self) -> None:
+        """Whether the store would take an object now; for /readyz and doctor.
+
+        Raises:
+            Unreachable: it would not.
+        """
+        ...
+
+
+def asset_digest(source: bytes | Path) -> Digest:
+    """SHA-256 and size of bytes or of a file, in constant memory."""
+    if isinstance(source, bytes):
+        return Digest(hashlib.sha256(source).hexdigest(), len(source))
+    with source.open("rb") as file:
+        return Digest(hashlib.file_digest(file, "sha256").hexdigest(), file.tell())
+
+
+def checked_key(key: str) -> str:
+    """`key`, if it is one: parts of letters, digits and `._-`, none beginning with a dot.
+
+    Raises:
+        InvalidInput: it is not (an absolute path, `..`, a backslash, NUL, …).
+    """
+    if not KEY.fullmatch(key) or len(key) > 512:
+        raise InvalidInput(f"{key[:80]!r} is not a key of the asset store", where="key")
+    return key
+
+
+def check_content(key: str, digest: Digest) -> None:
+    """Refuse content that is not what its key says.
+
+    Raises:
+        InvalidInput: the last part of `key` is the SHA-256 of other content.
+    """
+    named = key.rpartition("/")[2]
+    if re.fullmatch(r"[0-9a-f]{64}", named) and named != digest.sha256:
+        raise InvalidInput(f"the content has SHA-256 {digest.sha256}, its key says {named}", where=key)
+
+
+def no_such_object(key: str) -> NotFound:
+    """The error for a key without an object."""
+    return NotFound("no such object in the asset store", where=key)
+
+
+def range_past_end(key: str, start: int, size: int) -> InvalidInput:
+    """The error for a range that begins past the end."""
+    return InvalidInput(f"the range begins at byte {start} of {size}", where=key)
+
+
+def read_chunks(file: BinaryIO, length: int | None) -> Iterator[bytes]:
+    """Chunks of an open file, which is closed at the end."""
+    with file:
+        left = length
+        while left is None or left > 0:
+            chunk = file.read(CHUNK if left is None else min(CHUNK, left))
+            if not chunk:
+                return
+            if left is not None:
+                left -= len(chunk)
+            yield chunk

@@ -1,0 +1,198 @@
+"""The asset store on S3, by the `minio` SDK."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+from urllib.parse import quote
+
+import urllib3
+from minio import Minio
+from minio.error import InvalidResponseError, MinioException, S3Error, ServerError
+
+from shared.errors import Unreachable
+from shared.storage.port import (
+    CHUNK,
+    PRESIGN_SECONDS,
+    Digest,
+    Opened,
+    asset_digest,
+    check_content,
+    checked_key,
+    no_such_object,
+    range_past_end,
+)
+
+# The SDK's own pool waits 300 s and tries 5 times; a worker must know within seconds and release its lease.
+CONNECT_SECONDS = 3.0
+READ_SECONDS = 15.0
+RETRIES = 2
+MISSING = frozenset({"NoSuchKey", "NoSuchBucket", "404"})
+
+
+@dataclass(frozen=True)
+class S3Options:
+    """Where the store is. `public_endpoint` stands in presigned URLs, where clients reach it under another name."""
+
+    endpoint: str
+    bucket: str
+    access_key: str
+    secret_key: str
+    region: str = "us-east-1"
+    secure: bool = False
+    public_endpoint: str | None = None
+
+
+class S3Store:
+    """Objects of one bucket. One client per process, shared by its threads."""
+
+    def __init__(self, options: S3Options) -> None:
+        self.options = options
+        self._client = _client(options, options.endpoint)
+        public = options.public_endpoint
+        self._public = _client(options, public) if public and public != options.endpoint else self._client
+
+    def make_bucket(self) -> None:
+        """Make the bucket if there is none."""
+        bucket = self.options.bucket
+        with self._outages():
+            if self._client.bucket_exists(bucket):
+                return
+            try:
+                self._client.make_bucket(bucket)
+            except S3Error as error:
+                if error.code not in {"BucketAlreadyOwnedByYou", "BucketAlreadyExists"}:  # another process was quicker
+                    raise
+
+    def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
+        """See `AssetStore.put`."""
+        checked_key(key)
+        digest = asset_digest(source)
+        check_content(key, digest)
+        with self._outages():
+            if isinstance(source, bytes):
+                self._client.put_object(
+                    self.options.bucket, key, io.BytesIO(source), digest.size, content_type=media_type
+                )
+            else:
+                self._client.fput_object(self.options.bucket, key, str(source), content_type=media_type)
+        return digest
+
+    def get(self, key: str) -> bytes:
+        """See `AssetStore.get`."""
+        return b"".join(self.open(key).chunks)
+
+    def open(self, key: str, start: int = 0, length: int | None = None) -> Opened:
+        """See `AssetStore.open`."""
+        size = self.size(key)
+        if start > size or (start == size and size > 0):
+            raise range_past_end(key, start, size)
+        wanted = size - start if length is None else min(length, size - start)
+        return Opened(size, self._chunks(key, start, wanted) if wanted else iter(()))
+
+    def exists(self, key: str) -> bool:
+        """See `AssetStore.exists`."""
+        with self._outages():
+            try:
+                self._client.stat_object(self.options.bucket, checked_key(key))
+            except S3Error as error:
+                if error.code in MISSING:
+                    return False
+                raise
+        return True
+
+    def size(self, key: str) -> int:
+        """See `AssetStore.size`."""
+        with self._outages(key):
+            return self._client.stat_object(self.options.bucket, checked_key(key)).size or 0
+
+    def delete(self, key: str) -> None:
+        """See `AssetStore.delete`."""
+        with self._outages():
+            self._client.remove_object(self.options.bucket, checked_key(key))
+
+    def keys(self, prefix: str = "") -> Iterator[str]:
+        """See `AssetStore.keys`."""
+        with self._outages():
+            for found in self._client.list_objects(self.options.bucket, prefix=prefix, recursive=True):
+                if found.object_name is not None:
+                    yield found.object_name
+
+    def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
+        """See `AssetStore.presign`. Computed here: no request is made."""
+        return self._public.presigned_get_object(
+            self.options.bucket,
+            checked_key(key),
+            expires=timedelta(seconds=seconds),
+            response_headers={
+                "response-content-disposition": f"attachment; filename*=UTF-8''{quote(filename, safe='')}",
+                "response-content-type": media_type,
+            },
+        )
+
+    def check(self) -> None:
+        """See `AssetStore.check`."""
+        with self._outages():
+            if not self._client.bucket_exists(self.options.bucket):
+                raise Unreachable(
+                    "the bucket does not exist", where=self._where(), hint="Make it, or run `marey admin init`."
+                )
+
+    def _chunks(self, key: str, start: int, length: int) -> Iterator[bytes]:
+        with self._outages(key):
+            response = self._client.get_object(self.options.bucket, key, offset=start, length=length)
+            try:
+                read = 0
+                for chunk in response.stream(CHUNK):
+                    read += len(chunk)
+                    yield chunk
+            finally:
+                response.close()
+                response.release_conn()
+            if read != length:
+                raise Unreachable(f"the connection ended after {read} of {length} bytes", where=self._where(key))
+
+    def _where(self, key: str | None = None) -> str:
+        return "/".join(filter(None, (f"s3://{self.options.endpoint}", self.options.bucket, key)))
+
+    @contextmanager
+    def _outages(self, key: str | None = None) -> Iterator[None]:
+        """Turn errors of the SDK into `NotFound` (of `key`) or `Unreachable`."""
+        try:
+            yield
+        except S3Error as error:
+            if key is not None and error.code in MISSING:
+                raise no_such_object(key) from error
+            raise self._unreachable(f"{error.code}: {error.message}") from error
+        except (ServerError, InvalidResponseError, MinioException) as error:
+            raise self._unreachable(str(error).splitlines()[0]) from error
+        except (urllib3.exceptions.HTTPError, OSError) as error:
+            cause = getattr(error, "reason", None) or error
+            raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
+
+    def _unreachable(self, cause: str) -> Unreachable:
+        return Unreachable(
+            f"the object store does not answer as it should ({cause})",
+            where=self._where(),
+            hint="Is it running, and are MAREY_S3_ENDPOINT and the keys right?",
+        )
+
+
+def _client(options: S3Options, endpoint: str) -> Minio:
+    pool = urllib3.PoolManager(
+        maxsize=16,
+        timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
+        retries=urllib3.Retry(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504)),
+    )
+    return Minio(
+        endpoint,
+        access_key=options.access_key,
+        secret_key=options.secret_key,
+        region=options.region,  # else presigning asks the network for it
+        secure=options.secure,
+        http_client=pool,
+    )
