@@ -1,0 +1,186 @@
+"""Residual vector quantizer with exponential-moving-average codebooks.
+
+HGM³ eq. 1-2; EMA and resets after van den Oord et al. (2017), Zhang et al. (2023, T2M-GPT) and Guo et al. (2024, MoMask).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from shared.nn.distributed import all_reduce_sum, broadcast
+
+NO_TOKEN = -1
+"""Token of a level that was dropped, or of a position beyond the clip: decodes to the zero vector."""
+
+
+@dataclass(frozen=True)
+class Quantized:
+    """What one pass through the quantizer gives."""
+
+    output: Tensor  # (B, n, d), straight-through: its gradient goes to the input unchanged
+    tokens: Tensor  # (B, n, V) int64, NO_TOKEN where dropped or invalid
+    commitment: Tensor  # scalar: sum over levels of the mean squared distance (eq. 2, without β)
+    perplexity: Tensor  # (V,), exp of the entropy of each level's code usage in this batch
+
+
+class ResidualQuantizer(nn.Module):
+    """V codebooks of K codes; level v quantizes what the levels below it left over (eq. 1)."""
+
+    codebooks: Tensor  # (V, K, d)
+    counts: Tensor  # (V, K), moving average of how many vectors of a batch chose the code
+    sums: Tensor  # (V, K, d), moving average of the sum of those vectors
+    initialized: Tensor  # (), bool
+
+    def __init__(
+        self, levels: int, codes: int, width: int, *, decay: float = 0.99, dropout: float = 0.2, revive: float = 1.0
+    ) -> None:
+        """Build empty codebooks; the first training batch fills them.
+
+        Args:
+            levels: V, number of residual levels.
+            codes: K, codes a level.
+            width: d, width of a code.
+            decay: of the moving averages.
+            dropout: share of training samples that lose their upper levels (a random number of them, at least one).
+            revive: a code chosen by fewer vectors a batch than this (moving average) is dead and is reset.
+        """
+        super().__init__()
+        self.decay = decay
+        self.dropout = dropout
+        self.revive = revive
+        self.register_buffer("codebooks", torch.zeros(levels, codes, width))
+        self.register_buffer("counts", torch.ones(levels, codes))
+        self.register_buffer("sums", torch.zeros(levels, codes, width))
+        self.register_buffer("initialized", torch.tensor(False))
+
+    @property
+    def levels(self) -> int:
+        """V."""
+        return self.codebooks.shape[0]
+
+    @property
+    def codes(self) -> int:
+        """K."""
+        return self.codebooks.shape[1]
+
+    def forward(self, latent: Tensor, valid: Tensor | None = None) -> Quantized:
+        """Quantize; in training mode also update the codebooks and drop upper levels.
+
+        Args:
+            latent: (B, n, d).
+            valid: (B, n) bool, None = all. Invalid positions neither train nor count, and come out as zeros.
+        """
+        with torch.autocast(latent.device.type, enabled=False):
+            return self._forward(latent.float(), valid)
+
+    def _forward(self, latent: Tensor, valid: Tensor | None) -> Quantized:
+        if valid is None:
+            valid = torch.ones(latent.shape[:2], dtype=torch.bool, device=latent.device)
+        kept = self._kept_levels(latent)  # (B,)
+        residual = latent
+        total = torch.zeros_like(latent)
+        commitment = latent.new_zeros(())
+        tokens: list[Tensor] = []
+        perplexity: list[Tensor] = []
+        for level in range(self.levels):
+            active = valid & (level < kept)[:, None]  # (B, n)
+            if self.training:
+                self._initialize(level, residual.detach()[active])
+            index = self.nearest(residual.detach(), level)  # (B, n)
+            chosen = self.codebooks[level][index] * active[..., None]  # (B, n, d)
+            distance = (residual - chosen).square().mean(-1)  # (B, n)
+            commitment = commitment + (distance * active).sum() / active.sum().clamp(min=1)
+            usage = torch.bincount(index[active], minlength=self.codes).float()
+            perplexity.append(_perplexity(usage))
+            if self.training:
+                self._update(level, residual.detach()[active], index[active], usage)
+            residual = residual - chosen
+            total = total + chosen
+            tokens.append(index.masked_fill(~active, NO_TOKEN))
+        if self.training:
+            self.initialized.fill_(True)
+        masked = latent * valid[..., None]
+        output = masked + (total - masked).detach()
+        return Quantized(output, torch.stack(tokens, -1), commitment, torch.stack(perplexity))
+
+    @torch.no_grad()
+    def encode(self, latent: Tensor) -> Tensor:
+        """Tokens (B, n, V) of `latent` (B, n, d), all levels, nothing trained."""
+        residual = latent.float()
+        tokens: list[Tensor] = []
+        for level in range(self.levels):
+            index = self.nearest(residual, level)
+            residual = residual - self.codebooks[level][index]
+            tokens.append(index)
+        return torch.stack(tokens, -1)
+
+    def decode(self, tokens: Tensor) -> Tensor:
+        """Sum of the codes (B, n, d) of tokens (B, n, V' <= V); NO_TOKEN adds nothing."""
+        total = self.codebooks.new_zeros((*tokens.shape[:-1], self.codebooks.shape[-1]))
+        for level in range(tokens.shape[-1]):
+            index = tokens[..., level]
+            total = total + self.codebooks[level][index.clamp(min=0)] * (index >= 0)[..., None]
+        return total
+
+    def nearest(self, vectors: Tensor, level: int) -> Tensor:
+        """Index (...) of the code of `level` nearest to each vector (..., d), Euclidean."""
+        codebook = self.codebooks[level]
+        flat = vectors.reshape(-1, vectors.shape[-1])
+        # |x|² is the same for every code: left out
+        scores = torch.addmm(codebook.square().sum(-1), flat, codebook.T, beta=1.0, alpha=-2.0)
+        return scores.argmin(-1).view(vectors.shape[:-1])
+
+    def _kept_levels(self, latent: Tensor) -> Tensor:
+        """How many levels each sample keeps (B,): all, or in training for a share of the samples 1 to V - 1."""
+        batch = latent.shape[0]
+        everything = torch.full((batch,), self.levels, device=latent.device)
+        if not self.training or self.dropout == 0 or self.levels == 1:
+            return everything
+        fewer = torch.randint(1, self.levels, (batch,), device=latent.device)
+        return torch.where(torch.rand(batch, device=latent.device) < self.dropout, fewer, everything)
+
+    @torch.no_grad()
+    def _initialize(self, level: int, vectors: Tensor) -> None:
+        """Fill a codebook with vectors of the first batch (repeated with a little noise if there are too few)."""
+        if bool(self.initialized) or len(vectors) == 0:
+            return
+        self.codebooks[level] = broadcast(_draw(vectors, self.codes))
+        self.sums[level] = self.codebooks[level]
+        self.counts[level] = 1.0
+
+    @torch.no_grad()
+    def _update(self, level: int, vectors: Tensor, index: Tensor, usage: Tensor) -> None:
+        """Move the averages, then reset dead codes to vectors of this batch."""
+        sums = torch.zeros_like(self.sums[level]).index_add_(0, index, vectors)
+        usage = all_reduce_sum(usage.clone())
+        sums = all_reduce_sum(sums)
+        self.counts[level].mul_(self.decay).add_(usage, alpha=1 - self.decay)
+        self.sums[level].mul_(self.decay).add_(sums, alpha=1 - self.decay)
+        alive = self.counts[level] >= self.revive  # (K,)
+        self.codebooks[level] = self.sums[level] / self.counts[level].clamp(min=1e-6)[:, None]
+        if len(vectors) == 0 or bool(alive.all()):
+            return
+        # A revived code starts as if it had just been used often enough, so that it lives long enough to find work.
+        fresh = broadcast(_draw(vectors, self.codes))
+        dead = ~alive
+        self.codebooks[level][dead] = fresh[dead]
+        self.sums[level][dead] = fresh[dead] * self.revive
+        self.counts[level][dead] = self.revive
+
+
+def _draw(vectors: Tensor, count: int) -> Tensor:
+    """`count` vectors drawn from (N, d) without replacement; when N < count, repeated with a little noise."""
+    rows = len(vectors)
+    if rows >= count:
+        return vectors[torch.randperm(rows, device=vectors.device)[:count]].clone()
+    repeated = vectors[torch.randint(rows, (count,), device=vectors.device)]
+    return repeated + torch.randn_like(repeated) * (0.01 / vectors.shape[-1] ** 0.5)
+
+
+def _perplexity(usage: Tensor) -> Tensor:
+    """exp(entropy) of a histogram (K,)."""
+    share = usage / usage.sum().clamp(min=1)
+    return torch.exp(-(share * torch.log(share + 1e-10)).sum())

@@ -1,0 +1,29 @@
+"""Joints in space from HumanML3D-like features, differentiable: the torch twin of `FeatureLayout.decode`."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+
+def world_joints(features: Tensor, joints: int) -> Tensor:
+    """Decode positions: (B, T, D) features in their own units to (B, T, J, 3) metres, Y up, facing +Z in frame 0.
+
+    Columns: [0] half the yaw delta a frame, [1:3] displacement in the heading frame, [3] root height, [4:4+3(J-1)]
+    the other joints relative to the root's ground point, in the heading frame (HumanML3D; `facts.md` of the design).
+    """
+    features = features.float()
+    batch, frames = features.shape[:2]
+    half = features[..., 0].cumsum(1)
+    angle = torch.cat([half.new_zeros(batch, 1), half[:, :-1]], 1)  # (B, T): sum over the frames before
+    # heading frame to world: rotation about Y by -2 · angle
+    cos, sin = torch.cos(2 * angle), torch.sin(2 * angle)
+    step = torch.cat([features.new_zeros(batch, 1, 2), features[:, :-1, 1:3]], 1)  # (B, T, 2): x, z
+    root_x = (cos * step[..., 0] - sin * step[..., 1]).cumsum(1)
+    root_z = (sin * step[..., 0] + cos * step[..., 1]).cumsum(1)
+    local = features[..., 4 : 4 + 3 * (joints - 1)].view(batch, frames, joints - 1, 3)
+    x = cos[..., None] * local[..., 0] - sin[..., None] * local[..., 2] + root_x[..., None]
+    z = sin[..., None] * local[..., 0] + cos[..., None] * local[..., 2] + root_z[..., None]
+    others = torch.stack([x, local[..., 1], z], -1)  # (B, T, J - 1, 3)
+    root = torch.stack([root_x, features[..., 3], root_z], -1)[:, :, None]
+    return torch.cat([root, others], 2)

@@ -1,0 +1,285 @@
+"""The one training loop: a stage says what a loss is, the loop does the rest.
+
+Resuming is exact because nothing random is carried along: batches and torch's generator are seeded from
+(seed, step, rank) at every step. With a budget in minutes the schedules depend on the clock, and runs differ.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import structlog
+import torch
+import torch.distributed as dist
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from torch import Tensor, nn
+from torch.utils.tensorboard import SummaryWriter
+
+from shared.errors import InvalidInput, MareyError
+from shared.nn import distributed
+from shared.nn.ema import WeightAverage
+from workers.training.budget import Budget, learning_rate
+from workers.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
+
+log = structlog.get_logger()
+
+
+@dataclass(frozen=True)
+class StepContext:
+    """What a stage may depend on in one step."""
+
+    step: int
+    fraction: float  # of the budget, 0 to 1: every schedule runs on it
+    rng: np.random.Generator  # for the choice of data, seeded from (seed, step, rank)
+
+
+class OptimisationConfig(Protocol):
+    """The fields of a stage's configuration that the loop reads."""
+
+    @property
+    def batch(self) -> int: ...
+    @property
+    def learning_rate(self) -> float: ...
+    @property
+    def warmup_steps(self) -> int: ...
+    @property
+    def warmup_share(self) -> float: ...
+    @property
+    def decay(self) -> Any: ...
+    @property
+    def final(self) -> float: ...
+    @property
+    def weight_decay(self) -> float: ...
+    @property
+    def betas(self) -> tuple[float, float]: ...
+    @property
+    def clip(self) -> float: ...
+    @property
+    def ema(self) -> float: ...
+
+
+class Stage(Protocol):
+    """One thing to train."""
+
+    name: str
+    module: nn.Module
+    """Everything trained and everything a checkpoint must hold."""
+    optimisation: OptimisationConfig
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """Parameters whose gradient norms are clipped apart from each other."""
+        ...
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Loss of one batch, and what to log."""
+        ...
+
+    def after_step(self, context: StepContext) -> None:
+        """After the optimiser's step (teacher update)."""
+        ...
+
+    def validate(self) -> Mapping[str, float]:
+        """Metrics of the averaged weights on the validation split."""
+        ...
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is driven; none of it changes what is learnt but seed, budget and precision."""
+
+    folder: Path
+    budget: Budget
+    seed: int = 0
+    resume: bool = False
+    bf16: bool = True
+    checkpoint_minutes: float = 3.0
+    validate_times: int = 8  # over the whole budget, the end included
+    log_every: int = 20
+    quiet: bool = False
+
+
+def choose_device(name: str) -> torch.device:
+    """`auto` (CUDA where there is one), `cpu`, `cuda`, `cuda:1`.
+
+    Raises:
+        InvalidInput: the device is not there.
+    """
+    if name == "auto":
+        local = int(os.environ.get("LOCAL_RANK", "0"))
+        return torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+    try:
+        device = torch.device(name)
+    except RuntimeError as error:
+        raise InvalidInput(f"{name!r} is no device", hint="Use auto, cpu, cuda or cuda:N.") from error
+    if device.type == "cuda" and not torch.cuda.is_available():
+        raise InvalidInput("there is no CUDA device here", where=name, hint="Use --device cpu or auto.")
+    return device
+
+
+def start_process_group() -> None:
+    """Join the other processes when started by torchrun; otherwise nothing."""
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not dist.is_initialized():
+        dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
+
+
+def train(stage: Stage, options: RunOptions, config: dict[str, Any]) -> dict[str, float]:
+    """Train `stage` until the budget is used; returns its last validation metrics.
+
+    `folder/checkpoint` holds the state to resume from; `folder/tensorboard` the curves.
+
+    Raises:
+        MareyError: the loss is no longer finite.
+    """
+    return _Run(stage, options, config).execute()
+
+
+class _Run:
+    def __init__(self, stage: Stage, options: RunOptions, config: dict[str, Any]) -> None:
+        self.stage, self.options, self.config = stage, options, config
+        o = stage.optimisation
+        self.device = next(stage.module.parameters()).device
+        trained = [p for group in stage.clip_groups() for p in group]
+        self.optimizer = torch.optim.AdamW(
+            _decay_groups(trained, o.weight_decay), lr=o.learning_rate, betas=o.betas, fused=self.device.type == "cuda"
+        )
+        self.average = WeightAverage(stage.module, o.ema)
+        self.step = 0
+        self.seconds = 0.0
+        self.metrics: dict[str, float] = {}
+        self.checkpoint = options.folder / "checkpoint"
+        self.main = distributed.rank() == 0
+        if options.resume:
+            state = load_checkpoint(self.checkpoint, stage.module, self.average, self.optimizer)
+            if (state.stage, state.seed, state.config) != (stage.name, options.seed, config):
+                raise InvalidInput(
+                    "the checkpoint was made with another stage, seed or configuration",
+                    where=str(self.checkpoint),
+                    hint="Resume with what the run was started with, or start anew in another folder.",
+                )
+            self.step, self.seconds, self.metrics = state.step, state.seconds, state.metrics
+        else:
+            for tensor in stage.module.state_dict().values():
+                distributed.broadcast(tensor)
+
+    @property
+    def fraction(self) -> float:
+        return self.options.budget.fraction(self.step, self.seconds)
+
+    def execute(self) -> dict[str, float]:
+        options = self.options
+        options.folder.mkdir(parents=True, exist_ok=True)
+        writer = SummaryWriter(str(options.folder / "tensorboard"), purge_step=self.step) if self.main else None
+        validated = math.floor(self.fraction * options.validate_times)
+        saved = time.monotonic()
+        # without a process group every process has its own clock: rank 0's decides (see _tick)
+        with _progress(self.main and not options.quiet) as progress:
+            bar = progress.add_task(self.stage.name, total=1.0, completed=self.fraction, note="")
+            while self.fraction < 1.0:
+                logs = self._one_step()
+                if writer and (self.step % options.log_every == 0 or self.step == 1):
+                    self._write_logs(writer, progress, bar, logs)
+                due = math.floor(self.fraction * options.validate_times + 1e-9)
+                if due > validated or self.fraction >= 1.0:
+                    validated = due
+                    self._validate(writer)
+                if time.monotonic() - saved > 60 * options.checkpoint_minutes or self.fraction >= 1.0:
+                    saved = time.monotonic()
+                    self._save()
+        if writer:
+            writer.close()
+        return self.metrics
+
+    def _one_step(self) -> dict[str, float]:
+        started = time.monotonic()
+        stage, o = self.stage, self.stage.optimisation
+        fraction = self.fraction
+        rate = learning_rate(
+            o.learning_rate, fraction, self.step, warmup_steps=o.warmup_steps, warmup_share=o.warmup_share,
+            decay=o.decay, final=o.final,
+        )  # fmt: skip
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
+        entropy = np.random.SeedSequence([self.options.seed, self.step, distributed.rank()])
+        rng = np.random.default_rng(entropy)
+        torch.manual_seed(int(rng.integers(2**62)))
+        context = StepContext(self.step, fraction, rng)
+        stage.module.train()
+        with self._autocast():
+            loss, logs = stage.loss(context)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        groups = stage.clip_groups()
+        for group in groups:
+            distributed.average_gradients(group)
+        norms = [nn.utils.clip_grad_norm_(group, o.clip) for group in groups]
+        if not all(bool(torch.isfinite(n)) for n in norms):
+            raise MareyError(
+                f"the gradient of {stage.name} is not finite at step {self.step}",
+                where=str(self.options.folder),
+                hint="Resume from the last checkpoint with a smaller learning rate.",
+            )
+        self.optimizer.step()
+        stage.after_step(context)
+        self.average.update(self.step)
+        self.step += 1
+        self._tick(time.monotonic() - started)
+        values = {k: float(v) for k, v in logs.items()} if self.step % self.options.log_every in (0, 1) else {}
+        return values | {"rate": rate, "gradient_norm": float(norms[0])}
+
+    def _tick(self, seconds: float) -> None:
+        """Advance the training clock, the same on all processes."""
+        elapsed = torch.tensor(seconds, dtype=torch.float64, device=self.device)
+        self.seconds += float(distributed.broadcast(elapsed))
+
+    def _autocast(self) -> Any:
+        if not self.options.bf16:
+            return nullcontext()
+        return torch.autocast(self.device.type, dtype=torch.bfloat16)
+
+    def _validate(self, writer: SummaryWriter | None) -> None:
+        started = time.monotonic()
+        self.stage.module.eval()
+        with self.average.applied(), torch.no_grad(), self._autocast():
+            self.metrics = {k: float(v) for k, v in self.stage.validate().items()}
+        self._tick(time.monotonic() - started)
+        if writer:
+            for name, value in self.metrics.items():
+                writer.add_scalar(f"validation/{name}", value, self.step)
+            writer.flush()
+            shown = {k: round(v, 4) for k, v in self.metrics.items()}
+            log.info("validated", stage=self.stage.name, step=self.step, minutes=round(self.seconds / 60, 1), **shown)
+
+    def _save(self) -> None:
+        if not self.main:
+            return
+        state = TrainingState(
+            self.stage.name, self.step, self.seconds, self.options.seed, self.config, dict(self.metrics)
+        )
+        save_checkpoint(self.checkpoint, state, self.stage.module, self.average, self.optimizer)
+
+    def _write_logs(self, writer: SummaryWriter, progress: Progress, bar: TaskID, logs: dict[str, float]) -> None:
+        for name, value in logs.items():
+            writer.add_scalar(f"train/{name}", value, self.step)
+        note = f"step {self.step}  loss {logs.get('loss', math.nan):.4f}"
+        progress.update(bar, completed=self.fraction, note=note)
+
+
+def _decay_groups(parameters: Sequence[nn.Parameter], weight_decay: float) -> list[dict[str, Any]]:
+    """Weight decay on matrices only, not on biases and norms."""
+    return [
+        {"params": [p for p in parameters if p.dim() >= 2], "weight_decay": weight_decay},
+        {"params": [p for p in parameters if p.dim() < 2], "weight_decay": 0.0},
+    ]
+
+
+def _progress(shown: bool) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[note]}"))
+    return Progress(*columns, disable=not shown)
