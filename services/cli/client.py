@@ -1,0 +1,205 @@
+"""The HTTP client: retries with back-off, problems as errors, nothing else."""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+from uuid import uuid4
+
+import httpx2
+
+from services.cli.place import Server, find_server
+from shared.errors import (
+    Conflict,
+    InvalidBundle,
+    InvalidFile,
+    InvalidInput,
+    MareyError,
+    NotFound,
+    Refused,
+    TimedOut,
+    TooLarge,
+    Unauthenticated,
+    Unreachable,
+)
+from shared.items import InvalidItems, Problem
+
+ATTEMPTS = 5
+FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
+"""Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
+RETRIED = frozenset({429, 502, 503, 504})
+TYPE_PREFIX = "urn:marey:problem:"
+
+_ERRORS: dict[str, type[MareyError]] = {
+    kind.problem_type: kind
+    for kind in (
+        InvalidInput, TooLarge, InvalidFile, InvalidBundle, Conflict, NotFound, Unreachable, Refused, Unauthenticated,
+        TimedOut,
+    )
+}  # fmt: skip
+
+
+class Client:
+    """Talks to one server; safe to use from several threads.
+
+    One idempotency key goes with every attempt of one `submit`, so a retry after a lost answer enqueues nothing twice.
+    """
+
+    def __init__(self, server: Server, *, timeout: float = 30.0) -> None:
+        self.server = server
+        self._http = httpx2.Client(
+            base_url=server.url,
+            headers={"Authorization": f"Bearer {server.key}"},
+            timeout=httpx2.Timeout(timeout, connect=5.0),
+        )
+
+    @classmethod
+    def here(cls) -> Client:
+        """A client of the server that `MAREY_SERVER` or `server.json` names."""
+        return cls(find_server())
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._http.close()
+
+    def get(self, path: str, **params: Any) -> Any:
+        """The JSON at `path`."""
+        return self._send("GET", path, params=_given(params)).json()
+
+    def post(self, path: str, body: Any = None, **params: Any) -> Any:
+        """POST a JSON body, None = none; the answer's JSON. Retried: only for requests that may be repeated."""
+        return self._send("POST", path, params=_given(params), json=body).json()
+
+    def patch(self, path: str, body: Any) -> Any:
+        """PATCH with a JSON body; the answer's JSON."""
+        return self._send("PATCH", path, json=body).json()
+
+    def delete(self, path: str) -> None:
+        """DELETE."""
+        self._send("DELETE", path)
+
+    def submit(self, lines: list[dict[str, Any]], *, validate_only: bool = False, **params: Any) -> Any:
+        """Submit items as NDJSON; the job, or with `validate_only` what it would be.
+
+        Raises:
+            InvalidItems: with the problems of every line.
+        """
+        body = "\n".join(json.dumps(line, ensure_ascii=False) for line in lines).encode()
+        headers = {"Content-Type": "application/x-ndjson", "Idempotency-Key": str(uuid4())}
+        query = _given({**params, "validate_only": validate_only or None})
+        return self._send("POST", "/v1/jobs", params=query, content=body, headers=headers).json()
+
+    def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
+        """Every element of a listing, page after page."""
+        cursor: str | None = None
+        while True:
+            page = self.get(path, **params, cursor=cursor)
+            yield from page["items"]
+            cursor = page.get("next")
+            if cursor is None:
+                return
+
+    @contextmanager
+    def stream(
+        self, path: str, headers: Mapping[str, str] | None = None, *, patience: float = 30.0
+    ) -> Iterator[httpx2.Response]:
+        """An open answer, to be read in pieces; redirects (to the object store) are followed without the key.
+
+        Args:
+            patience: seconds of silence after which the server counts as unreachable.
+        """
+        timeout = httpx2.Timeout(patience, connect=5.0)
+        options: dict[str, Any] = {"headers": headers, "follow_redirects": True, "timeout": timeout}
+        with _as_unreachable(self.server), self._http.stream("GET", path, **options) as response:
+            if response.status_code >= 400:
+                response.read()
+                raise error_of(response)
+            yield response
+
+    def events(self, job: str, after: int = 0, *, patience: float = 30.0) -> Iterator[dict[str, Any]]:
+        """Events of a job as they happen, from `after` on; ends when the job does or the connection breaks."""
+        headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
+        with self.stream(f"/v1/jobs/{job}/events", headers, patience=patience) as response:
+            if response.status_code == 204:
+                return
+            for event in httpx2.EventSource(response):
+                if event.data:
+                    yield json.loads(event.data)
+
+    def _send(self, method: str, path: str, **request: Any) -> httpx2.Response:
+        pause = FIRST_PAUSE
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                response = self._http.request(method, path, **request)
+            except httpx2.TransportError as error:
+                if attempt == ATTEMPTS or isinstance(error, httpx2.UnsupportedProtocol):
+                    raise _unreachable(self.server, error) from error
+                wait = pause
+            else:
+                if response.status_code < 400:
+                    return response
+                if response.status_code not in RETRIED or attempt == ATTEMPTS:
+                    raise error_of(response)
+                wait = max(pause, _retry_after(response))
+            time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
+            pause = min(pause * 2, LONGEST_PAUSE)
+        raise AssertionError("unreachable: the last attempt returns or raises")
+
+
+def error_of(response: httpx2.Response) -> MareyError:
+    """The error that an RFC 9457 problem tells, as the exception that was raised on the server."""
+    try:
+        problem = response.json()
+        kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
+        message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
+    except (ValueError, KeyError, TypeError):
+        return _foreign(response)
+    if kind == InvalidItems.problem_type:
+        problems = [Problem(p.get("line"), p.get("field"), p["message"]) for p in problem.get("problems", [])]
+        return InvalidItems(problems, total=problem.get("total"))
+    found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
+    return found(message, where=where, hint=hint)
+
+
+def _foreign(response: httpx2.Response) -> MareyError:
+    kind = (
+        Unreachable if response.status_code >= 500 else Refused if response.status_code in (401, 403) else InvalidInput
+    )
+    return kind(
+        f"answered {response.status_code} without saying why",
+        where=str(response.request.url),
+        hint="Is MAREY_SERVER the address of a Marey server?",
+    )
+
+
+@contextmanager
+def _as_unreachable(server: Server) -> Iterator[None]:
+    try:
+        yield
+    except httpx2.TransportError as error:
+        raise _unreachable(server, error) from error
+
+
+def _unreachable(server: Server, error: Exception) -> Unreachable:
+    return Unreachable(
+        f"the server does not answer ({type(error).__name__}: {error})",
+        where=server.url,
+        hint="Is it running? `marey serve` starts one here; MAREY_SERVER names another.",
+    )
+
+
+def _retry_after(response: httpx2.Response) -> float:
+    try:
+        return min(float(response.headers.get("Retry-After", 0)), 60.0)
+    except ValueError:
+        return 0.0
+
+
+def _given(params: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in params.items() if value is not None}

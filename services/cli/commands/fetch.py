@@ -1,0 +1,95 @@
+"""`marey fetch`, and the output lines of a job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console, options
+from services.cli.names import check_template
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from services.cli.client import Client
+    from services.cli.fetching import Download
+
+
+def fetch(
+    jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help="Jobs whose motions to fetch.")],
+    output: options.Folder = Path(),
+    formats: options.Formats = None,
+    name_template: options.Template = options.TEMPLATE,
+    overwrite: options.Overwrite = False,
+    as_json: console.Json = False,
+) -> None:
+    """Fetch the motions of jobs: eight files at a time, resumed and checked. Of several jobs, each has its folder."""
+    from services.cli.client import Client
+
+    check_template(name_template)
+    with Client.here() as client:
+        for job in jobs:
+            folder = output if len(jobs) == 1 else output / job
+            write_job(client, job, folder, formats, template=name_template, overwrite=overwrite, as_json=as_json)
+
+
+def write_job(
+    client: Client,
+    job: str,
+    folder: Path,
+    formats: Sequence[options.FileFormat] | None,
+    *,
+    template: str = options.TEMPLATE,
+    overwrite: bool = False,
+    as_json: bool = False,
+) -> list[dict[str, Any]]:
+    """Fetch what a job has made so far and print a line for each of its items, in input order.
+
+    Returns:
+        The output lines.
+    """
+    from services.cli.fetching import check_folder, download_all, plan
+
+    wanted = [f.value for f in formats] if formats else None
+    planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), folder, wanted, template)
+    check_folder(folder)
+    downloads = [download for _, files in planned for download in files]
+    with console.bar() as bar:
+        task = bar.add_task("fetching", total=len(downloads))
+        download_all(client, downloads, overwrite=overwrite, done=lambda _: bar.advance(task))
+    lines = [output_line(item, files) for item, files in planned]
+    for line in lines:
+        if as_json:
+            console.result_json(line)
+        else:
+            for path in line["files"].values():
+                console.result(console.home_relative(path))
+    waiting = sum(line["state"] in ("ready", "leased") for line in lines)
+    if waiting:
+        console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
+    return lines
+
+
+def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:
+    """The line of one item, as architecture.md gives it."""
+    motion = item["motion"] or {}
+    return {
+        "job": item["job"],
+        "item": item["id"],
+        "motion": motion.get("id"),
+        "name": item["name"],
+        "prompt": item["prompt"],
+        "variant": item["variant"],
+        "model": item["model"],
+        "bundle": item["bundle"],
+        "licence": motion.get("licence"),
+        "seed": item["seed"],
+        "state": item["state"],
+        "error": item["error"],
+        "frames": motion.get("frames"),
+        "fps": motion.get("fps"),
+        "elapsed": motion.get("elapsed"),
+        "files": {d.url.rpartition("/")[2]: str(d.path.absolute()) for d in files},
+    }

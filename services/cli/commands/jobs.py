@@ -1,0 +1,165 @@
+"""`marey jobs …`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import console
+
+app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
+
+Job = Annotated[str, typer.Argument(metavar="JOB", help="The job's id.")]
+Jobs = Annotated[list[str], typer.Argument(metavar="JOB…", help="Ids of jobs.")]
+Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
+
+COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
+
+
+class State(StrEnum):
+    """States of jobs."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSED = "paused"
+    SUCCEEDED = "succeeded"
+    PARTIAL = "partial"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+@app.command("list")
+def list_jobs(
+    state: Annotated[State | None, typer.Option("--state", help="Only jobs in this state.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    as_json: console.Json = False,
+) -> None:
+    """List jobs, newest first."""
+    from itertools import islice
+
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        params = {"state": state.value if state else None, "limit": min(limit, 1000)}
+        found = list(islice(client.pages("/v1/jobs", **params), limit))
+    if as_json:
+        for job in found:
+            console.result_json(job)
+        return
+    columns = ("id", "name", "state", "priority", "done", "total", "created")
+    console.table(columns, ((*(j[c] for c in columns[:4]), _done(j), j["total"], j["created"]) for j in found))
+
+
+@app.command()
+def show(job: Job, as_json: console.Json = False) -> None:
+    """Show a job, and why its items failed."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.get(f"/v1/jobs/{job}")
+        if as_json:
+            console.result_json(found)
+            return
+        for field in ("id", "name", "comment", "state", "control", "priority", "created", "started", "finished"):
+            if found[field] is not None:
+                console.result(f"{field:<10} {found[field]}")
+        counts = ", ".join(f"{found['counters'][name]} {name}" for name in COUNTERS if found["counters"][name])
+        console.result(f"{'items':<10} {found['total']}: {counts}")
+        for state in ("failed", "dead"):
+            if found["counters"][state]:
+                _show_failures(client, job, state)
+
+
+@app.command()
+def watch(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> None:
+    """Show a job's progress until it ends; exits 6 if items failed."""
+    _wait(job, timeout, as_json, quiet=False)
+
+
+@app.command()
+def wait(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> None:
+    """Wait, silently, until a job ends; exits 6 if items failed."""
+    _wait(job, timeout, as_json, quiet=True)
+
+
+@app.command()
+def pause(jobs: Jobs, as_json: console.Json = False) -> None:
+    """Stop giving out items of jobs; those being made are finished."""
+    _act(jobs, "pause", as_json)
+
+
+@app.command()
+def resume(jobs: Jobs, as_json: console.Json = False) -> None:
+    """Go on with paused jobs."""
+    _act(jobs, "resume", as_json)
+
+
+@app.command()
+def cancel(jobs: Jobs, as_json: console.Json = False) -> None:
+    """Cancel what is not done yet; what is done stays."""
+    _act(jobs, "cancel", as_json)
+
+
+@app.command()
+def retry(
+    jobs: Jobs,
+    cancelled: Annotated[
+        bool, typer.Option("--cancelled", help="Cancelled items too, not failed and dead alone.")
+    ] = False,
+    as_json: console.Json = False,
+) -> None:
+    """Try failed and dead items again."""
+    _act(jobs, "retry", as_json, states=["failed", "dead", "cancelled"] if cancelled else None)
+
+
+@app.command()
+def delete(jobs: Jobs, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+    """Delete ended jobs with their motions."""
+    from services.cli.client import Client
+
+    if not yes:
+        typer.confirm(f"Delete {len(jobs)} jobs with their motions?", abort=True, err=True)
+    with Client.here() as client:
+        for job in jobs:
+            client.delete(f"/v1/jobs/{job}")
+            console.say(f"{job} deleted")
+
+
+def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
+    from services.cli.client import Client
+    from services.cli.watching import check_ended, watch_job
+
+    with Client.here() as client:
+        ended = watch_job(client, job, timeout=timeout, quiet=quiet)
+    if as_json:
+        console.result_json(ended)
+    check_ended(ended)
+
+
+def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for job in jobs:
+            found = client.post(f"/v1/jobs/{job}/{verb}", **params)
+            if as_json:
+                console.result_json(found)
+            else:
+                console.say(f"{job} {found['state']}")
+
+
+def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:
+    page = client.get(f"/v1/jobs/{job}/items", state=state, limit=limit)
+    for item in page["items"]:
+        error = item["error"] or {"message": item["reason"], "hint": None}
+        console.result(f"{state:<10} {item['index'] + 1}: {item['prompt'][:60]!r}: {error['message']}")
+        if error.get("hint"):
+            console.result(f"{'':<10} {error['hint']}")
+    if page.get("next"):
+        console.result(f"{'':<10} … and more: `marey fetch {job} --json` has a line for each")
+
+
+def _done(job: dict[str, Any]) -> int:
+    return sum(job["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))

@@ -1,0 +1,93 @@
+"""`marey submit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from services.cli import console, options, rows
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from shared.items import Item
+
+
+def submit(
+    prompts: options.Prompts = None,
+    file: options.PromptFile = None,
+    input_format: options.PromptFormat = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
+    priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
+    fail_early: Annotated[
+        float | None, typer.Option("--fail-early", help="Cancel the rest once this share (0 to 1) has failed.")
+    ] = None,
+    model: options.Model = None,
+    bundle: options.Bundle = None,
+    seconds: options.Seconds = None,
+    seed: options.Seed = None,
+    variants: options.Variants = None,
+    watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
+    fetch: Annotated[
+        Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
+    ] = None,
+    formats: options.Formats = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check everything, submit nothing.")] = False,
+    timeout: Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Put prompts into the queue of a server; prints the job's id."""
+    from services.cli.client import Client
+
+    if fetch is not None:
+        from services.cli.fetching import check_folder
+
+        check_folder(fetch)  # before anything is enqueued
+    items = read_prompts(prompts, file, input_format)
+    items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants)
+    with Client.here() as client:
+        job = client.submit(
+            [item.as_json() for item in items],
+            validate_only=dry_run,
+            name=name,
+            priority=priority or None,
+            fail_early=fail_early,
+        )
+        if dry_run:
+            console.say(f"{job['items']} motions would be made; nothing was submitted.")
+            if as_json:
+                console.result_json(job)
+            return
+        if as_json and fetch is None:
+            console.result_json(job)
+        elif not as_json:
+            console.result(job["id"])
+        if not watch and fetch is None:
+            return
+        _follow(client, job["id"], fetch, formats, timeout, as_json)
+
+
+def read_prompts(prompts: list[str] | None, file: str | None, input_format: options.InputFormat | None) -> list[Item]:
+    """The items of PROMPT… or of -f.
+
+    Raises:
+        InvalidInput: none or both are given, or what is there cannot be used.
+    """
+    if prompts and file:
+        raise InvalidInput("both PROMPT and -f are given", hint="Give the one or the other.")
+    if file:
+        return rows.items_from_file(file, None if input_format is None else input_format.value)
+    if not prompts:
+        raise InvalidInput("there is no prompt", hint="Give one or more in quotes, or a file of them with -f.")
+    return rows.items_from_prompts(prompts)
+
+
+def _follow(client, job: str, folder: Path | None, formats, timeout: float | None, as_json: bool) -> None:  # noqa: ANN001
+    from services.cli.commands.fetch import write_job
+    from services.cli.watching import check_ended, watch_job
+
+    ended = watch_job(client, job, timeout=timeout)
+    if folder is not None:
+        write_job(client, job, folder, formats, as_json=as_json)
+    check_ended(ended)

@@ -1,0 +1,76 @@
+"""Where output goes: results on stdout, words for people on stderr, `--json` as one JSON object a line."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on stdout.")]
+
+
+def stderr() -> Console:
+    """The console of words for people."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def say(text: str) -> None:
+    """A line for people, on stderr, verbatim."""
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+
+def result(text: str) -> None:
+    """A result, on stdout."""
+    print(text, flush=True)  # noqa: T201
+
+
+def result_json(value: Any) -> None:
+    """A result as one line of JSON, on stdout."""
+    result(json.dumps(value, ensure_ascii=False, separators=(", ", ": ")))
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe."""
+    if not sys.stdout.isatty():
+        for row in rows:
+            result("\t".join(_cell(value) for value in row))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    drawn = Table(box=None, header_style="bold", pad_edge=False)
+    for column in columns:
+        drawn.add_column(column, overflow="fold")
+    for row in rows:
+        drawn.add_row(*(Text(_cell(value)) for value in row))
+    Console(highlight=False).print(drawn)
+
+
+def bar() -> Progress:
+    """A progress bar on stderr; without a terminal it prints nothing by itself."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=stderr()
+    )
+
+
+def home_relative(path: str | os.PathLike[str]) -> str:
+    """The path as a person would type it from here."""
+    text = os.fspath(path)
+    return os.path.relpath(text) if not os.path.relpath(text).startswith("..") else text
+
+
+def _cell(value: object) -> str:
+    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value).replace("\n", " ")

@@ -1,0 +1,186 @@
+"""Fetching the files of motions: eight at a time, into `.part` files, resumed, checked by sha256."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from services.cli.client import Client
+from services.cli.names import DEFAULT_TEMPLATE, Naming, file_name, slug
+from shared.errors import Conflict, InvalidFile, InvalidInput, Unreachable
+
+PARALLEL = 8
+ATTEMPTS = 4
+"""Downloads of one file that may break off; each goes on where the last one stopped."""
+BLOCK = 2**18
+
+
+@dataclass(frozen=True)
+class Download:
+    """One file to fetch."""
+
+    url: str
+    """Path on the server."""
+    sha256: str
+    size: int
+    path: Path
+
+
+def check_folder(folder: Path) -> Path:
+    """The folder, made if need be and tried for writing.
+
+    Raises:
+        InvalidInput: it cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InvalidInput(
+            f"cannot write here: {error.strerror}", where=str(folder), hint="Choose another folder with -o."
+        ) from error
+    return folder
+
+
+def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
+) -> list[tuple[dict[str, Any], list[Download]]]:  # fmt: skip
+    """Which files of which items go where.
+
+    Args:
+        items: items of the API, in input order.
+        formats: of files; None = all there are.
+
+    Raises:
+        InvalidInput: two motions would have one name, or a name is not a plain file name.
+        Conflict: a wanted format was not made.
+    """
+    planned: list[tuple[dict[str, Any], list[Download]]] = []
+    taken: dict[str, str] = {}
+    for item in items:
+        downloads: list[Download] = []
+        motion = item["motion"]
+        for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
+            name = file_name(template, naming(item), file["format"])
+            if taken.setdefault(name.casefold(), item["id"]) != item["id"]:
+                raise InvalidInput(
+                    f"two motions would be written to {name}",
+                    where="--name-template",
+                    hint="Put {index} and {seed} in.",
+                )
+            url = f"/v1/motions/{motion['id']}/files/{file['format']}"
+            downloads.append(Download(url, file["sha256"], file["size"], folder / name))
+        planned.append((item, downloads))
+    return planned
+
+
+def naming(item: dict[str, Any]) -> Naming:
+    """What a name template may use of an item of the API."""
+    return Naming(
+        index=item["index"] + 1,
+        name=item["name"] or slug(item["prompt"]),
+        seed=item["seed"],
+        variant=item["variant"],
+        model=item["model"],
+        job=item["job"],
+    )
+
+
+def download_all(
+    client: Client, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
+) -> None:
+    """Fetch all files, or complain before the first one is touched.
+
+    Args:
+        overwrite: replace files that hold something else.
+        done: called after each file.
+
+    Raises:
+        Conflict: a file is there and holds something else.
+        InvalidFile: what arrived is not what the server said, or cannot be written.
+    """
+    missing: list[Download] = []
+    for download in downloads:
+        if _is_there(download, overwrite):
+            done(download)
+        else:
+            missing.append(download)
+    with ThreadPoolExecutor(PARALLEL) as pool:
+        try:
+            for download in pool.map(lambda d: _download(client, d), missing):
+                done(download)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _wanted(files: list[dict[str, Any]], formats: Sequence[str] | None, item: str) -> Iterator[dict[str, Any]]:
+    if formats is None:
+        yield from files
+        return
+    by_format = {file["format"]: file for file in files}
+    for name in formats:
+        if name not in by_format:
+            raise Conflict(f"was not made as {name}", where=f"item {item}", hint=f"It has {', '.join(by_format)}.")
+        yield by_format[name]
+
+
+def _is_there(download: Download, overwrite: bool) -> bool:
+    try:
+        if download.path.stat().st_size == download.size and sha256_of(download.path) == download.sha256:
+            return True
+    except FileNotFoundError:
+        return False
+    if not overwrite:
+        raise Conflict(
+            "is there already and holds something else",
+            where=str(download.path),
+            hint="Choose another folder, or --overwrite.",
+        )
+    return False
+
+
+def _download(client: Client, download: Download) -> Download:
+    part = download.path.with_name(download.path.name + ".part")
+    for attempt in range(1, ATTEMPTS + 1):
+        try:
+            _continue(client, download, part)
+        except Unreachable:
+            if attempt == ATTEMPTS:
+                raise
+            continue
+        except OSError as error:
+            raise InvalidFile(f"cannot be written: {error.strerror}", where=str(part)) from error
+        if sha256_of(part) == download.sha256:
+            part.replace(download.path)
+            return download
+        part.unlink()  # a leftover of another file, or damaged on the way: from the start
+    raise InvalidFile(
+        "what arrived has another sha256 than the server says", where=str(download.path), hint="Fetch it again later."
+    )
+
+
+def _continue(client: Client, download: Download, part: Path) -> None:
+    have = part.stat().st_size if part.exists() else 0
+    if have >= download.size:
+        have = 0
+    headers = {"Range": f"bytes={have}-"} if have else {}
+    with client.stream(download.url, headers) as response:
+        resumed = response.status_code == 206
+        with part.open("ab" if resumed else "wb") as stream:
+            for block in response.iter_bytes(BLOCK):
+                stream.write(block)
+            stream.flush()
+            os.fsync(stream.fileno())
+
+
+def sha256_of(path: Path) -> str:
+    """Hex sha256 of a file."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

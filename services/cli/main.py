@@ -1,0 +1,86 @@
+"""The commands of `marey`. Each module of `commands` imports what it needs when it runs, not before."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from services.cli import console
+from services.cli.commands import admin, convert, data, fetch, generate, jobs, models, serve, submit, text, train
+from shared.errors import MareyError
+
+INTERRUPTED = 130
+
+HELP = """Text in, 3D human motion out.
+
+Exit codes: 0 all succeeded; 1 internal error; 2 usage or invalid input; 3 not found; 4 unreachable; 5 refused;
+6 ended with failed, dead or cancelled items; 7 --timeout passed; 130 interrupted."""
+
+
+class Commands(TyperGroup):
+    """Expected errors are printed verbatim and set the exit code; anything else is a bug and shows its traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the chosen command."""
+        try:
+            return super().invoke(ctx)
+        except MareyError as error:
+            console.say(f"marey: {error}")
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            console.say("marey: interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError:
+            sys.stderr.close()  # the reader of our output left; Python would complain at exit
+            raise typer.Exit(0) from None
+
+
+app = typer.Typer(
+    cls=Commands,
+    help=HELP,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        console.result(version("marey"))
+        raise typer.Exit(0)
+
+
+@app.callback()
+def root(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it.")] = False,
+) -> None:
+    """Nothing of its own: the help stands in `HELP`."""
+
+
+app.command("generate")(generate.generate)
+app.command("submit")(submit.submit)
+app.add_typer(jobs.app, name="jobs")
+app.command("fetch")(fetch.fetch)
+app.command("serve")(serve.serve)
+app.command("worker")(serve.worker)
+app.command("scheduler")(serve.scheduler)
+app.command("api")(serve.api)
+app.add_typer(text.app, name="text")
+app.add_typer(models.app, name="models")
+app.add_typer(data.app, name="data")
+app.add_typer(train.app, name="train")
+app.command("convert")(convert.convert)
+app.command("render")(convert.render)
+app.command("doctor")(admin.doctor)
+app.add_typer(admin.app, name="admin")
+
+
+def run() -> None:
+    """The console script."""
+    app()

@@ -1,0 +1,73 @@
+"""Names of written files: `{index:05}_{name or slug}_{seed}.{ext}`, and never a path that leaves its folder."""
+
+from __future__ import annotations
+
+import re
+import string
+import unicodedata
+from dataclasses import dataclass
+
+from shared.errors import InvalidInput
+from shared.items import NAME, RESERVED
+
+DEFAULT_TEMPLATE = "{index:05}_{name}_{seed}"
+MAX_SLUG = 48
+FIELDS = ("index", "name", "seed", "variant", "model", "job")
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What a template may speak of. `index` counts prompts from 1; `name` is the item's name, else a slug."""
+
+    index: int
+    name: str
+    seed: int
+    variant: int
+    model: str
+    job: str
+
+
+def slug(text: str, limit: int = MAX_SLUG) -> str:
+    """The words of a prompt as a plain file name: `A person waves!` → `a-person-waves`."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    words = re.sub(r"[^a-z0-9]+", "-", plain).strip("-")
+    if len(words) > limit:
+        words = words[: limit + 1].rpartition("-")[0] or words[:limit]
+    return words or "motion"
+
+
+def check_template(template: str) -> str:
+    """The template, if it makes one plain file name from each item.
+
+    Raises:
+        InvalidInput: it names an unknown field, or could leave the folder.
+    """
+    try:
+        fields = [name for _, name, _, _ in string.Formatter().parse(template) if name is not None]
+    except ValueError as error:
+        raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
+    unknown = [name for name in fields if name not in FIELDS]
+    if unknown:
+        raise InvalidInput(f"{unknown[0]!r} is not a field of a template", where="--name-template", hint=_HINT)
+    file_name(template, Naming(1, "name", 0, 0, "hgm3", "job"), "npz")
+    return template
+
+
+def file_name(template: str, naming: Naming, extension: str) -> str:
+    """The file name of one motion.
+
+    Raises:
+        InvalidInput: what comes out is not a plain file name.
+    """
+    try:
+        stem = template.format(**vars(naming))
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
+    if not NAME.match(stem) or "/" in stem or "\\" in stem or ".." in stem or not stem.isprintable():
+        raise InvalidInput(f"{stem!r} is not a plain file name", where="--name-template", hint=_HINT)
+    if len(stem) > 200 or RESERVED.fullmatch(stem) or set(stem) & set('<>:"|?*'):
+        raise InvalidInput(f"{stem[:80]!r} is not a file name on every system", where="--name-template", hint=_HINT)
+    return f"{stem}.{extension}"
+
+
+_HINT = f"Fields are {', '.join('{' + f + '}' for f in FIELDS)}; the default is {DEFAULT_TEMPLATE!r}. No folders in it."

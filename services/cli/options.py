@@ -1,0 +1,47 @@
+"""Options that several commands share, spelled once."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from services.cli.names import DEFAULT_TEMPLATE
+
+
+class FileFormat(StrEnum):
+    """Formats a motion comes in."""
+
+    BVH = "bvh"
+    NPZ = "npz"
+
+
+class InputFormat(StrEnum):
+    """Formats of files of prompts."""
+
+    CSV = "csv"
+    JSONL = "jsonl"
+    TXT = "txt"
+
+
+Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="What the person does.")]
+PromptFile = Annotated[
+    str | None, typer.Option("-f", "--file", help="CSV, JSONL or text file of prompts; - is stdin.", show_default=False)
+]
+PromptFormat = Annotated[
+    InputFormat | None, typer.Option("--input-format", help="Format of -f where its ending does not tell.")
+]
+Formats = Annotated[list[FileFormat] | None, typer.Option("--format", help="File format; may be repeated.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; made if it is not there.")]
+Template = Annotated[
+    str, typer.Option("--name-template", help="File names, of {index} {name} {seed} {variant} {model} {job}.")
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that hold something else.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", help="Length; none given = the model decides.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first variant; none given = drawn.")]
+Variants = Annotated[int | None, typer.Option("--variants", help="Motions of each prompt.")]
+Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
+Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]
+TEMPLATE = DEFAULT_TEMPLATE

@@ -1,0 +1,87 @@
+"""Where the server is: `MAREY_SERVER` and `MAREY_KEY`, else the `server.json` of a `marey serve` on this machine."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from shared.errors import InvalidFile, InvalidInput, Unauthenticated, Unreachable
+
+
+@dataclass(frozen=True)
+class Server:
+    """A server to talk to. `pid` is known only for one that runs here."""
+
+    url: str
+    key: str
+    pid: int | None = None
+
+
+def home() -> Path:
+    """`MAREY_HOME`, by default the user's data folder: database, assets, logs, lock and `server.json`."""
+    given = os.environ.get("MAREY_HOME")
+    if given:
+        return Path(given).expanduser().absolute()
+    from platformdirs import user_data_path
+
+    return user_data_path("marey", appauthor=False)
+
+
+def find_server() -> Server:
+    """The server that commands talk to.
+
+    Raises:
+        Unreachable: none is named and none runs here.
+        Unauthenticated: one is named, but no key.
+    """
+    url = os.environ.get("MAREY_SERVER")
+    if not url:
+        return _local_server()
+    if not url.startswith(("http://", "https://")):
+        raise InvalidInput(f"MAREY_SERVER is {url!r}, not a URL", hint="Write it as https://marey.example.com")
+    return Server(url.rstrip("/"), _key())
+
+
+def write_server(server: Server, folder: Path) -> None:
+    """Write `server.json`, readable by its owner alone, in one step."""
+    path = folder / "server.json"
+    temporary = path.with_suffix(".json.part")
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
+        json.dump(asdict(server), stream)
+    temporary.replace(path)
+
+
+def read_server(folder: Path) -> Server | None:
+    """The server that `folder/server.json` names; None = no such file."""
+    path = folder / "server.json"
+    try:
+        fields = json.loads(path.read_text(encoding="utf-8"))
+        return Server(str(fields["url"]), str(fields["key"]), int(fields["pid"]))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InvalidFile(
+            f"cannot be read: {error}", where=str(path), hint="Delete it and start `marey serve` again."
+        ) from error
+
+
+def _local_server() -> Server:
+    server = read_server(home())
+    if server is None:
+        raise Unreachable(
+            "no server is running here",
+            where=str(home()),
+            hint="Start one with `marey serve`, or name one with MAREY_SERVER and MAREY_KEY.",
+        )
+    return server
+
+
+def _key() -> str:
+    path = os.environ.get("MAREY_KEY_FILE")
+    key = Path(path).expanduser().read_text(encoding="utf-8").strip() if path else os.environ.get("MAREY_KEY", "")
+    if not key:
+        raise Unauthenticated("MAREY_SERVER names a server, but MAREY_KEY is empty", hint="Set MAREY_KEY to your key.")
+    return key

@@ -1,0 +1,302 @@
+"""What one line of input asks for, and the one check of it.
+
+The command line (files, `generate`) and the API (JSON and NDJSON bodies) read items through here, so that a problem
+has the same words everywhere. Standard library only: the small client imports it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from shared.errors import InvalidInput, TooLarge
+from shared.text.prompts import check_prompt
+
+MAX_ITEMS = 100_000
+"""Items (prompts times variants) of one job."""
+MAX_BODY_BYTES = 64 * 2**20
+MAX_PROBLEMS = 1000
+"""More than these are counted, not listed."""
+MAX_SEED = 2**31 - 1
+MAX_VARIANTS = 100
+MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
+"""What any model here may do; a bundle's own range, which is narrower, is checked where the bundle is known."""
+MAX_TAGS, MAX_TAG_LENGTH = 20, 64
+
+COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
+FIELDS = (*COLUMNS, "settings")
+SETTINGS = {
+    "steps": (1, 100),
+    "guidance": (0.0, 20.0),
+    "temperature": (0.0, 5.0),
+    "top_k": (0.0, 1.0),
+    "residual_guidance": (0.0, 20.0),
+}
+"""Sampling settings an item may set, each with its range. One with whole bounds is whole."""
+
+NAME = re.compile(r"[^\W_][\w .()+=@,-]{0,99}", re.ASCII)
+"""A name becomes a file name on the client: plain characters, no separators, no leading dot or dash."""
+RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+"""Names that Windows keeps for devices."""
+MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One prompt with what goes with it; None = the server or the model decides."""
+
+    prompt: str
+    name: str | None = None
+    seconds: float | None = None
+    seed: int | None = None
+    """Seed of variant 0; variant k uses seed + k."""
+    variants: int = 1
+    model: str | None = None
+    """A model (`hgm3`), a bundle (`hgm3-starter`) or an exact bundle (`hgm3-starter@0123456789ab`)."""
+    tags: tuple[str, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def as_json(self) -> dict[str, Any]:
+        """The item as a line of a request body: only what was given."""
+        fields = {name: getattr(self, name) for name in FIELDS}
+        return {name: list(v) if isinstance(v, tuple) else v for name, v in fields.items() if v not in (None, (), {})}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with the input. `line` counts from 1; None = not about a line."""
+
+    line: int | None
+    field: str | None
+    message: str
+
+    def __str__(self) -> str:
+        place = ": ".join(str(p) for p in (f"line {self.line}" if self.line else None, self.field) if p is not None)
+        return f"{place}: {self.message}" if place else self.message
+
+
+class InvalidItems(InvalidInput):
+    """Some lines of the input cannot be used; none was."""
+
+    problem_type = "invalid-items"
+
+    def __init__(self, problems: Iterable[Problem], *, where: str | None = None, total: int | None = None) -> None:
+        found = list(problems)
+        self.total = len(found) if total is None else total
+        self.problems = tuple(found[:MAX_PROBLEMS])
+        count = "1 problem" if self.total == 1 else f"{self.total} problems"
+        super().__init__(
+            f"{count} in the input; nothing was submitted", where=where, hint="Correct them and try again."
+        )
+
+    def __str__(self) -> str:
+        lines = [f"  {problem}" for problem in self.problems]
+        if self.total > len(lines):
+            lines.append(f"  … and {self.total - len(lines)} more")
+        head = f"{self.where}: {self.message}" if self.where else self.message
+        return "\n".join([head, *lines, f"  {self.hint}"])
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """A line that could not even be parsed; `read_item` refuses it with this message."""
+
+    message: str
+
+
+def read_json(line: str | bytes) -> object:
+    """The JSON value of one line, or `Unreadable`."""
+    try:
+        return json.loads(line)
+    except RecursionError:
+        return Unreadable("is nested too deeply")
+    except ValueError as error:
+        return Unreadable(f"is not JSON: {error}")
+
+
+def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[Problem]]:
+    """The item in `raw`, a JSON object, or all that is wrong with it.
+
+    Args:
+        raw: what a JSON line or an element of `items` holds, or `Unreadable`.
+        line: where it stood, for the problems.
+    """
+    if isinstance(raw, Unreadable):
+        return None, [Problem(line, None, raw.message)]
+    if not isinstance(raw, Mapping):
+        return None, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
+    problems = [
+        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {', '.join(FIELDS)}")
+        for name in raw
+        if name not in FIELDS
+    ]
+    values: dict[str, Any] = {}
+    for name, check in _CHECKS.items():
+        if raw.get(name) is None:
+            continue
+        try:
+            values[name] = check(raw[name])
+        except InvalidInput as error:
+            problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
+    if raw.get("prompt") is None:
+        problems.append(Problem(line, "prompt", "is missing: say what the person does"))
+    seed, variants = values.get("seed"), values.get("variants", 1)
+    if seed is not None and seed + variants - 1 > MAX_SEED:
+        problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
+    return (None, problems) if problems else (Item(**values), [])
+
+
+def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None = None) -> list[Item]:
+    """All items, or one error with all problems.
+
+    Raises:
+        InvalidItems: at least one is wrong.
+        TooLarge: more than `MAX_ITEMS` with their variants.
+    """
+    items: list[Item] = []
+    problems: list[Problem] = []
+    total = 0
+    for line, raw in raws:
+        item, found = read_item(raw, line)
+        total += len(found)
+        problems.extend(found[: MAX_PROBLEMS - len(problems)])
+        if item is not None:
+            items.append(item)
+    if problems:
+        raise InvalidItems(problems, where=where, total=total)
+    if not items:
+        raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
+    check_count(items, where=where)
+    return items
+
+
+def check_count(items: Iterable[Item], *, where: str | None = None) -> int:
+    """Items with their variants.
+
+    Raises:
+        TooLarge: more than `MAX_ITEMS`.
+    """
+    count = sum(item.variants for item in items)
+    if count > MAX_ITEMS:
+        raise TooLarge(
+            f"{count} motions (prompts times variants) are over the limit of {MAX_ITEMS} a job",
+            where=where,
+            hint="Submit them as several jobs.",
+        )
+    return count
+
+
+def _name(value: object) -> str:
+    text = _text(value)
+    if not NAME.fullmatch(text) or text.endswith((".", " ")) or ".." in text or RESERVED.fullmatch(text):
+        raise InvalidInput(
+            f"{text[:60]!r} cannot be a file name: use up to 100 of A-Z a-z 0-9 space _ . ( ) + = @ , - "
+            "and begin with a letter or digit"
+        )
+    return text
+
+
+def _seconds(value: object) -> float:
+    number = _number(value)
+    if not MIN_SECONDS <= number <= MAX_SECONDS:
+        raise InvalidInput(f"{number:g} is outside {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
+    return number
+
+
+def _seed(value: object) -> int:
+    return _whole(value, 0, MAX_SEED)
+
+
+def _variants(value: object) -> int:
+    return _whole(value, 1, MAX_VARIANTS)
+
+
+def _model(value: object) -> str:
+    text = _text(value)
+    if not MODEL.fullmatch(text):
+        raise InvalidInput(f"{text[:60]!r} is not the name of a model or bundle: `marey models list` shows them")
+    return text
+
+
+def _tags(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise InvalidInput('is not a list of words: write ["walk", "take 2"]')
+    if len(value) > MAX_TAGS:
+        raise InvalidInput(f"{len(value)} tags are over the limit of {MAX_TAGS}")
+    tags = tuple(_text(tag) for tag in value)
+    for tag in tags:
+        if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not tag.isprintable():
+            raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
+    return tags
+
+
+def _settings(value: object) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise InvalidInput('is not an object: write {"guidance": 4.5}')
+    checked: dict[str, float] = {}
+    for name, given in value.items():
+        if name not in SETTINGS:
+            raise InvalidInput(f"{str(name)[:60]!r} is not a setting; known are {', '.join(SETTINGS)}")
+        low, high = SETTINGS[name]
+        try:
+            checked[name] = _whole(given, low, int(high)) if isinstance(low, int) else _number(given)
+        except InvalidInput as error:
+            raise InvalidInput(f"{name}: {error.message}") from error
+        if not low <= checked[name] <= high:
+            raise InvalidInput(f"{name}: {checked[name]:g} is outside {low:g} to {high:g}")
+    return checked
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise InvalidInput(f"is {_kind(value)}, not a text")
+    try:
+        value.encode("utf-8")
+    except UnicodeEncodeError:
+        raise InvalidInput("holds a lone surrogate: it is not valid Unicode") from None
+    return value
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidInput(f"is {_kind(value)}, not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InvalidInput("is not a finite number")
+    return number
+
+
+def _whole(value: object, low: int, high: int) -> int:
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InvalidInput(f"is {_kind(value)}, not a whole number")
+    if not low <= value <= high:
+        raise InvalidInput(f"{value if abs(value) < 10**20 else 'it'} is outside {low} to {high}")
+    return value
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, str):
+        return repr(value[:40])
+    kinds = {bool: "true or false", list: "a list", dict: "an object", type(None): "null"}
+    return kinds.get(type(value), repr(value)[:40])
+
+
+_CHECKS = {
+    "prompt": lambda value: check_prompt(_text(value)),
+    "name": _name,
+    "seconds": _seconds,
+    "seed": _seed,
+    "variants": _variants,
+    "model": _model,
+    "tags": _tags,
+    "settings": _settings,
+}
