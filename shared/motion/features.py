@@ -105,8 +105,7 @@ def gaussian_smooth(values: Array, sigma: float) -> Array:
     radius = int(4 * sigma + 0.5)
     kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
     padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
-    kernel /= kernel.sum()
-    return np.stack([np.convolve(padded[:, c], kernel, mode="valid") for c in range(values.shape[1])], axis=1)
+    return np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0) @ (kernel / kernel.sum())
 
 
 @dataclass(frozen=True, eq=False)

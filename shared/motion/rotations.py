@@ -173,19 +173,20 @@ def from_6d(d: Array) -> Array:
 
 
 def from_euler(angles: Array, order: str) -> Array:
-    """Quaternions (..., 4) of Euler angles in degrees (..., 3), given in the order their axes are named.
+    """Quaternions (..., 4) of Euler angles in degrees (..., n), given in the order their axes are named.
 
-    `order` is as in a BVH file, `ZXY` for instance: the first axis is the outermost, R = Rz Rx Ry.
+    `order` is as in a BVH file, `ZXY` for instance: the first axis is the outermost, R = Rz Rx Ry. It may name any
+    number of axes, also none.
     """
     half = np.radians(np.asarray(angles, np.float64)) / 2
     cos, sin = np.cos(half), np.sin(half)
-    q = np.zeros((*half.shape[:-1], 4))
-    q[..., 0] = cos[..., 0]
-    q[..., 1 + AXES.index(order[0])] = sin[..., 0]
-    for k in (1, 2):
-        # q * (c + s e): the unit axis e only permutes and signs the components of q
-        turned = np.empty_like(q)
-        x, y, z = 1 + AXES.index(order[k]), 1 + (AXES.index(order[k]) + 1) % 3, 1 + (AXES.index(order[k]) + 2) % 3
+    q = np.broadcast_to(IDENTITY, (*half.shape[:-1], 4))
+    for k, axis in enumerate(order):
+        # q * (c + s e): the unit axis e only permutes the components of q and changes signs
+        x = AXES.index(axis)
+        y, z = 1 + (x + 1) % 3, 1 + (x + 2) % 3
+        x += 1
+        turned = np.empty(q.shape)
         turned[..., 0] = -q[..., x]
         turned[..., x] = q[..., 0]
         turned[..., y] = q[..., z]
