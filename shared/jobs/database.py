@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import psycopg
 import sqlalchemy as sa
+from psycopg import sql
 from sqlalchemy import event, exc
 
 from shared.errors import Unreachable
@@ -39,14 +40,15 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10) -> sa
 
     @event.listens_for(engine, "connect")
     def _set_up(connection: psycopg.Connection[tuple[object, ...]], _record: object) -> None:
-        connection.execute(f"SET statement_timeout = {STATEMENT_TIMEOUT}; SET timezone = 'UTC'")
+        connection.execute("SELECT set_config('statement_timeout', %s, false)", (str(STATEMENT_TIMEOUT),))
+        connection.execute("SET timezone = 'UTC'")
         connection.commit()
 
     return engine
 
 
 @contextmanager
-def transaction(engine: sa.Engine) -> Iterator[sa.Connection]:
+def transaction(engine: sa.Engine) -> Generator[sa.Connection]:
     """One transaction: commits at the end, rolls back on an exception.
 
     Raises:
@@ -97,7 +99,7 @@ class Listener:
         try:
             self._connection = psycopg.connect(dsn, autocommit=True, connect_timeout=CONNECT_TIMEOUT)
             for channel in channels:
-                self._connection.execute(psycopg.sql.SQL("LISTEN {}").format(psycopg.sql.Identifier(channel)))
+                self._connection.execute(sql.SQL("LISTEN {}").format(sql.Identifier(channel)))
         except psycopg.OperationalError as error:
             raise unreachable(error) from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -142,7 +142,7 @@ def _fsync_folder(folder: Path) -> None:
 
 
 @contextmanager
-def _outages(root: Path, key: str | None = None) -> Iterator[None]:
+def _outages(root: Path, key: str | None = None) -> Generator[None]:
     """Turn errors of the file system into `NotFound` (of `key`) or `Unreachable`."""
     try:
         yield

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -160,7 +160,7 @@ class S3Store:
         return "/".join(filter(None, (f"s3://{self.options.endpoint}", self.options.bucket, key)))
 
     @contextmanager
-    def _outages(self, key: str | None = None) -> Iterator[None]:
+    def _outages(self, key: str | None = None) -> Generator[None]:
         """Turn errors of the SDK into `NotFound` (of `key`) or `Unreachable`."""
         try:
             yield
