@@ -1,0 +1,14 @@
+"""Alembic's environment: runs on the connection that `shared.jobs.migrate` hands over."""
+
+from alembic import context
+
+from shared.jobs.schema import metadata
+
+context.configure(
+    connection=context.config.attributes["connection"],
+    target_metadata=metadata,
+    compare_server_default=True,
+    transaction_per_migration=False,
+)
+with context.begin_transaction():
+    context.run_migrations()
