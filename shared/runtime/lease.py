@@ -1,90 +1,118 @@
-"""Leases of this process: a thread renews them, learns what was cancelled or lost, and stops renewing a stuck batch."""
+"""Leases of this process: a thread renews them and learns what was cancelled or lost."""
 
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from uuid import UUID
 
 from shared.errors import Unreachable
-from shared.jobs.types import Claim
+from shared.jobs import Claim
+from shared.jobs import Heartbeat as Answer
 from shared.runtime.logs import logger
 
 log = logger(__name__)
 
-Renew = Callable[[UUID], set[UUID]]
-"""Renews one lease by its token in the database; gives the items that are still ours. Raises `Unreachable`."""
+Renew = Callable[[UUID, Collection[UUID], bool], Answer]
+"""Renews one lease in the database: its token, its open items, whether it progressed. Raises `Unreachable`."""
 
 
 class HeldLease:
     """A claim being worked on: what the handler tells the heartbeat and what the heartbeat tells the handler.
 
-    It is the `BatchControl` of `shared.runtime.handler`. One writer for each field, so no lock is needed.
+    It is the `BatchControl` of `shared.runtime.handler`. Its state is a few attributes replaced as a whole, so the
+    decode loop pays no lock.
     """
 
-    def __init__(self, claim: Claim, stopping: threading.Event, stall_seconds: float) -> None:
+    def __init__(self, claim: Claim, stopping: threading.Event) -> None:
         self.claim = claim
-        self._everything = frozenset(item.id for item in claim.items)
-        self._gone: frozenset[UUID] = frozenset()
         self._stopping = stopping
-        self._stall_seconds = stall_seconds
-        self._progressed: float | None = None
-        self.stalled = False
+        self._everything = frozenset(item.id for item in claim.items)
+        self._open = self._everything
+        self._gone: frozenset[UUID] = frozenset()
+        self._moved = True
+        self._exempt = False
 
     def progress(self, done: int, total: int) -> None:
         """`done` of `total` steps: the batch is alive."""
-        self._progressed = time.monotonic()
+        self._moved = True
+        self._exempt = False
 
     def dropped(self) -> frozenset[UUID]:
-        """Items whose result nobody wants; all of them when the worker stops or the batch was given up."""
-        return self._everything if self._stopping.is_set() or self.stalled else self._gone
+        """Items whose result nobody wants; all of them when the worker stops or the lease is lost."""
+        return self._everything if self._stopping.is_set() else self._gone
 
+    @property
     def lost(self) -> frozenset[UUID]:
         """Items that are no longer ours: a result for them is thrown away."""
-        return self._everything if self.stalled else self._gone
+        return self._gone
 
-    def suspend_stall_clock(self) -> None:
-        """Loading and the first compile make no progress for minutes; the clock starts at the next `progress`."""
-        self._progressed = None
+    @property
+    def open(self) -> frozenset[UUID]:
+        """Items neither committed, failed nor released, and still ours as far as we know."""
+        return self._open - self._gone
 
-    def is_stuck(self) -> bool:
-        """Whether the decode loop was silent for longer than allowed."""
-        return self._progressed is not None and time.monotonic() - self._progressed > self._stall_seconds
+    def settle(self, items: Iterable[UUID]) -> None:
+        """These items are written, or known not to be ours: the heartbeat asks no more about them."""
+        self._open = self._open - frozenset(items)
 
-    def keep(self, still_ours: Iterable[UUID]) -> None:
-        """What the database says is still leased to this token."""
-        self._gone = self._everything - frozenset(still_ours)
+    def exempt(self) -> None:
+        """Loading and the first compile may be silent for minutes; ends with the next `progress`."""
+        self._exempt = True
+
+    def take_progress(self) -> bool:
+        """Whether the batch moved since the last call (or need not)."""
+        moved, self._moved = self._moved or self._exempt, False
+        return moved
+
+    def learn(self, answer: Answer) -> None:
+        """Take in what the database said."""
+        self._gone = self._everything if answer.lost else self._gone | answer.gone
 
 
 class Heartbeat(threading.Thread):
     """Renews every held lease each `interval` seconds, on its own connection.
 
-    A lease that cannot be renewed because the database is away is not given up here: the fence decides at the commit.
+    A batch that is silent for too long is not renewed: the database measures that, by its own clock. While the database
+    is away nothing is given up here: the fence decides at the commit.
     """
 
-    def __init__(self, renew: Renew, *, interval: float, stall_seconds: float, stopping: threading.Event) -> None:
+    def __init__(
+        self,
+        renew: Renew,
+        *,
+        interval: float,
+        stopping: threading.Event,
+        present: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`present`, called after each round, says that this worker lives. Raises `Unreachable` at most."""
         super().__init__(name="heartbeat", daemon=True)
         self._renew = renew
+        self._present = present
         self._interval = interval
-        self._stall_seconds = stall_seconds
         self._stopping = stopping
         self._held: dict[UUID, HeldLease] = {}
         self._closed = threading.Event()
 
     def hold(self, claim: Claim) -> HeldLease:
         """Keep the lease of `claim` alive until `let_go`."""
-        lease = HeldLease(claim, self._stopping, self._stall_seconds)
+        lease = HeldLease(claim, self._stopping)
         self._held[claim.lease_token] = lease
         return lease
 
     def let_go(self, lease: HeldLease) -> None:
-        """Stop renewing; the caller has committed or released every item."""
+        """Stop renewing; the caller has written every item, or given up on them."""
         self._held.pop(lease.claim.lease_token, None)
 
     def run(self) -> None:
         while not self._closed.wait(self._interval):
             self.beat()
+            try:
+                self._present()
+            except Unreachable as error:
+                log.warning("presence_failed", error=error.message)
+            except Exception:
+                log.exception("presence_failed")  # without this thread every lease here would run out
 
     def close(self) -> None:
         """End the thread; leases still held run out by themselves."""
@@ -93,12 +121,18 @@ class Heartbeat(threading.Thread):
     def beat(self) -> None:
         """Renew each lease once."""
         for token, lease in list(self._held.items()):
-            if lease.is_stuck():
-                log.error("lease_given_up", reason="no progress", items=len(lease.claim.items))
-                lease.stalled = True
-                self._held.pop(token, None)
+            items = lease.open
+            if not items:
                 continue
             try:
-                lease.keep(self._renew(token))
+                answer = self._renew(token, items, lease.take_progress())
             except Unreachable as error:
                 log.warning("heartbeat_failed", error=error.message)
+                continue
+            except Exception:
+                log.exception("heartbeat_failed")
+                continue
+            if answer.gone or answer.lost:
+                lease.learn(answer)
+                if lease.open != items:  # not merely committed in between
+                    log.info("items_taken_away", job=str(lease.claim.job), lost=answer.lost, items=len(answer.gone))

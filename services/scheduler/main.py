@@ -1,0 +1,102 @@
+"""`marey scheduler`: relay and sweeper in one process. A second one beside it is harmless, and so is its death."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType
+
+import sqlalchemy as sa
+
+from services.scheduler.periodic import Periodic
+from services.scheduler.relay import Relay, publisher
+from shared.errors import InvalidInput
+from shared.jobs import create_engine, remove_stale_assets, sweep, transaction
+from shared.runtime.app import create_app
+from shared.runtime.logs import configure_logging, logger
+from shared.runtime.queue import redis_client
+from shared.settings import Settings
+from shared.storage import open_store
+
+log = logger(__name__)
+
+STALE_ASSETS_SECONDS = 600.0  # assets half written by a dead worker wait an hour anyway
+STOP_SECONDS = 10.0
+
+
+def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None) -> int:
+    """Run until SIGTERM or SIGINT, or until `stopping` is set (then no signal handler is installed).
+
+    Neither database, queue nor store has to be there at the start: every part waits for what it needs.
+
+    Raises:
+        InvalidInput: a setting is missing.
+    """
+    if chosen.database_url is None or chosen.queue_url is None:
+        raise InvalidInput(
+            "a scheduler needs a database and a queue",
+            where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
+            hint="Set both, or use `marey serve`, which brings its own.",
+        )
+    if stopping is None:
+        configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
+        stopping = threading.Event()
+        _stop_on_signals(stopping)
+    database_url = chosen.database_url.get_secret_value()
+    queue_url = chosen.queue_url.get_secret_value()
+    engine = create_engine(database_url)
+    app = create_app(queue_url)
+    lists = redis_client(queue_url)
+    threads = [
+        Relay(engine, database_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping),
+        *_periodic(engine, chosen, stopping),
+    ]
+    for thread in threads:
+        thread.start()
+    log.info("started", parts=[thread.name for thread in threads])
+    stopping.wait()
+    for thread in threads:
+        thread.join(STOP_SECONDS)
+    app.close()
+    lists.close()
+    engine.dispose()
+    return 0
+
+
+def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:
+    store = open_store(chosen)
+
+    def probe() -> None:
+        with transaction(engine):
+            pass
+
+    def sweep_once() -> None:
+        report = sweep(engine)
+        if report.leases_lost or report.items_dead:
+            log.warning("swept", leases_lost=report.leases_lost, returned=report.items_returned, dead=report.items_dead)
+
+    def remove_stale() -> None:
+        removed = remove_stale_assets(engine, store)
+        if removed:
+            log.info("stale_assets_removed", assets=removed)
+
+    return [
+        # A lease that ran out while the database was away is not its worker's fault: let heartbeats come first.
+        Periodic(
+            "sweeper",
+            sweep_once,
+            seconds=chosen.sweep_seconds,
+            stopping=stopping,
+            probe=probe,
+            grace=chosen.lease_seconds,
+        ),
+        Periodic("stale_assets", remove_stale, seconds=STALE_ASSETS_SECONDS, stopping=stopping),
+    ]
+
+
+def _stop_on_signals(stopping: threading.Event) -> None:
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        stopping.set()
+
+    signal.signal(signal.SIGTERM, stop)
+    signal.signal(signal.SIGINT, stop)

@@ -1,0 +1,61 @@
+"""A thread that does one thing every so often, and outlives whatever that does. Schedules and webhooks go here too."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from shared.errors import Unreachable
+from shared.runtime.logs import logger
+
+log = logger(__name__)
+
+
+class Periodic(threading.Thread):
+    """Calls `action` every `seconds` until `stopping`.
+
+    After an outage, `probe` is asked until it does not raise `Unreachable`; then `grace` seconds pass before the next
+    call, for others must first find the database again.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        action: Callable[[], None],
+        *,
+        seconds: float,
+        stopping: threading.Event,
+        probe: Callable[[], None] = lambda: None,
+        grace: float = 0.0,
+    ) -> None:
+        super().__init__(name=name, daemon=True)
+        self._action = action
+        self._seconds = seconds
+        self._probe = probe
+        self._grace = grace
+        self._stopping = stopping
+        self._away = False
+
+    def run(self) -> None:
+        while not self._stopping.wait(self._seconds):
+            try:
+                self.once()
+            except Unreachable as error:
+                if not self._away:
+                    log.warning(f"{self.name}_waits", error=error.message)
+                self._away = True
+            except Exception:
+                log.exception(f"{self.name}_failed")
+
+    def once(self) -> None:
+        """One round.
+
+        Raises:
+            Unreachable: what the action needs is away.
+        """
+        if self._away:
+            self._probe()
+            self._stopping.wait(self._grace)
+            self._away = False
+        if not self._stopping.is_set():
+            self._action()

@@ -1,0 +1,124 @@
+"""The relay: tells workers, by hints in Redis, that rows wait in Postgres. Level-triggered: it remembers nothing.
+
+Every half second, and at once on NOTIFY, each queue's list is topped up to min(waiting batches, live workers). A lost
+list (FLUSHALL), a lost hint or a second relay need no special path: the next round looks at the rows again, and a hint
+too many finds nothing to claim.
+"""
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+
+import kombu.exceptions
+import redis
+import sqlalchemy as sa
+from celery import Celery
+
+from shared.errors import Unreachable
+from shared.jobs import QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
+from shared.runtime.app import DRAIN, PUBLISH_RETRY
+from shared.runtime.logs import logger
+
+log = logger(__name__)
+
+BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64}
+DEFAULT_BATCH_SIZE = 32
+"""Items of one claim, for counting the batches that wait; a wrong guess costs a hint, never an item."""
+
+LEAST_PAUSE = 0.05  # seconds between two rounds: a submit in many transactions notifies as often
+TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows that hints still reach it
+
+
+class Relay(threading.Thread):
+    """One round each `interval` seconds and on each notification, until `stopping`."""
+
+    def __init__(
+        self,
+        engine: sa.Engine,
+        database_url: str,
+        lists: redis.Redis,
+        publish: Callable[[str], None],
+        *,
+        interval: float,
+        stopping: threading.Event,
+    ) -> None:
+        super().__init__(name="relay", daemon=True)
+        self._engine = engine
+        self._database_url = database_url
+        self._lists = lists
+        self._publish = publish
+        self._interval = interval
+        self._stopping = stopping
+        self._next_tick = 0.0
+
+    def run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                with Listener(self._database_url, (QUEUE_CHANNEL,)) as listener:
+                    while not self._stopping.is_set():
+                        self.round()
+                        self._stopping.wait(LEAST_PAUSE)
+                        listener.wait(self._interval)
+            except Unreachable as error:
+                log.warning("relay_waits", error=error.message)
+            except Exception:
+                log.exception("relay_failed")
+            self._stopping.wait(self._interval)
+
+    def round(self) -> dict[str, int]:
+        """Top up every list once; gives how many hints went to which queue.
+
+        Raises:
+            Unreachable: the database or the queue does not answer.
+        """
+        with transaction(self._engine) as conn:
+            live = live_workers(conn)
+            sizes = {queue: BATCH_SIZES.get(queue, DEFAULT_BATCH_SIZE) for queue in live}
+            waiting = waiting_batches(conn, sizes) if sizes else {}
+        ticking = time.monotonic() >= self._next_tick
+        if ticking:
+            self._next_tick = time.monotonic() + TICK_SECONDS
+        sent: dict[str, int] = {}
+        for queue, workers in live.items():
+            wanted = workers if ticking else min(waiting.get(queue, 0), workers)
+            if wanted == 0:
+                continue
+            missing = wanted - self._length(queue)
+            for _ in range(missing):
+                self._publish(queue)
+            if missing > 0:
+                sent[queue] = missing
+        return sent
+
+    def _length(self, queue: str) -> int:
+        try:
+            return int(self._lists.llen(queue))  # pyright: ignore[reportArgumentType] - redis-py types async too
+        except redis.RedisError as error:
+            raise queue_away(error) from error
+
+
+def publisher(app: Celery) -> Callable[[str], None]:
+    """How to send one hint to a queue, by name: the scheduler imports no worker.
+
+    Raises (from what it gives): `Unreachable`, after a bounded number of tries.
+    """
+
+    def publish(queue: str) -> None:
+        try:
+            app.send_task(DRAIN, args=[queue], queue=queue, retry=True, retry_policy=PUBLISH_RETRY)
+        except (kombu.exceptions.OperationalError, redis.RedisError, OSError) as error:
+            raise queue_away(error) from error
+
+    return publish
+
+
+def queue_away(error: Exception) -> Unreachable:
+    """The expected error for a broker that does not answer."""
+    return Unreachable(
+        f"the queue does not answer ({type(error).__name__})",
+        where="queue",
+        hint="Is it running, and is MAREY_QUEUE_URL right? Embedded: `marey serve` starts it.",
+    )

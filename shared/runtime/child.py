@@ -1,0 +1,225 @@
+"""The one child of a worker: handlers, threads and connections, made after the spawn and kept until the end."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Collection
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import FrameType
+from typing import cast
+from uuid import UUID
+
+from shared.errors import InvalidInput, Unreachable
+from shared.jobs import Heartbeat as Answer
+from shared.jobs import WorkerBeat, beat, create_engine, heartbeat, retire, transaction
+from shared.runtime.committer import Committer
+from shared.runtime.faults import patiently
+from shared.runtime.handler import Handler, HandlerFactory, Role
+from shared.runtime.lease import Heartbeat
+from shared.runtime.logs import configure_logging, logger
+from shared.runtime.loop import Drain
+from shared.settings import Settings, settings
+from shared.storage import open_store
+
+log = logger(__name__)
+
+ROLE_VARIABLE = "MAREY_ROLE"
+"""Environment variable by which a parent tells its child, a fresh interpreter, what to serve."""
+NAME_VARIABLE = "MAREY_WORKER_NAME"
+
+FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
+TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the last batch's end, doubled
+
+
+@dataclass(frozen=True)
+class WorkerStatus:
+    """What a child says of itself to probes, in `home/run/worker-NAME.json`, every few seconds."""
+
+    pid: int
+    ready: bool
+    """The model is loaded and queues are served."""
+    tick_age: float
+    """Seconds since the last claim or step of progress. Idle workers tick too: the relay sends each a hint."""
+    written: float
+    """Wall clock."""
+    error: str | None = None
+    """Why the child could not start; its parent ends then."""
+
+    def alive(self, now: float) -> bool:
+        """Whether a liveness probe should pass."""
+        return now - self.written < FRESH and self.tick_age < TICK_LIMIT
+
+
+def status_file(home: Path, name: str) -> Path:
+    """Where the worker `name` keeps its status."""
+    return home / "run" / f"worker-{name}.json"
+
+
+def read_status(home: Path, name: str) -> WorkerStatus | None:
+    """The status of the worker `name`; None where there is none yet."""
+    try:
+        return WorkerStatus(**json.loads(status_file(home, name).read_text(encoding="utf-8")))
+    except (FileNotFoundError, ValueError, TypeError):
+        return None
+
+
+def write_status(home: Path, name: str, status: WorkerStatus) -> None:
+    """Replace the status of the worker `name`."""
+    path = status_file(home, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(f".{os.getpid()}")
+    temporary.write_text(json.dumps(asdict(status)), encoding="utf-8")
+    temporary.replace(path)
+
+
+def import_handler(reference: str) -> Handler:
+    """Import `module:attribute` and call it.
+
+    Raises:
+        InvalidInput: there is no such module or attribute.
+    """
+    module, _, attribute = reference.partition(":")
+    try:
+        factory = cast("HandlerFactory", getattr(importlib.import_module(module), attribute))
+    except (ImportError, AttributeError) as error:
+        raise InvalidInput(
+            f"the handler {reference!r} cannot be imported: {error}",
+            where="worker",
+            hint="Install the extra it needs (`pip install 'marey[worker]'`), or correct `module:attribute`.",
+        ) from error
+    return factory()
+
+
+class Child:
+    """Runs drains; lives as long as its process."""
+
+    def __init__(self, role: Role, name: str, chosen: Settings) -> None:
+        if chosen.database_url is None:
+            raise InvalidInput("a worker needs a database", where="MAREY_DATABASE_URL", hint="`marey serve` sets it.")
+        url = chosen.database_url.get_secret_value()
+        self._role = role
+        self._name = name
+        self._settings = chosen
+        self._engine = create_engine(url, pool_size=4)
+        self._beats = create_engine(url, pool_size=1)  # a heartbeat never waits for a commit's connection
+        self._stopping = threading.Event()
+        self._ready = False
+        self._ticked = time.monotonic()
+        self._heartbeat = Heartbeat(
+            self._renew, interval=chosen.heartbeat_seconds, stopping=self._stopping, present=self._present
+        )
+        self._committer = Committer(self._engine, open_store(chosen), self._heartbeat, self._stopping)
+        handlers = {queue: import_handler(reference) for queue, reference in role.handlers.items()}
+        self._drain = Drain(
+            self._engine,
+            name,
+            handlers,
+            heartbeat=self._heartbeat,
+            committer=self._committer,
+            stopping=self._stopping,
+            ticked=self._tick,
+        )
+
+    @classmethod
+    def of_environment(cls) -> Child:
+        """The child its parent described."""
+        role = Role(**json.loads(os.environ[ROLE_VARIABLE]))
+        return cls(role, os.environ[NAME_VARIABLE], settings())
+
+    def start(self) -> None:
+        """Start the threads, load what is to be loaded, and say that this worker is ready.
+
+        Raises: whatever a handler raises on loading.
+        """
+        configure_logging(f"worker-{self._role.name}", level=self._settings.log_level, json=self._settings.log_json)
+        signal.signal(signal.SIGTERM, self._on_sigterm)
+        self._heartbeat.start()
+        self._committer.start()
+        for queue, bundle in self._role.preload.items():
+            self._drain.load(queue, bundle)
+        self._ready = True
+        try:
+            self._present()
+        except Unreachable as error:
+            log.warning("presence_failed", error=error.message)  # the heartbeat goes on trying
+        log.info("ready", worker=self._name, queues=list(self._role.handlers))
+
+    def drain(self) -> int:
+        """Serve the queues; gives the number of items claimed."""
+        self._tick()
+        return self._drain.drain(self._settings.drain_seconds)
+
+    def stop(self) -> None:
+        """Give everything back and say good-bye."""
+        self._stopping.set()
+        self._ready = False
+        self._committer.wait_until_idle(5.0)
+        self._heartbeat.close()
+        status_file(self._settings.home, self._name).unlink(missing_ok=True)
+        try:
+            with transaction(self._beats) as conn:
+                for queue in self._role.handlers:
+                    retire(conn, self._worker(queue))
+        except Unreachable as error:
+            log.warning("not_retired", error=error.message)  # the row says by its age that nobody is there
+
+    def _on_sigterm(self, _signal: int, _frame: FrameType | None) -> None:
+        self._stopping.set()
+
+    def _tick(self) -> None:
+        self._ticked = time.monotonic()
+
+    def _worker(self, queue: str) -> str:
+        return f"{self._name}/{queue}"
+
+    def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
+        with transaction(self._beats) as conn:
+            return heartbeat(conn, token, items, progressed=progressed)
+
+    def _present(self) -> None:
+        """Tell probes (by file) and the relay (by row) that this worker lives."""
+        age = time.monotonic() - self._ticked
+        write_status(self._settings.home, self._name, WorkerStatus(os.getpid(), self._ready, age, time.time()))
+        if not self._ready or self._stopping.is_set():
+            return
+        with transaction(self._beats) as conn:
+            for queue in self._role.handlers:
+                loaded = self._drain.loaded.get(queue)
+                beat(
+                    conn,
+                    WorkerBeat(
+                        id=self._worker(queue),
+                        queue=queue,
+                        host=socket.gethostname(),
+                        pid=os.getpid(),
+                        device=self._settings.device,
+                        bundle=loaded.bundle if loaded else None,
+                        batch_key=loaded.batch_key if loaded else None,
+                    ),
+                )
+
+
+def wait_for_database(chosen: Settings, seconds: float = 60.0) -> None:
+    """Wait until the database answers.
+
+    Raises:
+        Unreachable: it did not.
+    """
+    assert chosen.database_url is not None  # the caller's edge has checked
+    engine = create_engine(chosen.database_url.get_secret_value(), pool_size=1)
+
+    def ask() -> None:
+        with transaction(engine):
+            pass
+
+    try:
+        patiently(ask, seconds=seconds)
+    finally:
+        engine.dispose()

@@ -1,0 +1,267 @@
+"""The store thread: exports, stores and commits the results of one batch while the next one runs."""
+
+from __future__ import annotations
+
+import hashlib
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.errors import MareyError, Unreachable
+from shared.jobs import (
+    AssetDigest,
+    Committed,
+    ItemFailure,
+    NewMotion,
+    NewText,
+    Problem,
+    asset_key,
+    begin_assets,
+    commit_motions,
+    commit_texts,
+    fail_items,
+    release,
+    transaction,
+)
+from shared.runtime.faults import as_problem, patiently
+from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, TextDone
+from shared.runtime.lease import Heartbeat, HeldLease
+from shared.runtime.logs import logger
+from shared.storage import AssetStore
+
+log = logger(__name__)
+
+GROUP = 64  # outcomes of one transaction, at most: a commit costs an fsync and the lock of its job row
+GROUP_SECONDS = 2.0  # but what a killed child would lose is kept small
+PUTS_AT_ONCE = 8
+STORE_PATIENCE = 60.0  # seconds; rides out a restart of the store, after that the items are given back
+DATABASE_PATIENCE = 120.0
+STOP_PATIENCE = 15.0  # of the 25 s a worker has to stop
+
+
+@dataclass(frozen=True)
+class _Finish:
+    """The handler is through with this lease; `reason` says why items without an outcome go back."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class _Exported:
+    item: UUID
+    export: Export
+    elapsed: float
+    files: tuple[tuple[ExportedFile, AssetDigest], ...]
+
+
+class Committer(threading.Thread):
+    """Takes outcomes in, writes them down. Every write is fenced; what is not ours any more is thrown away.
+
+    At most two leases are under way, one running and one being stored; `admit` waits until that holds.
+    """
+
+    def __init__(self, engine: sa.Engine, store: AssetStore, heartbeat: Heartbeat, stopping: threading.Event) -> None:
+        super().__init__(name="committer", daemon=True)
+        self._engine = engine
+        self._store = store
+        self._heartbeat = heartbeat
+        self._stopping = stopping
+        self._inbox: queue.SimpleQueue[tuple[HeldLease, Outcome | _Finish] | None] = queue.SimpleQueue()
+        self._held_back: tuple[HeldLease, Outcome | _Finish] | None = None
+        self._slots = threading.Semaphore(2)
+        self._idle = threading.Condition()
+        self._pending = 0
+        self._puts = ThreadPoolExecutor(PUTS_AT_ONCE, thread_name_prefix="put")
+
+    # --- the loop's side ---
+
+    def admit(self) -> None:
+        """Wait until another lease may be taken."""
+        self._slots.acquire()
+        with self._idle:
+            self._pending += 1
+
+    def dismiss(self) -> None:
+        """Give back an `admit` for which there was nothing to claim."""
+        with self._idle:
+            self._pending -= 1
+            self._idle.notify_all()
+        self._slots.release()
+
+    def put(self, lease: HeldLease, outcome: Outcome) -> None:
+        """Hand over one outcome."""
+        self._inbox.put((lease, outcome))
+
+    def finish(self, lease: HeldLease, reason: str) -> None:
+        """No more outcomes of this lease: items without one go back, at no cost, with `reason`."""
+        self._inbox.put((lease, _Finish(reason)))
+
+    def wait_until_idle(self, timeout: float) -> bool:
+        """Whether everything handed over was written within `timeout` seconds."""
+        with self._idle:
+            return self._idle.wait_for(lambda: self._pending == 0, timeout)
+
+    def close(self) -> None:
+        """End the thread after what it has."""
+        self._inbox.put(None)
+
+    # --- the thread's side ---
+
+    def run(self) -> None:
+        while (message := self._next()) is not None:
+            lease, first = message
+            try:
+                if isinstance(first, _Finish):
+                    self._give_back(lease, lease.open, first.reason)
+                else:
+                    self._write_or_fail(lease, self._group(lease, first))
+            except Exception as error:  # the thread must live; what is not written runs again when the lease is swept
+                problem = as_problem(error)
+                log.exception("not_written", job=str(lease.claim.job), error=problem.problem_type)
+            if isinstance(first, _Finish):
+                self._heartbeat.let_go(lease)
+                self.dismiss()
+
+    def _next(self) -> tuple[HeldLease, Outcome | _Finish] | None:
+        message, self._held_back = self._held_back, None
+        return message if message is not None else self._inbox.get()
+
+    def _group(self, lease: HeldLease, first: Outcome) -> list[_Exported | TextDone | Failed]:
+        """`first` and what follows of the same lease, exported: as much as is there, within bounds."""
+        until = time.monotonic() + GROUP_SECONDS
+        group = [self._export(lease, first)]
+        while len(group) < GROUP and time.monotonic() < until:
+            try:
+                message = self._inbox.get_nowait()
+            except queue.Empty:
+                break
+            if message is None or message[0] is not lease or isinstance(message[1], _Finish):
+                if message is None:
+                    self._inbox.put(None)
+                self._held_back = message
+                break
+            group.append(self._export(lease, message[1]))
+        return [outcome for outcome in group if outcome is not None]
+
+    def _export(self, lease: HeldLease, outcome: Outcome) -> _Exported | TextDone | Failed | None:
+        """Make the files of a `Done`; None when nobody wants it any more."""
+        if outcome.item in lease.lost:
+            return None
+        if not isinstance(outcome, Done):
+            return outcome
+        try:
+            export = outcome.export()
+        except MareyError as error:
+            return Failed(outcome.item, error, retryable=isinstance(error, Unreachable))
+        except Exception as error:
+            log.exception("export_failed", item=str(outcome.item))
+            return Failed(outcome.item, as_problem(error), retryable=True)
+        finally:
+            lease.progress(0, 0)
+        files = tuple((file, _digest(file)) for file in export.files)
+        return _Exported(outcome.item, export, outcome.elapsed, files)
+
+    def _write_or_fail(self, lease: HeldLease, group: Sequence[_Exported | TextDone | Failed]) -> None:
+        """Write; a bug in there costs the items an attempt, so that it cannot go round for ever."""
+        try:
+            self._write(lease, group)
+        except Unreachable:
+            raise  # given back when the lease is finished
+        except Exception as error:
+            log.exception("write_failed", job=str(lease.claim.job), items=len(group))
+            problem = Problem.of(as_problem(error))
+            failures = [ItemFailure(outcome.item, problem, retryable=True) for outcome in group]
+            lease.settle(outcome.item for outcome in group)
+            self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
+
+    def _write(self, lease: HeldLease, group: Sequence[_Exported | TextDone | Failed]) -> None:
+        motions = [outcome for outcome in group if isinstance(outcome, _Exported)]
+        if motions:
+            self._write_motions(lease, motions)
+        texts = [NewText(o.item, o.key, o.blob) for o in group if isinstance(o, TextDone)]
+        if texts:
+            self._commit(lease, "texts", lambda conn, token: commit_texts(conn, token, texts))
+        failures = [ItemFailure(o.item, Problem.of(o.problem), o.retryable) for o in group if isinstance(o, Failed)]
+        if failures:
+            self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
+
+    def _write_motions(self, lease: HeldLease, motions: Sequence[_Exported]) -> None:
+        digests = list({digest.sha256: digest for motion in motions for _, digest in motion.files}.values())
+        token = lease.claim.lease_token
+
+        def announce() -> bool:
+            with transaction(self._engine) as conn:
+                return begin_assets(conn, token, digests)
+
+        if not patiently(announce, seconds=DATABASE_PATIENCE):
+            lease.settle(motion.item for motion in motions)
+            log.info("results_thrown_away", job=str(lease.claim.job), items=len(motions))
+            return
+        try:
+            patience = STOP_PATIENCE if self._stopping.is_set() else STORE_PATIENCE
+            self._put_files(lease, motions, patience)
+        except Unreachable as error:
+            log.error("store_away", job=str(lease.claim.job), error=error.message)
+            self._give_back(lease, [motion.item for motion in motions], "the asset store does not answer")
+            return
+        rows = [
+            NewMotion(
+                item=motion.item,
+                files={file.format: digest for file, digest in motion.files},
+                frames=motion.export.frames,
+                fps=motion.export.fps,
+                licence=motion.export.licence,
+                elapsed=motion.elapsed,
+                metadata=motion.export.manifest,
+            )
+            for motion in motions
+        ]
+        self._commit(lease, "motions", lambda conn, token: commit_motions(conn, token, rows))
+
+    def _put_files(self, lease: HeldLease, motions: Sequence[_Exported], patience: float) -> None:
+        until = time.monotonic() + patience
+        contents = {digest.sha256: file for motion in motions for file, digest in motion.files}
+
+        def put(sha256: str, file: ExportedFile) -> None:
+            key = asset_key(lease.claim.tenant, sha256)
+            patiently(
+                lambda: self._store.put(key, file.content, media_type=file.media_type),
+                seconds=max(0.0, until - time.monotonic()),
+            )
+            lease.progress(0, 0)
+
+        futures = [self._puts.submit(put, sha256, file) for sha256, file in contents.items()]
+        errors = [error for future in futures if (error := future.exception()) is not None]
+        if errors:
+            raise errors[0]
+
+    def _commit(self, lease: HeldLease, what: str, write: Callable[[sa.Connection, UUID], Committed]) -> None:
+        def attempt() -> Committed:
+            with transaction(self._engine) as conn:
+                return write(conn, lease.claim.lease_token)
+
+        # A commit whose answer got lost is repeated: its items then count as `lost`, their rows stand.
+        committed = patiently(attempt, seconds=DATABASE_PATIENCE)
+        lease.settle([*committed.items, *committed.lost])
+        log.info(
+            "committed",
+            what=what,
+            job=str(lease.claim.job),
+            items=len(committed.items),
+            thrown_away=len(committed.lost),
+        )
+
+    def _give_back(self, lease: HeldLease, items: Iterable[UUID], reason: str) -> None:
+        open_items = [item for item in items if item in lease.open]
+        if open_items:
+            self._commit(lease, "release", lambda conn, token: release(conn, token, reason, open_items))
+
+
+def _digest(file: ExportedFile) -> AssetDigest:
+    return AssetDigest(hashlib.sha256(file.content).hexdigest(), len(file.content), file.media_type)

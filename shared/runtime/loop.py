@@ -1,0 +1,231 @@
+"""The claim loop: claim, split into buckets, run, hand over; until nothing is left, the time is up or a stop comes."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NoReturn
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.errors import MareyError, Unreachable
+from shared.jobs import Claim, ClaimedItem, Stage, claim, load_texts, transaction
+from shared.runtime.committer import Committer
+from shared.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
+from shared.runtime.handler import Batch, Failed, Handler
+from shared.runtime.lease import Heartbeat, HeldLease
+from shared.runtime.logs import logger
+
+log = logger(__name__)
+
+STOP_PATIENCE = 20.0  # of the 25 s a worker has to stop
+WRITE_PATIENCE = 300.0  # longer than the committer's own patience with store and database together
+OUTAGE_PAUSE = 5.0  # seconds; what a handler could not reach is not asked again at once
+CLAIM_PATIENCE = 30.0  # seconds without a database until a drain gives up; the next hint starts another
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What a handler has ready: the bundle and the lane it last served."""
+
+    bundle: str
+    batch_key: str
+
+
+def end_child() -> NoReturn:
+    """Crash this process: its accelerator's context is gone, and every later call would fail.
+
+    The parent starts another child; the lease runs out as after any crash, so that a prompt which does this each time
+    ends `dead` and its neighbours do not.
+    """
+    os._exit(70)  # EX_SOFTWARE
+
+
+class Drain:
+    """Serves the queues of one child.
+
+    Args:
+        engine: the database.
+        worker: name under which it claims.
+        handlers: by queue, in order of precedence: texts before motions, since they unlock them.
+        ticked: called at each claim and step of progress: liveness is the age of the last.
+    """
+
+    def __init__(
+        self,
+        engine: sa.Engine,
+        worker: str,
+        handlers: Mapping[str, Handler],
+        *,
+        heartbeat: Heartbeat,
+        committer: Committer,
+        stopping: threading.Event,
+        ticked: Callable[[], None],
+    ) -> None:
+        self._engine = engine
+        self._worker = worker
+        self._handlers = handlers
+        self._heartbeat = heartbeat
+        self._committer = committer
+        self._stopping = stopping
+        self._ticked = ticked
+        self.loaded: dict[str, Loaded] = {}
+
+    def drain(self, seconds: float) -> int:
+        """Work until no queue has anything, `seconds` are over or a stop comes; every result is written at the end.
+
+        Returns: how many items were claimed.
+
+        Raises:
+            Unreachable: the database stayed away for longer than `CLAIM_PATIENCE`.
+        """
+        until = time.monotonic() + seconds
+        claimed = 0
+        try:
+            while not self._stopping.is_set() and time.monotonic() < until:
+                items = self._one_batch()
+                if not items:
+                    break
+                claimed += items
+        finally:
+            self._committer.wait_until_idle(STOP_PATIENCE if self._stopping.is_set() else WRITE_PATIENCE)
+        return claimed
+
+    def load(self, queue: str, bundle: str, batch_key: str = "") -> None:
+        """Make `bundle` ready on the handler of `queue`, if it is not.
+
+        Raises: whatever the handler raises.
+        """
+        known = self.loaded.get(queue)
+        if known is None or known.bundle != bundle:
+            self.loaded.pop(queue, None)
+            started = time.monotonic()
+            self._handlers[queue].load(bundle)
+            log.info("loaded", queue=queue, bundle=bundle, seconds=round(time.monotonic() - started, 2))
+        self.loaded[queue] = Loaded(bundle, batch_key)
+
+    def _one_batch(self) -> int:
+        self._committer.admit()
+        taken: Claim | None = None
+        try:
+            self._ticked()
+            taken = patiently(self._claim, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+        finally:
+            if taken is None:
+                self._committer.dismiss()
+        if taken is None:
+            return 0
+        lease = self._heartbeat.hold(taken)
+        log.info("claimed", queue=taken.queue, job=str(taken.job), items=len(taken.items), solo=taken.solo)
+        reason = "the worker gave no result"
+        try:
+            reason = self._run_claim(lease)
+        finally:
+            self._committer.finish(lease, "the worker was stopped" if self._stopping.is_set() else reason)
+        return len(taken.items)
+
+    def _claim(self) -> Claim | None:
+        for queue, handler in self._handlers.items():
+            known = self.loaded.get(queue)
+            with transaction(self._engine) as conn:
+                taken = claim(
+                    conn,
+                    queue,
+                    self._worker,
+                    handler.batch_size,
+                    prefer_batch_key=known.batch_key if known else None,
+                )
+            if taken is not None:
+                return taken
+        return None
+
+    def _run_claim(self, lease: HeldLease) -> str:
+        """Run every bucket of a claim; gives the reason for which items without an outcome go back."""
+        taken = lease.claim
+        handler = self._handlers[taken.queue]
+        try:
+            fresh = taken.queue not in self.loaded or self.loaded[taken.queue].bundle != taken.bundle
+            if fresh:
+                lease.exempt()  # loading, and the compile of the first batch, are silent for minutes
+            self.load(taken.queue, taken.bundle, taken.batch_key)
+            batch = self._batch(lease)
+            buckets = handler.buckets(batch)
+        except Unreachable as error:
+            return self._pause(error)
+        except Exception as error:
+            self._fail_all(lease, taken.items, error, retryable=not isinstance(error, MareyError))
+            return "failed"
+        for bucket in buckets:
+            try:
+                self._run_bucket(lease, handler, replace(batch, items=tuple(bucket)))
+            except Unreachable as error:
+                return self._pause(error)
+        self._ticked()
+        return "the worker gave no result"
+
+    def _pause(self, error: Unreachable) -> str:
+        log.warning("outage", error=error.message)
+        self._stopping.wait(OUTAGE_PAUSE)
+        return error.message
+
+    def _batch(self, lease: HeldLease) -> Batch:
+        """The claim with its text features; items without any fail, retryably."""
+        taken = lease.claim
+        if taken.stage is Stage.TEXT:
+            return Batch(taken, taken.items, {})
+        keys = sorted({item.text_key for item in taken.items})
+
+        def read() -> dict[str, bytes]:
+            with transaction(self._engine) as conn:
+                return load_texts(conn, keys)
+
+        features = patiently(read, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+        missing = [item for item in taken.items if item.text_key not in features]
+        if missing:
+            self._fail_all(lease, missing, HandlerError("the text features of this item are gone"), retryable=True)
+        return Batch(taken, tuple(item for item in taken.items if item.text_key in features), features)
+
+    def _run_bucket(self, lease: HeldLease, handler: Handler, batch: Batch) -> None:
+        """Run items together; when that fails, halve, so that one of them cannot fail the others."""
+        dropped = lease.dropped()
+        batch = replace(batch, items=tuple(item for item in batch.items if item.id not in dropped))
+        if not batch.items:
+            return
+        answered: set[UUID] = set()
+        try:
+            for outcome in handler.run(batch, lease):
+                answered.add(outcome.item)
+                self._committer.put(lease, outcome)
+                self._ticked()
+        except Unreachable:
+            raise
+        except Exception as error:
+            left = [item for item in batch.items if item.id not in answered]
+            if is_device_lost(error):
+                log.exception("device_lost", items=len(left))
+                end_child()
+            if len(left) < 2 or isinstance(error, MareyError):
+                self._fail_all(lease, left, error, retryable=not isinstance(error, MareyError))
+                return
+            log.warning("batch_halved", items=len(left), memory=is_out_of_memory(error), error=type(error).__name__)
+        else:
+            left = [item for item in batch.items if item.id not in answered | lease.dropped()]
+            if left:
+                self._fail_all(lease, left, HandlerError("the worker gave no result for this item"), retryable=True)
+            return
+        # Outside the except block, where the exception no longer holds the tensors that did not fit.
+        lease.exempt()  # new shapes may compile anew
+        middle = (len(left) + 1) // 2
+        for half in (left[:middle], left[middle:]):
+            self._run_bucket(lease, handler, replace(batch, items=tuple(half)))
+
+    def _fail_all(self, lease: HeldLease, items: Sequence[ClaimedItem], error: Exception, *, retryable: bool) -> None:
+        problem = as_problem(error)
+        if problem is not error:
+            log.error("handler_failed", items=len(items), exc_info=error)
+        for item in items:
+            self._committer.put(lease, Failed(item.id, problem, retryable))

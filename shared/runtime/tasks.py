@@ -1,0 +1,57 @@
+"""What Celery imports in a worker: the one task, and the child behind it."""
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUntypedFunctionDecorator=false
+# pyright: reportUnknownVariableType=false
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+
+from celery import shared_task
+from celery.signals import worker_process_init, worker_process_shutdown
+
+from shared.errors import MareyError, Unreachable
+from shared.runtime.app import DRAIN
+from shared.runtime.child import NAME_VARIABLE, Child, WorkerStatus, write_status
+from shared.runtime.logs import logger
+from shared.settings import settings
+
+log = logger(__name__)
+
+_child: Child | None = None
+
+
+@worker_process_init.connect
+def _start(**_: object) -> None:
+    """Make the child, or end it and its parent: a worker that cannot load its model must not take hints."""
+    global _child
+    try:
+        _child = Child.of_environment()
+        _child.start()
+    except Exception as error:
+        expected = isinstance(error, MareyError)
+        log.error("worker_cannot_start", error=str(error), exc_info=None if expected else error)
+        status = WorkerStatus(os.getpid(), ready=False, tick_age=0.0, written=time.time(), error=str(error))
+        write_status(settings().home, os.environ[NAME_VARIABLE], status)
+        os.kill(os.getppid(), signal.SIGTERM)
+        os._exit(1)
+
+
+@worker_process_shutdown.connect
+def _stop(**_: object) -> None:
+    if _child is not None:
+        _child.stop()
+
+
+@shared_task(name=DRAIN, ignore_result=True)
+def drain(queue: str) -> None:
+    """A hint that `queue` has work. The child serves all its queues, in its own order."""
+    if _child is None:
+        raise RuntimeError("drain outside of a worker child")
+    try:
+        items = _child.drain()
+    except Unreachable as error:
+        log.warning("drain_ended", queue=queue, error=error.message)
+    else:
+        log.debug("drained", queue=queue, items=items)

@@ -1,0 +1,96 @@
+"""`marey worker ROLE`: the Celery parent. It imports no handler, hence no torch; its one child does the work."""
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownArgumentType=false
+# pyright: reportUnknownVariableType=false, reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import threading
+from dataclasses import asdict
+from typing import Any
+
+import psutil
+from celery import signals
+
+from shared.errors import InvalidInput
+from shared.runtime.app import create_app
+from shared.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, read_status, status_file, wait_for_database
+from shared.runtime.handler import Role
+from shared.runtime.logs import configure_logging, logger
+from shared.settings import Settings
+
+log = logger(__name__)
+
+STOP_SECONDS = 25.0  # below the 30 s after which Kubernetes kills
+KILL_SECONDS = 3.0
+
+
+def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int:
+    """Run a worker until SIGTERM or SIGINT; gives the exit code.
+
+    SIGTERM lets the child write what is finished and release the rest, uncounted; after 25 s it is killed.
+
+    Args:
+        role: what to serve; its child reads it from the environment.
+        chosen: needs `database_url` and `queue_url`.
+        name: unique among the workers; made of role, host and process by default.
+
+    Raises:
+        InvalidInput: a setting is missing.
+        Unreachable: the database does not answer within a minute.
+    """
+    if chosen.database_url is None or chosen.queue_url is None:
+        raise InvalidInput(
+            "a worker needs a database and a queue",
+            where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
+            hint="Set both, or use `marey serve`, which brings its own.",
+        )
+    configure_logging(f"worker-{role.name}", level=chosen.log_level, json=chosen.log_json)
+    wait_for_database(chosen)
+    name = name or f"{role.name}-{socket.gethostname()}-{os.getpid()}"
+    os.environ[ROLE_VARIABLE] = json.dumps(asdict(role))
+    os.environ[NAME_VARIABLE] = name
+    os.environ["MAREY_DATABASE_URL"] = chosen.database_url.get_secret_value()  # the child is a fresh interpreter
+    app = create_app(chosen.queue_url.get_secret_value())
+    signals.setup_logging.connect(_keep_logging, weak=False)
+    signals.worker_shutting_down.connect(_stop_children, weak=False)
+    worker = app.Worker(
+        hostname=f"{role.name}@{name}",
+        queues=list(role.handlers),
+        loglevel=chosen.log_level,
+        without_gossip=True,
+        without_mingle=True,
+        without_heartbeat=True,  # Celery's, over the broker; ours stands in the database
+        quiet=True,
+    )
+    worker.start()
+    status = read_status(chosen.home, name)
+    if status is not None and status.error is not None:
+        status_file(chosen.home, name).unlink(missing_ok=True)
+        return 1
+    return int(worker.exitcode or 0)
+
+
+def _keep_logging(**_: Any) -> None:
+    """Being connected is enough: Celery then leaves logging alone."""
+
+
+def _stop_children(**_: Any) -> None:
+    """Tell the child to release its leases; Celery's warm shutdown alone would wait for the drain to end."""
+    children = psutil.Process().children()
+    for child in children:
+        child.send_signal(signal.SIGTERM)
+    threading.Thread(target=_kill_stragglers, args=(children,), name="stop", daemon=True).start()
+
+
+def _kill_stragglers(children: list[psutil.Process]) -> None:
+    _, alive = psutil.wait_procs(children, timeout=STOP_SECONDS)
+    for child in alive:
+        log.error("child_killed", pid=child.pid, seconds=STOP_SECONDS)
+        child.kill()
+    if alive:
+        psutil.wait_procs(alive, timeout=KILL_SECONDS)
+        os._exit(1)
