@@ -23,7 +23,7 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 
 # Radii in metres on a body whose joints span 1.5 m from the lowest to the highest; they scale with the span.
 SPAN = 1.5
-PELVIS, WAIST, CHEST, NECK, GIRDLE = 0.098, 0.094, 0.112, 0.048, 0.062
+PELVIS, WAIST, CHEST, NECK, GIRDLE = 0.098, 0.094, 0.108, 0.048, 0.062
 SOLE = 0.028
 # Radius over the share of the way from where the limb leaves the trunk to its end.
 LEG = ((0.0, 0.45, 0.85, 1.0), (0.084, 0.058, 0.041, SOLE))
@@ -142,9 +142,10 @@ class _Tailor:
         start = self.radius(parent)
         if self.part[parent] == "middle" and self.part[joint] != "middle":  # where a limb leaves the trunk
             start = self.unit * (0.9 * PELVIS if joint in self.legs else GIRDLE)
-            return Limb("middle", parent, joint, start, end)
-        if self.part[parent] == "middle" and joint not in self.trunk:
-            start = self.unit * NECK
+            # A little thinner than the limb that begins there, so that two surfaces never coincide and flicker.
+            return Limb("middle", parent, joint, start, 0.95 * end)
+        if parent in self.trunk and joint not in self.trunk:  # the chest narrows towards the neck
+            start = 0.92 * self.unit * CHEST
         return Limb(self.part[joint], parent, joint, start, end)
 
     def head(self) -> list[Limb]:

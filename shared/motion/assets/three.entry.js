@@ -1,0 +1,27 @@
+// What the player uses of three.js; see README.md for how three.min.js is made from it.
+export {
+  BufferGeometry,
+  CircleGeometry,
+  Color,
+  DirectionalLight,
+  Float32BufferAttribute,
+  HemisphereLight,
+  LatheGeometry,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  MeshStandardMaterial,
+  PCFShadowMap,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Quaternion,
+  Scene,
+  ShaderMaterial,
+  ShadowMaterial,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";

@@ -1,0 +1,145 @@
+"""The player: one HTML file that shows motion in 3D, without a network.
+
+Everything is inside the page: style, script, three.js and the motion (root as float32, local rotations as float16, which
+keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy forbids
+the page to fetch anything. Every text is escaped: a prompt is data, whatever is in it.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from shared.motion.body import Body, dress
+from shared.motion.clip import MotionClip
+from shared.motion.paper import one_line
+from shared.motion.render import caption_of, facts_of
+
+THEMES = ("auto", "light", "dark")
+
+
+def html_player(
+    clips: MotionClip | Sequence[MotionClip],
+    path: str | Path,
+    *,
+    title: str | None = None,
+    captions: Sequence[str] | None = None,
+    theme: str = "auto",
+) -> Path:
+    """Write a page that plays clips in 3D.
+
+    Args:
+        clips: one clip or several, which become a list to choose from.
+        path: the `.html` to write.
+        title: of the page; otherwise the first caption.
+        captions: one a clip; otherwise the prompt of its manifest.
+        theme: `auto` (as the browser asks), `light` or `dark`.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InvalidInput: no clip, an unknown theme, or a path that is not a writable HTML file.
+    """
+    rows = [clips] if isinstance(clips, MotionClip) else list(clips)
+    path = Path(path)
+    if not rows:
+        raise InvalidInput("there is no clip to play", hint="Give at least one.")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InvalidInput(f"a player is an .html, not {path.suffix or 'a name without ending'}", where=str(path))
+    if captions is not None and len(captions) != len(rows):
+        raise InvalidInput(f"{len(captions)} captions for {len(rows)} clips")
+    if theme not in THEMES:
+        raise InvalidInput(f"there is no theme {theme!r}", hint=f"One of: {', '.join(THEMES)}.")
+    texts = [one_line(c) for c in captions] if captions else [one_line(caption_of(c)) for c in rows]
+    page = _page(_document(rows, texts), one_line(title or texts[0]) or "Marey", theme)
+    try:
+        path.write_text(page, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InvalidInput(f"cannot write it: {error.strerror or error}", where=str(path)) from error
+    return path
+
+
+def _page(document: dict[str, object], title: str, theme: str) -> str:
+    parts = {
+        "%THEME%": theme,
+        "%TITLE%": html.escape(title),
+        "%STYLE%": _asset("player.css"),
+        "%MOTION%": script_json(document),
+        "%LICENCE%": _asset("three.LICENSE.txt"),
+        "%THREE%": _asset("three.min.js"),
+        "%PLAYER%": _asset("player.js"),
+    }
+    page = _asset("player.html")
+    pieces: list[str] = []
+    # In order and once each: what is filled in is never searched for the next mark, so no text can imitate one.
+    for mark, text in parts.items():
+        before, page = page.split(mark, 1)
+        pieces += [before, text]
+    return "".join([*pieces, page])
+
+
+def script_json(value: object) -> str:
+    """JSON that may stand inside a `<script>`: no character in it can end the element or start a comment."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text
+
+
+def _asset(name: str) -> str:
+    return (resources.files("shared.motion") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:
+    bodies: dict[str, int] = {}  # clips of one skeleton share one body
+    entries: list[dict[str, object]] = []
+    for number, (clip, caption) in enumerate(zip(clips, captions, strict=True), start=1):
+        body = json.dumps(_body(clip), separators=(",", ":"), allow_nan=False)
+        entries.append(
+            {
+                "name": f"clip {number}",
+                "caption": caption,
+                "facts": one_line(facts_of(clip)),
+                "body": bodies.setdefault(body, len(bodies)),
+                "fps": float(clip.fps),
+                "frames": len(clip.joints),
+                "root": _base64(np.asarray(clip.root, "<f4")),
+                "rotations": _base64(np.asarray(clip.rotations, "<f2")),
+                "contacts": _base64(np.asarray(clip.contacts, np.uint8)),
+            }
+        )
+    return {"bodies": [json.loads(body) for body in bodies], "clips": entries}
+
+
+def _body(clip: MotionClip) -> dict[str, object]:
+    skeleton = clip.skeleton.with_offsets(clip.offsets)
+    body: Body = dress(skeleton)
+    return {
+        "parents": list(skeleton.parents),
+        "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],
+        "feet": list(skeleton.feet),
+        "height": round(body.height, 4),
+        "sole": round(body.sole, 4),
+        "limbs": [
+            {
+                "part": limb.part,
+                "joints": [limb.start, limb.end],
+                "radii": [round(limb.start_radius, 5), round(limb.end_radius, 5)],
+                "offsets": [[round(x, 5) for x in offset] for offset in (limb.start_offset, limb.end_offset)],
+            }
+            for limb in body.limbs
+        ],
+    }
+
+
+def _base64(array: NDArray[np.generic]) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
