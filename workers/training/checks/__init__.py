@@ -1,0 +1,1 @@
+"""Kinematic checks: what a motion does, judged on its joints alone."""
