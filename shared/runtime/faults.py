@@ -34,7 +34,7 @@ def patiently(action: Callable[[], T], *, seconds: float, stopping: threading.Ev
     With `stopping`, a worker told to stop makes one more try and gives up.
     """
     give_up = tenacity.stop_after_delay(seconds)
-    wait = tenacity.wait_exponential_jitter(initial=FIRST_PAUSE, max=LONGEST_PAUSE, jitter=FIRST_PAUSE)
+    wait = tenacity.wait_exponential_jitter(multiplier=FIRST_PAUSE, max=LONGEST_PAUSE, jitter=FIRST_PAUSE)
     if stopping is None:
         retrying = tenacity.Retrying(
             retry=tenacity.retry_if_exception_type(Unreachable), stop=give_up, wait=wait, reraise=True

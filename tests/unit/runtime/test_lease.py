@@ -1,0 +1,119 @@
+import threading
+from collections.abc import Collection
+from uuid import UUID, uuid4
+
+import pytest
+
+from shared.errors import Unreachable
+from shared.jobs import Claim, ClaimedItem, Stage
+from shared.jobs import Heartbeat as Answer
+from shared.runtime.lease import Heartbeat, HeldLease
+
+
+def make_claim(count: int) -> Claim:
+    items = tuple(
+        ClaimedItem(
+            id=uuid4(), position=n, index=n, variant=0, name=None, prompt="walk", model="toy", bundle="toy@0",
+            text_key="k", seed=n, seconds=None, settings={}, tags=(), attempts=0,
+        )
+        for n in range(count)
+    )  # fmt: skip
+    return Claim(uuid4(), "default", uuid4(), "toy", Stage.GENERATE, "b", "toy@0", solo=False, items=items)
+
+
+class Database:
+    """What the heartbeat asks, and the answers it gets."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[set[UUID], bool]] = []
+        self.answer = Answer(lost=False, gone=frozenset())
+        self.away = False
+
+    def renew(self, _token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
+        self.asked.append((set(items), progressed))
+        if self.away:
+            raise Unreachable("gone")
+        return self.answer
+
+
+@pytest.fixture
+def database() -> Database:
+    return Database()
+
+
+@pytest.fixture
+def heartbeat(database: Database) -> Heartbeat:
+    return Heartbeat(database.renew, interval=60.0, stopping=threading.Event())
+
+
+def test_a_cancelled_item_is_dropped_and_its_neighbours_are_not(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(3))
+    cancelled = lease.claim.items[1].id
+    database.answer = Answer(lost=False, gone=frozenset({cancelled}))
+    heartbeat.beat()
+    assert lease.dropped() == {cancelled}
+    assert lease.open == {lease.claim.items[0].id, lease.claim.items[2].id}
+
+
+def test_a_lost_lease_drops_everything(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(3))
+    database.answer = Answer(lost=True, gone=frozenset())
+    heartbeat.beat()
+    assert lease.dropped() == lease.lost == {item.id for item in lease.claim.items}
+    assert not lease.open
+
+
+def test_written_items_are_asked_about_no_more(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(2))
+    lease.settle([lease.claim.items[0].id])
+    heartbeat.beat()
+    assert database.asked == [({lease.claim.items[1].id}, True)]
+    lease.settle([lease.claim.items[1].id])
+    heartbeat.beat()
+    assert len(database.asked) == 1
+
+
+def test_a_silent_batch_says_so_until_it_moves_again(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    heartbeat.beat()
+    heartbeat.beat()
+    lease.progress(1, 2)
+    heartbeat.beat()
+    assert [progressed for _, progressed in database.asked] == [True, False, True]
+
+
+def test_loading_is_exempt_from_progress_until_the_first_step(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    lease.exempt()
+    for _ in range(3):
+        heartbeat.beat()
+    lease.progress(1, 2)
+    heartbeat.beat()
+    heartbeat.beat()
+    assert [progressed for _, progressed in database.asked] == [True, True, True, True, False]
+
+
+def test_an_outage_of_the_database_gives_nothing_up(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    database.away = True
+    heartbeat.beat()
+    assert not lease.dropped()
+    database.away = False
+    heartbeat.beat()
+    assert len(database.asked) == 2
+
+
+def test_a_lease_let_go_is_not_renewed(database: Database, heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    heartbeat.let_go(lease)
+    heartbeat.beat()
+    assert database.asked == []
+
+
+def test_a_worker_told_to_stop_wants_no_more_results() -> None:
+    stopping = threading.Event()
+    lease = HeldLease(make_claim(2), stopping)
+    assert not lease.dropped()
+    stopping.set()
+    assert len(lease.dropped()) == 2
+    assert not lease.lost  # what is finished is still written

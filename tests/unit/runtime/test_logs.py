@@ -1,0 +1,44 @@
+import json
+import logging
+import threading
+from collections.abc import Iterator
+
+import pytest
+import structlog
+
+from shared.runtime.logs import configure_logging, logger
+
+
+@pytest.fixture(autouse=True)
+def _restore_logging() -> Iterator[None]:
+    root = logging.getLogger()
+    handlers, level = root.handlers[:], root.level
+    yield
+    root.handlers[:] = handlers
+    root.setLevel(level)
+    structlog.reset_defaults()
+
+
+def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
+    return [json.loads(line) for line in capsys.readouterr().err.splitlines()]
+
+
+def test_a_line_is_json_with_its_service_from_every_thread(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging("worker-hgm3", json=True)
+    log = logger("test")
+    log.info("claimed", items=32)
+    thread = threading.Thread(target=log.warning, args=("late",))
+    thread.start()
+    thread.join()
+    logging.getLogger("celery").warning("from the standard library")
+    written = lines(capsys)
+    assert [line["event"] for line in written] == ["claimed", "late", "from the standard library"]
+    assert {line["service"] for line in written} == {"worker-hgm3"}
+    assert written[0]["items"] == 32
+
+
+def test_prompts_and_secrets_are_withheld_whoever_logs_them(capsys: pytest.CaptureFixture[str]) -> None:
+    configure_logging("api", json=True)
+    logger("test").info("submitted", prompt="a secret scene", password="hunter2", url="redis://:pw@host")
+    (line,) = lines(capsys)
+    assert not {"a secret scene", "hunter2", "redis://:pw@host"} & set(map(str, line.values()))
