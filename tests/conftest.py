@@ -1,0 +1,120 @@
+"""Real servers for every test that needs one: started once a run (and once per xdist worker), on first use.
+
+`database_url` a migrated database of the test's own · `engine` its engine · `queue_url` an empty Valkey ·
+`folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start (and kill)
+servers of their own with `shared.runtime.embedded`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+import redis
+import sqlalchemy as sa
+
+from shared.jobs import create_engine, upgrade
+from shared.runtime.embedded import EmbeddedServer, socket_folder, start_postgres, start_valkey
+from shared.storage import FolderStore
+from shared.storage.s3 import S3Store
+from tests.servers.swift import Swift
+
+TEMPLATE = "migrated"
+_numbers = itertools.count()
+
+
+@pytest.fixture(scope="session")
+def servers_home() -> Iterator[Path]:
+    """Folder of the run's servers."""
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    yield home
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture
+def short_home() -> Iterator[Path]:
+    """A MAREY_HOME for one test."""
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    yield home
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def postgres(servers_home: Path) -> Iterator[EmbeddedServer]:
+    """The run's Postgres, with a migrated template database. Not to be killed: see `short_home`."""
+    with start_postgres(servers_home, durable=False) as server:
+        _execute(server, f"CREATE DATABASE {TEMPLATE}")
+        engine = create_engine(_url(server, TEMPLATE))
+        upgrade(engine)
+        engine.dispose()
+        yield server
+
+
+@pytest.fixture
+def database_url(postgres: EmbeddedServer) -> Iterator[str]:
+    """URL of a migrated, empty database of this test's own."""
+    name = f"test_{next(_numbers)}"
+    _execute(postgres, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
+    yield _url(postgres, name)
+    _execute(postgres, f"DROP DATABASE {name} WITH (FORCE)")
+
+
+@pytest.fixture
+def engine(database_url: str) -> Iterator[sa.Engine]:
+    """Engine of `database_url`."""
+    engine = create_engine(database_url, pool_size=10, max_overflow=20)
+    yield engine
+    engine.dispose()
+
+
+@pytest.fixture(scope="session")
+def valkey(servers_home: Path) -> Iterator[EmbeddedServer]:
+    """The run's Valkey. Not to be killed: see `short_home`."""
+    with start_valkey(servers_home) as server:
+        yield server
+
+
+@pytest.fixture
+def queue_url(valkey: EmbeddedServer, servers_home: Path) -> str:
+    """Celery's URL of an empty Valkey."""
+    with redis.Redis(unix_socket_path=str(socket_folder(servers_home) / "valkey.sock")) as client:
+        client.flushall()
+    return valkey.url
+
+
+@pytest.fixture
+def folder_store(tmp_path: Path) -> FolderStore:
+    """An empty asset store in a folder."""
+    return FolderStore(tmp_path / "assets")
+
+
+@pytest.fixture(scope="session")
+def swift(servers_home: Path) -> Iterator[Swift]:
+    """The run's S3 server. Who stops it starts it again."""
+    folder = servers_home / "swift"
+    folder.mkdir()
+    server = Swift(folder)
+    server.start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def s3_store(swift: Swift) -> S3Store:
+    """An empty asset store on S3."""
+    return swift.new_store()
+
+
+def _url(server: EmbeddedServer, database: str) -> str:
+    return sa.make_url(server.url).set(database=database).render_as_string(hide_password=False)
+
+
+def _execute(server: EmbeddedServer, statement: str) -> None:
+    dsn = sa.make_url(server.url).set(drivername="postgresql", database="postgres")
+    with psycopg.connect(dsn.render_as_string(hide_password=False), autocommit=True) as connection:
+        connection.execute(statement.encode())
