@@ -249,3 +249,11 @@ def mirror_by_name(names: tuple[str, ...]) -> tuple[int, ...]:
 
     pairs = [other(j) for j in range(len(names))]
     return tuple(p if pairs[p] == j else j for j, p in enumerate(pairs))
+
+
+def skeleton_of(names: tuple[str, ...], parents: tuple[int, ...], offsets: NDArray[np.floating]) -> Skeleton:
+    """A skeleton read from a file: one of ours with these offsets when names and tree are the same, else a new one."""
+    for known in SKELETONS.values():
+        if known.joint_names == names and known.parents == parents:
+            return known.with_offsets(offsets)
+    return Skeleton("other", names, parents, np.asarray(offsets, np.float32), mirror_by_name(names))

@@ -1,0 +1,222 @@
+"""A finished motion, and the npz file that holds it.
+
+The file opens with `numpy.load(path, allow_pickle=False)`; it is always in metres, Y up, facing +Z in frame 0. Its keys
+are a contract: joints, rotations, root, offsets, parents, names, fps, contacts, features, features_fps, manifest.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from shared.motion.files import write_atomically
+from shared.motion.kinematics import forward_kinematics
+from shared.motion.rotations import Array
+from shared.motion.skeleton import Skeleton, skeleton_of
+
+Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
+
+MAX_UNPACKED = 2**30  # bytes; an hour of 22 joints at 120 fps takes 0.4 GiB
+KEYS = (
+    "joints",
+    "rotations",
+    "root",
+    "offsets",
+    "parents",
+    "names",
+    "fps",
+    "contacts",
+    "features",
+    "features_fps",
+    "manifest",
+)
+
+
+def _nothing() -> Float32:
+    return np.zeros((0, 0), np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionClip:
+    """Poses of one body over time, in metres, Y up.
+
+    Attributes:
+        skeleton: the tree with this body's offsets.
+        rotations: (T, J, 4) local quaternions `w x y z`.
+        root: (T, 3) position of the root.
+        joints: (T, J, 3) what forward kinematics of the above gives.
+        contacts: (T, 4) L ankle, L toe, R ankle, R toe stand on the floor.
+        fps: frames a second.
+        features: (Tf, D) as generated, before clean-up and resampling; (0, 0) for a motion that no model made.
+        features_fps: their rate; 0 without features.
+        manifest: where the motion comes from; JSON.
+    """
+
+    skeleton: Skeleton
+    rotations: Float32 = field(repr=False)
+    root: Float32 = field(repr=False)
+    joints: Float32 = field(repr=False)
+    contacts: Bool = field(repr=False)
+    fps: float
+    features: Float32 = field(default_factory=_nothing, repr=False)
+    features_fps: float = 0.0
+    manifest: Mapping[str, Any] = field(default_factory=dict[str, Any], repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        skeleton: Skeleton,
+        rotations: Array,
+        root: Array,
+        contacts: Bool,
+        fps: float,
+        *,
+        features: Array | None = None,
+        features_fps: float = 0.0,
+        manifest: Mapping[str, Any] | None = None,
+    ) -> MotionClip:
+        """A clip whose joints are computed from its rotations."""
+        rotations, root = np.asarray(rotations, np.float32), np.asarray(root, np.float32)
+        return cls(
+            skeleton=skeleton,
+            rotations=rotations,
+            root=root,
+            joints=forward_kinematics(skeleton, rotations, root).astype(np.float32),
+            contacts=np.asarray(contacts, bool),
+            fps=float(fps),
+            features=_nothing() if features is None else np.asarray(features, np.float32),
+            features_fps=float(features_fps),
+            manifest=manifest or {},
+        )
+
+    @property
+    def offsets(self) -> Float32:
+        """(J, 3) rest pose: the T-pose with this body's proportions."""
+        return self.skeleton.offsets
+
+    @property
+    def frames(self) -> int:
+        """T."""
+        return len(self.root)
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip plays."""
+        return self.frames / self.fps
+
+    def to_npz(self) -> bytes:
+        """The npz file. Equal clips give equal bytes."""
+        names = np.array(self.skeleton.joint_names)
+        buffer = io.BytesIO()
+        np.savez(
+            buffer,
+            joints=self.joints,
+            rotations=self.rotations,
+            root=self.root,
+            offsets=self.offsets,
+            parents=np.array(self.skeleton.parents, np.int32),
+            names=names,
+            fps=np.float64(self.fps),
+            contacts=self.contacts,
+            features=self.features,
+            features_fps=np.float64(self.features_fps),
+            manifest=np.array(json.dumps(self.manifest, ensure_ascii=False, sort_keys=True)),
+        )
+        return buffer.getvalue()
+
+    def save_npz(self, path: Path | str) -> None:
+        """Write the npz file, whole or not at all."""
+        write_atomically(Path(path), self.to_npz())
+
+
+def load_npz(path: Path | str) -> MotionClip:
+    """Read a clip.
+
+    Raises:
+        NotFound: no such file.
+        InvalidFile: not such an npz: keys, shapes, kinds, pickles, numbers that are not finite, a tree that is none.
+        TooLarge: more than `MAX_UNPACKED` bytes inside.
+    """
+    path = Path(path)
+    try:
+        return parse_npz(path.read_bytes(), str(path))
+    except FileNotFoundError:
+        raise NotFound("no such file", where=str(path)) from None
+    except OSError as error:
+        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
+
+
+def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
+    """Read the bytes of a clip's npz file; see `load_npz`."""
+    arrays = _arrays(data, where)
+
+    def need(key: str, kinds: str, *shape: int | None) -> NDArray[Any]:
+        array = arrays[key]
+        wanted = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
+        if array.dtype.kind not in kinds:
+            raise InvalidFile(f"`{key}` holds {array.dtype}", where=where)
+        if array.ndim != len(shape) or any(s is not None and s != n for s, n in zip(shape, array.shape, strict=True)):
+            raise InvalidFile(f"`{key}` has shape {array.shape}, not {wanted}", where=where)
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise InvalidFile(f"`{key}` holds NaN or infinite numbers", where=where)
+        return array
+
+    joints = need("joints", "f", None, None, 3).astype(np.float32, copy=False)
+    frames, count = joints.shape[:2]
+    rotations = need("rotations", "f", frames, count, 4).astype(np.float32, copy=False)
+    names = tuple(str(n) for n in need("names", "U", count).tolist())
+    parents = tuple(int(p) for p in need("parents", "iu", count).tolist())
+    fps, features_fps = float(need("fps", "f")), float(need("features_fps", "f"))
+    if not frames or not 0 < fps <= 1000:
+        raise InvalidFile(f"{frames} frames at {fps:g} fps", where=where)
+    if np.abs(np.linalg.norm(rotations, axis=-1) - 1).max(initial=0) > 1e-3:
+        raise InvalidFile("`rotations` holds quaternions that are not of unit length", where=where)
+    try:
+        manifest = json.loads(str(need("manifest", "U")[()]))
+        skeleton = skeleton_of(names, parents, need("offsets", "f", count, 3))
+    except (ValueError, InvalidInput) as error:
+        raise InvalidFile(str(error), where=where) from None
+    if not isinstance(manifest, dict):
+        raise InvalidFile("`manifest` is not a JSON object", where=where)
+    return MotionClip(
+        skeleton=skeleton,
+        rotations=rotations,
+        root=need("root", "f", frames, 3).astype(np.float32, copy=False),
+        joints=joints,
+        contacts=need("contacts", "b", frames, 4),
+        fps=fps,
+        features=need("features", "f", None, None).astype(np.float32, copy=False),
+        features_fps=features_fps,
+        manifest=manifest,
+    )
+
+
+def _arrays(data: bytes, where: str) -> dict[str, NDArray[Any]]:
+    """The arrays of an npz by key; the sizes are looked at before anything is unpacked."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+            if size > MAX_UNPACKED:
+                raise TooLarge(f"{size / 2**30:.1f} GiB unpacked, over the limit of 1 GiB", where=where)
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            missing = [key for key in KEYS if key not in file.files]
+            if missing:
+                raise InvalidFile(
+                    f"has no {', '.join(missing)}", where=where, hint="It is no motion that Marey wrote, or an old one."
+                )
+            return {key: file[key] for key in KEYS}
+    except (zipfile.BadZipFile, EOFError, KeyError, NotImplementedError):
+        raise InvalidFile("is no npz file, or a broken one", where=where) from None
+    except (ValueError, OSError) as error:
+        reason = "holds pickled objects, which are never loaded" if "allow_pickle" in str(error) else "is broken"
+        raise InvalidFile(reason, where=where) from None
