@@ -124,6 +124,8 @@ class HGM3Config:
     masked: TransformerConfig = TransformerConfig()
     predictor: TransformerConfig = TransformerConfig()
     residual: TransformerConfig = TransformerConfig()
+    compact: bool = False
+    """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     residual_drop: float = 0.2  # condition drop of the residual transformer
     length_hidden: tuple[int, ...] = (512, 256, 128)
     mining: MiningConfig = MiningConfig()
@@ -174,8 +176,9 @@ STARTER = HGM3Config(
         width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1, position_weight=5.0, velocity_weight=1.0
     ),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
+    compact=True,
     masked=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.1, norm_first=True),
-    predictor=TransformerConfig(layers=2, heads=4, width=192, feedforward=384, dropout=0.1, norm_first=True),
+    predictor=TransformerConfig(layers=2, heads=4, width=192, feedforward=256, dropout=0.1, norm_first=True),
     residual=TransformerConfig(layers=4, heads=4, width=192, feedforward=384, dropout=0.1, norm_first=True),
     length_hidden=(128,),
     mining=MiningConfig(levels_per_step=1),
@@ -190,6 +193,7 @@ TINY = HGM3Config(
     name="tiny",
     tokenizer=TokenizerConfig(width=32, depth=1, levels=3, codes=32, code_width=16, dropout=0.0),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
+    compact=True,
     masked=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),
     predictor=TransformerConfig(layers=1, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),
     residual=TransformerConfig(layers=1, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),

@@ -1,0 +1,169 @@
+"""HGM³'s networks as one bundle: assembling, loading, and a random one for the machinery's tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from shared.bundles import Bundle, BundleWriter, TextSpec
+from shared.errors import InvalidBundle
+from shared.motion.features import layout
+from workers.hgm3.config import HGM3Config, named_config
+from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
+from workers.hgm3.tokenizer import Tokenizer, biased_std
+
+MODEL = "hgm3"
+CODEBOOK_STATISTICS = ("quantizer.sums",)
+"""State of the codebooks' training, as large as the codebooks, that generation does not need."""
+
+
+@dataclass(frozen=True)
+class Networks:
+    """All parts of a bundle."""
+
+    tokenizer: Tokenizer
+    masked: MaskedTransformer
+    predictor: LossPredictor  # the teacher, for the heat map
+    residual: ResidualTransformer
+    length: LengthEstimator
+
+    @classmethod
+    def build(cls, config: HGM3Config) -> Networks:
+        """Freshly initialised networks."""
+        return cls(
+            Tokenizer(config),
+            MaskedTransformer(config),
+            LossPredictor(config),
+            ResidualTransformer(config),
+            LengthEstimator(config),
+        )
+
+    def parts(self) -> dict[str, nn.Module]:
+        """Part name to network."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def write_bundle(
+    path: Path,
+    config: HGM3Config,
+    parts: Mapping[str, Mapping[str, Tensor]],
+    statistics: tuple[NDArray[np.float32], NDArray[np.float32]],
+    *,
+    text: TextSpec,
+    card: str | None = None,
+    overwrite: bool = False,
+    **manifest: Any,
+) -> Bundle:
+    """Write a bundle from the parts' state dicts.
+
+    Args:
+        path: the bundle's folder; its last name is the bundle's.
+        config: what the networks are built from.
+        parts: state dict of each part; those of the codebooks' training are left out.
+        statistics: mean and std (D,) that the tokenizer normalises with.
+        text: encoder, labeller and caps.
+        card: the model card.
+        overwrite: replace an existing bundle.
+        manifest: licence, data, metrics, training, random, version.
+    """
+    features = layout(config.layout)
+    with BundleWriter(path, overwrite=overwrite) as writer:
+        for name, state in parts.items():
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in CODEBOOK_STATISTICS})
+        writer.add_statistics(*statistics)
+        if card is not None:
+            writer.add_card(card)
+        return writer.finish(
+            name=path.name,
+            kind="generator",
+            model=MODEL,
+            config=config.name,
+            parameters=config.to_dict(),
+            skeleton=features.skeleton.name,
+            layout=config.layout,
+            fps=config.fps,
+            text=text,
+            **{"version": "1", **manifest},
+        )
+
+
+def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
+    """Build and fill the networks of a bundle, float32, in evaluation mode.
+
+    Raises:
+        InvalidBundle: of another model, or its tensors do not fit its configuration.
+    """
+    if bundle.manifest.model != MODEL:
+        raise InvalidBundle(f"is a bundle of {bundle.manifest.model}, not of {MODEL}", where=str(bundle.path))
+    config = HGM3Config.from_dict(bundle.manifest.parameters)
+    networks = Networks.build(config)
+    for name, network in networks.parts().items():
+        state = {k: torch.from_numpy(v) for k, v in bundle.tensors(name).items()}
+        missing, unexpected = _load(network, state, where=f"{bundle.path}: {name}")
+        missing = [k for k in missing if k not in CODEBOOK_STATISTICS]
+        if missing or unexpected:
+            raise InvalidBundle(
+                f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unexpected[:3]}",
+                where=f"{bundle.path}: {name}",
+            )
+        network.eval().requires_grad_(False)
+    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
+    networks.tokenizer.set_statistics(mean, std)
+    networks.residual.set_codebooks(networks.tokenizer.quantizer.codebooks)
+    return config, networks
+
+
+def _load(network: nn.Module, state: dict[str, Tensor], *, where: str) -> tuple[list[str], list[str]]:
+    try:
+        result = network.load_state_dict(state, strict=False)
+    except RuntimeError as error:  # a shape differs
+        raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
+    return list(result.missing_keys), list(result.unexpected_keys)
+
+
+def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int = 0) -> Bundle:
+    """A real bundle with random weights: it exercises everything and generates nonsense (manifest `random` = true).
+
+    Statistics are those of a person standing still, so that joints stay in sight.
+    """
+    path = Path(path)
+    config = named_config(config) if isinstance(config, str) else config
+    generator_state = torch.get_rng_state()
+    torch.manual_seed(seed)
+    try:
+        networks = Networks.build(config)
+        networks.tokenizer.quantizer.codebooks.normal_()
+        networks.tokenizer.quantizer.initialized.fill_(True)
+        parts = {name: network.state_dict() for name, network in networks.parts().items()}
+    finally:
+        torch.set_rng_state(generator_state)
+    mean, std = _standing(config)
+    text = TextSpec(
+        encoder="minilm" if config.condition.text_width == 384 else "clip-vit-b32",
+        width=config.condition.text_width,
+        max_actions=config.condition.max_actions,
+        max_specifics=config.condition.max_specifics,
+    )
+    biased = biased_std(torch.from_numpy(std), config.tokenizer.feature_bias).numpy()
+    return write_bundle(path, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True)
+
+
+def _standing(config: HGM3Config) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean and std (D,) of features around the rest pose."""
+    features = layout(config.layout)
+    rest = features.skeleton.offsets.astype(np.float64).copy()
+    for joint, parent in enumerate(features.skeleton.parents):
+        if parent >= 0:
+            rest[joint] += rest[parent]
+    rest[:, 1] -= rest[:, 1].min()
+    mean = features.encode(np.repeat(rest[None], 3, 0))[0]
+    std = np.full(features.dim, 0.05, np.float32)
+    std[:4] = 0.01
+    return mean.astype(np.float32), std

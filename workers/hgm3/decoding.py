@@ -1,0 +1,191 @@
+"""The decoding loops of HGM³ (Sec. 3.4): base tokens by confidence under three conditions, then residual levels.
+
+An item's tokens depend on its own seed, text and length alone. A forward holds items of one bucket (a multiple of 8
+tokens) and both branches of guidance; each sequence has its readable rows first, so padding changes no bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from shared.nn.masking import remaining_masks
+from shared.nn.sampling import guide, sample_top_k, uniform
+from shared.nn.transformer import pad_length
+from workers.hgm3.config import InferenceConfig
+from workers.hgm3.model import ACTION, MOTION, SPECIFIC, MaskedTransformer, ResidualTransformer
+from workers.hgm3.tokenizer import frame_mask
+
+BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
+"""What random numbers are drawn for; see `shared.nn.sampling.uniform`."""
+
+KeepRows = Callable[[], Tensor | None]
+"""Called after each pass: bool (B,) rows to go on with, or None for all."""
+
+
+@dataclass(frozen=True)
+class DecodeOptions:
+    """Savings and variants; the first two change no token."""
+
+    skip_idle: bool = True  # leave out passes that keep nothing
+    trim_slots: bool = True  # leave out slots that nobody reads
+    min_progress: bool = False  # keep at least one token a pass (ours): other tokens
+    flat: bool = False  # the full condition in every pass (ablation): other tokens
+
+
+@dataclass(frozen=True)
+class Items:
+    """The items of one bucket."""
+
+    lengths: Tensor  # (B,) own tokens n
+    seeds: Tensor  # (B,) int64
+    nodes: Tensor  # (B, S, W) node embeddings C of the masked transformer's graph
+    present: Tensor  # (B, S) bool
+    sentence: Tensor  # (B, W) plain sentence features
+    tokens: Tensor  # (B, n_bucket, V) int64, -1 where not decoded
+    decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
+
+    def select(self, rows: Tensor) -> Items:
+        """The items at `rows`."""
+        fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
+        return Items(**fields)
+
+
+def condition_level(step: int, config: InferenceConfig, *, flat: bool = False) -> int:
+    """C(l) of eq. 14 for pass l = 1 … L."""
+    if flat or step > config.action_steps:
+        return SPECIFIC
+    return MOTION if step <= config.motion_steps else ACTION
+
+
+def decode_base(
+    model: MaskedTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
+) -> Items:
+    """Fill `tokens[..., 0]`: L passes, each keeping the most confident tokens and never masking them again."""
+    base = torch.full_like(items.tokens[..., 0], model.mask_token)  # (B, n)
+    schedule = _schedules(items.lengths, config.steps, options)  # (L + 1, B): masked before each pass, at last 0
+    for step in range(1, config.steps + 1):
+        before, after = schedule[step - 1], schedule[step]
+        active = (after < before).nonzero().squeeze(1)
+        rows = active if options.skip_idle and len(active) < len(base) else None
+        if rows is None or len(rows):
+            level = condition_level(step, config, flat=options.flat)
+            some = items if rows is None else items.select(rows)
+            masked_left = after if rows is None else after[rows]
+            part = base if rows is None else base[rows]
+            filled = _base_pass(model, some, part, masked_left, step, level, config, options)
+            items.decided[:, level] += before - after
+            if rows is None:
+                base = filled
+            else:
+                base[rows] = filled
+        stay = keep()
+        if stay is not None:
+            items, base, schedule = items.select(stay), base[stay], schedule[:, stay]
+    valid = frame_mask(items.lengths, base.shape[1])
+    tokens = items.tokens.clone()
+    tokens[..., 0] = base.masked_fill(~valid, -1)
+    return replace(items, tokens=tokens)
+
+
+def _base_pass(
+    model: MaskedTransformer,
+    items: Items,
+    base: Tensor,
+    masked_left: Tensor,
+    step: int,
+    level: int,
+    config: InferenceConfig,
+    options: DecodeOptions,
+) -> Tensor:
+    """One pass: predict at the masked tokens, keep all but the `masked_left` (B,) least confident. (B, n) -> (B, n)."""
+    size = base.shape[1]
+    valid = frame_mask(items.lengths, size)  # (B, n)
+    guided = guide(*_base_logits(model, items, base, valid, level, options), config.guidance)  # (B, n, K)
+    noise = uniform(items.seeds, BASE_STREAM, step, torch.arange(size, device=base.device))
+    drawn = sample_top_k(guided, noise, temperature=config.temperature, share=config.top_k)  # (B, n)
+    # Confidence = the guided softmax itself, before temperature and top-k.
+    confidence = (guided.gather(-1, drawn[..., None]).squeeze(-1) - guided.logsumexp(-1)).masked_fill(
+        (base != model.mask_token) | ~valid, torch.inf
+    )
+    order = confidence.argsort(dim=1, stable=True)  # least confident first; ties go to the earlier token
+    rank = torch.empty_like(order).scatter_(1, order, torch.arange(size, device=base.device).expand_as(order))
+    filled = torch.where(base == model.mask_token, drawn, base)
+    return filled.masked_fill(rank < masked_left[:, None], model.mask_token)
+
+
+def _base_logits(
+    model: MaskedTransformer, items: Items, base: Tensor, valid: Tensor, level: int, options: DecodeOptions
+) -> tuple[Tensor, Tensor]:
+    """Logits (B, n, K) with and without condition, from one forward of 2 B sequences."""
+    size, slots = base.shape[1], items.present.shape[1]
+    tokens = model.sequence.place(model.embedding(base.masked_fill(~valid, model.mask_token)))  # (B, n, w)
+    condition = model.condition(items.nodes)
+    null = condition.clone()
+    null[:, 0] = model.condition.null
+    places = model.sequence.positions[:slots]
+    x = torch.cat(
+        [torch.cat([tokens, condition + places], 1), torch.cat([tokens, null + places], 1)]
+    )  # (2 B, n + S, w)
+    visible = model.condition.visible(items.present, level)
+    first = torch.zeros_like(visible)
+    first[:, 0] = True
+    readable = torch.cat([torch.cat([valid, visible], 1), torch.cat([valid, first], 1)])
+    hidden = _packed(model.sequence, x, readable, size, trim=options.trim_slots)
+    with_condition, without = model.logits(hidden).chunk(2)
+    return with_condition, without
+
+
+def decode_residual(
+    model: ResidualTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
+) -> Items:
+    """Fill `tokens[..., 1:]` level by level, both branches of guidance in one forward."""
+    size = items.tokens.shape[1]
+    for level in range(1, model.levels):
+        valid = frame_mask(items.lengths, size)
+        below = [model.embed(items.tokens[..., v], v) for v in range(level)]
+        total = torch.stack(below).sum(0)  # (B, n, d)
+        x = model.sequence.place(model.enter(total) if model.compact else total)
+        levels = torch.full_like(items.lengths, level)
+        places = model.sequence.positions[:2]
+        text = model.conditions(levels, model.sentence(items.sentence)) + places
+        null = model.conditions(levels, model.null.expand_as(text[:, 0])) + places
+        x = torch.cat([torch.cat([x, text], 1), torch.cat([x, null], 1)])  # (2 B, n + 2, w)
+        readable = torch.cat([valid, torch.ones_like(valid[:, :2])], 1).repeat(2, 1)
+        hidden = _packed(model.sequence, x, readable, size, trim=options.trim_slots)
+        logits = model.logits(hidden, levels.repeat(2))
+        guided = guide(*logits.chunk(2), config.residual_guidance)
+        noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
+        drawn = sample_top_k(
+            guided, noise, temperature=config.residual_temperature, share=config.residual_top_k
+        ).masked_fill(~valid, -1)
+        tokens = items.tokens.clone()
+        tokens[..., level] = drawn
+        items = replace(items, tokens=tokens)
+        stay = keep()
+        items = items if stay is None else items.select(stay)
+    return items
+
+
+def _packed(sequence: torch.nn.Module, x: Tensor, readable: Tensor, size: int, *, trim: bool) -> Tensor:
+    """Run `sequence` with the readable rows of each sample first; outputs (B, size, w) at the tokens."""
+    longest = int(readable.sum(1).max()) if trim else readable.shape[1]
+    length = max(pad_length(longest), pad_length(size))
+    order = torch.argsort(~readable, dim=1, stable=True)
+    if length > order.shape[1]:
+        extra = length - order.shape[1]
+        order = torch.cat([order, order[:, -1:].expand(-1, extra)], 1)
+        readable = torch.cat([readable.gather(1, order[:, :-extra]), readable.new_zeros(len(order), extra)], 1)
+    else:
+        order = order[:, :length]
+        readable = readable.gather(1, order)
+    return sequence.packed(x, order, readable)[:, :size]
+
+
+def _schedules(lengths: Tensor, steps: int, options: DecodeOptions) -> Tensor:
+    """Masked tokens before pass 1 and after each pass: (L + 1, B)."""
+    columns = [[n, *remaining_masks(n, steps, min_progress=options.min_progress)] for n in lengths.tolist()]
+    return torch.tensor(columns, device=lengths.device).T.contiguous()

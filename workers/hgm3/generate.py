@@ -1,0 +1,294 @@
+"""Prompts' features in, motion features out: the whole of HGM³'s inference behind one class."""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from shared.bundles import Bundle, find_bundle
+from shared.errors import InvalidInput
+from shared.motion.features import FeatureLayout, layout
+from shared.nn.sampling import uniform
+from shared.nn.transformer import lower_matrices
+from shared.text.features import TextFeatures
+from workers.hgm3.bundle import Networks, load_networks
+from workers.hgm3.conditions import graph_batch
+from workers.hgm3.config import HGM3Config, InferenceConfig
+from workers.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from workers.training.loop import choose_device
+
+BUCKET = 8
+"""Tokens; an item is padded to a multiple of this, never to its batch's longest."""
+MAX_ROWS = 32
+"""Items a forward; beyond it a larger batch gains nothing on a CPU and costs memory."""
+MAX_SEED = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Request:
+    """One motion to make."""
+
+    text: TextFeatures
+    seed: int
+    frames: int | None = None  # at the model's fps; None = the length estimator decides
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Uniform over a batch; None = what the bundle says."""
+
+    steps: int | None = None
+    guidance: float | None = None
+    temperature: float | None = None
+    top_k: float | None = None
+    residual_guidance: float | None = None
+    residual_temperature: float | None = None
+    residual_top_k: float | None = None
+    min_progress: bool = False
+    flat: bool = False
+    skip_idle: bool = True
+    trim_slots: bool = True
+
+    def inference(self, default: InferenceConfig) -> InferenceConfig:
+        """The bundle's decoding with this batch's changes; stage boundaries scale with the steps.
+
+        Raises:
+            InvalidInput: a value out of range.
+        """
+        names = [n for n in InferenceConfig.__dataclass_fields__ if getattr(self, n, None) is not None]
+        config = replace(default, **{n: getattr(self, n) for n in names})
+        if config.steps != default.steps:
+            share = config.steps / default.steps
+            config = replace(
+                config,
+                motion_steps=round(default.motion_steps * share),
+                action_steps=round(default.action_steps * share),
+            )
+        if not 1 <= config.steps <= 100:
+            raise InvalidInput("must lie between 1 and 100", where="steps")
+        for name in ("top_k", "residual_top_k"):
+            if not 0 < getattr(config, name) <= 1:
+                raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where=name)
+        for name in ("temperature", "residual_temperature", "guidance", "residual_guidance"):
+            if not 0 <= getattr(config, name) <= 100:
+                raise InvalidInput("must lie between 0 and 100", where=name)
+        return config
+
+
+@dataclass(frozen=True)
+class Generated:
+    """One motion as the network made it: before decoding to joints and clean-up."""
+
+    tokens: NDArray[np.int16]  # (V, n)
+    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
+    decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
+
+
+class Control(Protocol):
+    """What a caller may do while a batch is decoded."""
+
+    def progress(self, done: int, total: int) -> None:
+        """Called after each step of the batch."""
+        ...
+
+    def dropped(self) -> set[int]:
+        """Indices of requests to leave out from now on (cancelled)."""
+        ...
+
+
+class _NoControl:
+    def progress(self, done: int, total: int) -> None:
+        """Nobody listens."""
+
+    def dropped(self) -> set[int]:
+        """Nobody is left out."""
+        return set()
+
+
+class Generator:
+    """A loaded bundle. Not thread-safe; one a process."""
+
+    def __init__(
+        self, bundle: Bundle, config: HGM3Config, networks: Networks, device: torch.device, dtype: torch.dtype
+    ) -> None:
+        self.bundle = bundle
+        self.config = config
+        self.networks = networks
+        self.device = device
+        self.dtype = dtype
+        self.layout: FeatureLayout = layout(config.layout)
+
+    @classmethod
+    def load(
+        cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
+    ) -> Generator:
+        """Load a bundle.
+
+        Args:
+            bundle: a verified bundle, or its name or path.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            threads: of torch; 0 leaves torch's own choice.
+            dtype: of the transformers' matrices; None = bfloat16 where the device multiplies it fast, else float32.
+
+        Raises:
+            InvalidBundle: not HGM³, or damaged.
+            InvalidInput: no such device.
+        """
+        if threads > 0:
+            torch.set_num_threads(threads)
+        chosen = choose_device(device)
+        verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
+        config, networks = load_networks(verified)
+        dtype = dtype or (torch.bfloat16 if _fast_bf16(chosen) else torch.float32)
+        for part in networks.parts().values():
+            part.to(chosen)
+            if dtype != torch.float32:
+                lower_matrices(part, dtype)
+        return cls(verified, config, networks, chosen, dtype)
+
+    @property
+    def frames_per_token(self) -> int:
+        """N/n."""
+        return self.config.tokenizer.frames_per_token
+
+    @torch.inference_mode()
+    def generate(
+        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+    ) -> list[Generated | None]:
+        """Make one motion a request; None where `control` dropped it.
+
+        The tokens of an item do not depend on the others, on their number or order.
+
+        Raises:
+            InvalidInput: a length or seed out of range, or features of another encoder.
+        """
+        settings = settings or Settings()
+        inference = settings.inference(self.config.inference)
+        options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress, settings.flat)
+        frames = self.frames(requests)
+        results: list[Generated | None] = [None] * len(requests)
+        groups = self._groups(frames)
+        watcher = _Watcher(control or _NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
+        for rows in groups:
+            self._group(rows, requests, frames, inference, options, watcher, results)
+        return results
+
+    def frames(self, requests: Sequence[Request]) -> list[int]:
+        """Feature frames of each request: as asked, or drawn from the length estimator with the item's seed."""
+        low, high = self.config.min_frames, self.config.max_frames
+        for request in requests:
+            if request.frames is not None and not low <= request.frames <= high:
+                seconds = f"{low / self.config.fps:g} to {high / self.config.fps:g} seconds"
+                raise InvalidInput(
+                    f"{request.frames} frames is out of range: this bundle makes {seconds}", where="frames"
+                )
+            if not 0 <= request.seed <= MAX_SEED:
+                raise InvalidInput(f"{request.seed} must lie between 0 and {MAX_SEED}", where="seed")
+        frames = [r.frames if r.frames is not None else 0 for r in requests]
+        open_rows = [i for i, r in enumerate(requests) if r.frames is None]
+        for row in open_rows:  # one by one: a matrix product of another height may round differently
+            frames[row] = self._estimate(requests[row])
+        return frames
+
+    def _estimate(self, request: Request) -> int:
+        sentence = torch.from_numpy(request.text.nodes[:1].astype(np.float32)).to(self.device)
+        share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
+        seeds = torch.tensor([request.seed], device=self.device)
+        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
+        tokens = int((share < draw * share[:, -1:]).sum()) + 1
+        frames = tokens * self.frames_per_token
+        return min(max(frames, self.config.min_frames), self.config.max_frames)
+
+    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
+        """Rows of one bucket each, at most MAX_ROWS."""
+        buckets: dict[int, list[int]] = defaultdict(list)
+        for row, count in enumerate(frames):
+            tokens = -(-count // self.frames_per_token)
+            buckets[-(-tokens // BUCKET) * BUCKET].append(row)
+        return [rows[i : i + MAX_ROWS] for _, rows in sorted(buckets.items()) for i in range(0, len(rows), MAX_ROWS)]
+
+    def _group(
+        self,
+        rows: list[int],
+        requests: Sequence[Request],
+        frames: Sequence[int],
+        inference: InferenceConfig,
+        options: DecodeOptions,
+        watcher: _Watcher,
+        results: list[Generated | None],
+    ) -> None:
+        watcher.start(rows)
+        if not watcher.rows:
+            return
+        rows = watcher.rows
+        items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
+        items = decode_base(self.networks.masked, items, inference, options, watcher.step)
+        items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
+        if not watcher.rows:
+            return
+        features = self.networks.tokenizer.decode(items.tokens, items.lengths).cpu().numpy()
+        watcher.step()
+        for position, row in enumerate(watcher.rows):
+            length = int(items.lengths[position])
+            results[row] = Generated(
+                items.tokens[position, :length].T.cpu().numpy().astype(np.int16),
+                features[position, : frames[row]].copy(),
+                tuple(items.decided[position].tolist()),
+            )
+
+    def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
+        lengths = [-(-f // self.frames_per_token) for f in frames]
+        bucket = -(-max(lengths) // BUCKET) * BUCKET
+        device, levels = self.device, self.config.tokenizer.levels
+        graphs = graph_batch([r.text for r in requests], self.config.condition, device)
+        return Items(
+            lengths=torch.tensor(lengths, device=device),
+            seeds=torch.tensor([r.seed for r in requests], device=device),
+            nodes=self.networks.masked.text(graphs),
+            present=graphs.present,
+            sentence=graphs.nodes[:, 0],
+            tokens=torch.full((len(requests), bucket, levels), -1, device=device),
+            decided=torch.zeros(len(requests), 3, dtype=torch.long, device=device),
+        )
+
+
+class _Watcher:
+    """Counts steps, reports them, and turns dropped requests into rows to keep."""
+
+    def __init__(self, control: Control, total: int) -> None:
+        self.control = control
+        self.total = total
+        self.done = 0
+        self.rows: list[int] = []
+
+    def start(self, rows: list[int]) -> None:
+        """Begin a group of requests."""
+        dropped = self.control.dropped()
+        self.rows = [r for r in rows if r not in dropped]
+
+    def step(self) -> Tensor | None:
+        """One step done; rows to keep, or None for all."""
+        self.done = min(self.done + 1, self.total)
+        self.control.progress(self.done, self.total)
+        dropped = self.control.dropped()
+        if not dropped or not any(r in dropped for r in self.rows):
+            return None
+        keep = [r not in dropped for r in self.rows]
+        self.rows = [r for r in self.rows if r not in dropped]
+        return torch.tensor(keep)
+
+
+def _fast_bf16(device: torch.device) -> bool:
+    """Whether bfloat16 matrices pay: CUDA, and CPUs with the instruction."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported()
+    check: Callable[[], bool] | None = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
+    return os.environ.get("MAREY_BF16", "1") != "0" and check is not None and check()

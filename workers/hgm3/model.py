@@ -1,0 +1,341 @@
+"""HGM³: the networks, read top to bottom.
+
+    semantic graph ── GraphAttention (eq. 9-11) ── Condition (three levels, fixed slots)
+    base tokens + condition ── MaskedTransformer F_θ (eq. 3-4)      ── logits
+    base tokens + condition ── LossPredictor G_φ (eq. 5)            ── difficulty of each token
+    lower levels + sentence ── ResidualTransformer (App. A.2)       ── logits of the next level
+    sentence                ── LengthEstimator                      ── logits of the number of tokens
+
+Jeong et al., "HGM³: Hierarchical Generative Masked Motion Modeling with Hard Token Mining", ICLR 2025. Where it is
+silent: masked and residual transformer after MoMask (Guo et al. 2024), graph after GraphMotion (Jin et al. 2024).
+
+Shapes: B batch, n tokens (padded to the bucket), V levels, K codes, W text width, w transformer width,
+S = 1 + A + P condition slots: the motion node, A actions, P specifics; absent slots are masked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from shared.nn.transformer import Transformer, initialize, sinusoidal_positions
+from workers.hgm3.config import ConditionConfig, HGM3Config, TransformerConfig
+
+EDGE_TYPES = 12
+MOTION, ACTION, SPECIFIC = 0, 1, 2
+"""Levels of condition: C^m, [C^m; C^a], [C^m; C^a; C^s]."""
+LEVELS = 3
+
+
+@dataclass(frozen=True)
+class GraphBatch:
+    """Semantic graphs of a batch in fixed slots."""
+
+    nodes: Tensor  # (B, S, W) encoder features of each node's text; zeros in absent slots
+    adjacency: Tensor  # (B, S, S) int64 edge type, -1 = no edge; self-loops on real nodes
+    present: Tensor  # (B, S) bool
+
+    def select(self, rows: Tensor) -> GraphBatch:
+        """The graphs at `rows` (indices or bool)."""
+        return GraphBatch(self.nodes[rows], self.adjacency[rows], self.present[rows])
+
+
+class TextNormalizer(nn.Module):
+    """Standardises text features by the training set's mean and std, apart for the three node levels (ours).
+
+    Sentence encoders put "left hand" and "right hand" nearly parallel; what differs is small beside what all motion
+    captions share.
+    """
+
+    mean: Tensor  # (3, W)
+    std: Tensor  # (3, W)
+
+    def __init__(self, config: ConditionConfig) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(LEVELS, config.text_width))
+        self.register_buffer("std", torch.ones(LEVELS, config.text_width))
+        level = [MOTION] + [ACTION] * config.max_actions + [SPECIFIC] * config.max_specifics
+        self.register_buffer("slot_level", torch.tensor(level), persistent=False)
+
+    def forward(self, nodes: Tensor, present: Tensor) -> Tensor:
+        """(B, S, W) -> (B, S, W), zeros in absent slots."""
+        index: Tensor = self.get_buffer("slot_level")
+        return (nodes.float() - self.mean[index]) / self.std[index] * present[..., None]
+
+    def sentence(self, features: Tensor) -> Tensor:
+        """(B, W) encodings of whole sentences, standardised."""
+        return (features.float() - self.mean[MOTION]) / self.std[MOTION]
+
+
+class GraphAttention(nn.Module):
+    """One layer of attention over the graph, eq. 9-11; width = text width."""
+
+    def __init__(self, width: int, dropout: float) -> None:
+        super().__init__()
+        self.dropout = dropout
+        self.project = nn.Linear(width, width, bias=False)  # W
+        # M and the E columns of M_r, cut into the half for i and the half for j: M·[h_i; h_j] = a_i + b_j
+        self.source = nn.Linear(width, 1 + EDGE_TYPES, bias=False)
+        self.target = nn.Linear(width, 1 + EDGE_TYPES, bias=False)
+
+    def forward(self, nodes: Tensor, adjacency: Tensor) -> Tensor:
+        """(B, S, W) nodes and (B, S, S) edge types (-1 = none) to (B, S, W); absent slots stay zero.
+
+        The softmax runs over the NEIGHBOURS j of node i (GraphMotion's code runs it over the queries).
+        """
+        h = self.project(nodes)  # (B, S, W), eq. 9
+        attention = self.attention(h, adjacency)
+        attention = F.dropout(attention, self.dropout, self.training)
+        return F.elu(attention @ h) + nodes  # eq. 11
+
+    def attention(self, h: Tensor, adjacency: Tensor) -> Tensor:
+        """ẽ_ij of eq. 10: (B, S, S), rows sum to 1 over the neighbours, zero rows for absent slots."""
+        edge = adjacency >= 0
+        logits = self.source(h)[:, :, None] + self.target(h)[:, None]  # (B, S, S, 1 + E)
+        typed = logits[..., 1:].gather(-1, adjacency.clamp(min=0)[..., None]).squeeze(-1)
+        logits = F.leaky_relu(logits[..., 0], 0.2) + F.leaky_relu(typed, 0.2)  # e_ij
+        logits = logits.float().masked_fill(~edge, torch.finfo(torch.float32).min)
+        return (torch.softmax(logits, -1) * edge).to(h.dtype)
+
+
+class TextEncoder(nn.Module):
+    """Graph batch to node embeddings C (B, S, W): standardise, then reason over the whole graph once."""
+
+    def __init__(self, config: ConditionConfig) -> None:
+        super().__init__()
+        self.normalizer = TextNormalizer(config)
+        self.graph = GraphAttention(config.text_width, config.dropout)
+
+    def forward(self, batch: GraphBatch) -> Tensor:
+        """(B, S, W)."""
+        return self.graph(self.normalizer(batch.nodes, batch.present), batch.adjacency)
+
+
+class Condition(nn.Module):
+    """Node embeddings to condition tokens of width w, and the null condition of guidance."""
+
+    def __init__(self, config: ConditionConfig, width: int) -> None:
+        super().__init__()
+        self.config = config
+        self.project = nn.Linear(config.text_width, width)
+        self.null = nn.Parameter(torch.zeros(width))  # in slot 0, the rest masked; the same at all levels (ours)
+
+    def forward(self, nodes: Tensor, dropped: Tensor | None = None) -> Tensor:
+        """(B, S, W) -> (B, S, w); samples marked in `dropped` (B,) bool carry the null token in slot 0."""
+        tokens = self.project(nodes)
+        if dropped is None:
+            return tokens
+        first = torch.where(dropped[:, None], self.null.to(tokens.dtype), tokens[:, 0])
+        return torch.cat([first[:, None], tokens[:, 1:]], 1)
+
+    def visible(self, present: Tensor, level: int | Tensor, dropped: Tensor | None = None) -> Tensor:
+        """Which slots (B, S) bool a transformer may read at `level` (one for all, or (B,))."""
+        slots = torch.arange(self.config.slots, device=present.device)
+        slot_level = (slots > 0).long() + (slots > self.config.max_actions).long()  # 0, 1 … 1, 2 … 2
+        level = torch.as_tensor(level, device=present.device).expand(present.shape[0])
+        seen = present & (slot_level[None] <= level[:, None])
+        return seen if dropped is None else seen & ~(dropped[:, None] & (slots > 0))
+
+
+class SequenceModel(nn.Module):
+    """Transformer over [tokens | slots]; positions count the slots first: motion 0, actions, specifics, tokens."""
+
+    positions: Tensor  # (S + n_max, w)
+
+    def __init__(self, config: TransformerConfig, slots: int, max_tokens: int) -> None:
+        super().__init__()
+        self.slots = slots
+        c = config
+        self.transformer = Transformer(c.layers, c.width, c.heads, c.feedforward, c.dropout, norm_first=c.norm_first)
+        # a bucket is a multiple of 8 tokens
+        table = sinusoidal_positions(slots + max_tokens + 8, c.width)
+        self.register_buffer("positions", table, persistent=False)
+
+    def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
+        """Embedded tokens (B, n, w) and condition (B, S' <= S, w) to outputs at the tokens (B, n, w).
+
+        `valid` (B, n) and `visible` (B, S') say what may be read; S' < S leaves out the last slots, all invisible.
+        """
+        size, slots = tokens.shape[1], condition.shape[1]
+        condition = condition + self.positions[:slots]
+        x = torch.cat([self.place(tokens), condition], 1)  # (B, n + S', w)
+        return self.transformer(x, torch.cat([valid, visible], 1))[:, :size]
+
+    def place(self, tokens: Tensor) -> Tensor:
+        """Embedded tokens (B, n, w) plus their positions, which count from behind the slots."""
+        return tokens + self.positions[self.slots : self.slots + tokens.shape[1]]
+
+    def packed(self, x: Tensor, order: Tensor, visible: Tensor) -> Tensor:
+        """Inference: run on the rows `order` (B, Q) of placed inputs x (B, n + S, w), what is visible standing first.
+
+        Padding then follows everything that is read, and may be cut or added without changing a bit (`pad_length`).
+        """
+        rows = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))
+        return self.transformer(rows, visible)
+
+
+class TokenHead(nn.Module):
+    """Dense, GELU, norm, and one logit a code (MoMask); `tied` gives the last matrix, else it is learnt."""
+
+    def __init__(self, width: int, codes: int, *, tied: bool) -> None:
+        super().__init__()
+        self.dense = nn.Linear(width, width)
+        self.norm = nn.LayerNorm(width)
+        self.bias = nn.Parameter(torch.zeros(codes))
+        self.codes = None if tied else nn.Linear(width, codes, bias=False)
+
+    def forward(self, x: Tensor, tied: Tensor | None = None) -> Tensor:
+        """(B, n, w) -> (B, n, K) logits, float32."""
+        h = self.norm(F.gelu(self.dense(x)))
+        logits = self.codes(h) if self.codes is not None else F.linear(h, _given(tied))
+        return logits.float() + self.bias
+
+
+class MaskedTransformer(nn.Module):
+    """F_θ: reconstructs masked base tokens under a condition (eq. 3)."""
+
+    def __init__(self, config: HGM3Config) -> None:
+        super().__init__()
+        codes = config.tokenizer.codes
+        self.mask_token = codes
+        self.compact = config.compact
+        self.text = TextEncoder(config.condition)
+        self.condition = Condition(config.condition, config.masked.width)
+        self.embedding = nn.Embedding(codes + 1, config.masked.width)  # the last is [MASK]
+        self.sequence = SequenceModel(config.masked, config.condition.slots, config.max_tokens)
+        self.head = TokenHead(config.masked.width, codes, tied=config.compact)
+        initialize(self)
+
+    def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
+        """Logits (B, n, K) of tokens (B, n) in 0 … K (K = [MASK]; any value where not `valid`)."""
+        embedded = self.embedding(tokens.masked_fill(~valid, self.mask_token))
+        return self.logits(self.sequence(embedded, valid, condition, visible))
+
+    def logits(self, hidden: Tensor) -> Tensor:
+        """(B, n, w) -> (B, n, K) float32."""
+        return self.head(hidden, self.embedding.weight[:-1] if self.compact else None)
+
+
+class LossPredictor(nn.Module):
+    """G_φ: reads the UNMASKED base tokens and the condition, says which tokens F_θ finds hard (eq. 5)."""
+
+    def __init__(self, config: HGM3Config) -> None:
+        super().__init__()
+        self.condition = Condition(config.condition, config.predictor.width)
+        self.embedding = nn.Embedding(config.tokenizer.codes, config.predictor.width)
+        self.sequence = SequenceModel(config.predictor, config.condition.slots, config.max_tokens)
+        self.head = nn.Linear(config.predictor.width, 1)
+        initialize(self)
+
+    def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
+        """Difficulty (B, n), only its order means something; zero where not `valid`."""
+        embedded = self.embedding(tokens.masked_fill(~valid, 0))
+        hidden = self.sequence(embedded, valid, condition, visible)
+        return self.head(hidden).float().squeeze(-1) * valid
+
+
+class ResidualTransformer(nn.Module):
+    """Predicts level v + 1 from the levels up to v and the plain sentence feature (App. A.2)."""
+
+    codebooks: Tensor  # (V, K, d): the tokenizer's, each level scaled to unit std; not stored twice
+    code_std: Tensor  # (V,): those stds
+
+    def __init__(self, config: HGM3Config) -> None:
+        super().__init__()
+        t, width = config.tokenizer, config.residual.width
+        self.levels = t.levels
+        self.compact = config.compact
+        self.normalizer = TextNormalizer(config.condition)
+        self.text = nn.Linear(config.condition.text_width, width)
+        self.null = nn.Parameter(torch.zeros(width))
+        self.level = nn.Embedding(t.levels - 1, width)
+        self.sequence = SequenceModel(config.residual, 2, config.max_tokens)
+        if config.compact:  # ours: the codes themselves, projected in and out
+            self.register_buffer("codebooks", torch.zeros(t.levels, t.codes, t.code_width), persistent=False)
+            self.register_buffer("code_std", torch.ones(t.levels), persistent=False)
+            self.enter = nn.Linear(t.code_width, width)
+            self.leave = nn.Linear(width, t.code_width)
+            self.scale = nn.Parameter(torch.ones(t.levels - 1))
+            self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
+        else:
+            self.embedding = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
+            self.dense = nn.Linear(width, width)
+            self.norm = nn.LayerNorm(width)
+            self.output = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
+            self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
+        initialize(self)
+
+    def set_codebooks(self, codebooks: Tensor) -> None:
+        """Hand over the tokenizer's codebooks (V, K, d); without effect unless compact."""
+        if self.compact:
+            self.code_std.copy_(codebooks.std((1, 2)).clamp(min=1e-6))
+            self.codebooks.copy_(codebooks / self.code_std[:, None, None])
+
+    def embed(self, tokens: Tensor, level: int) -> Tensor:
+        """What level `level` of tokens (B, n) adds to the input of the levels above: (B, n, d or w)."""
+        if not self.compact:
+            return F.embedding(tokens.clamp(min=0), self.embedding[level])
+        # relative to the first level, so that the input has about unit scale
+        return F.embedding(tokens.clamp(min=0), self.codebooks[level]) * (self.code_std[level] / self.code_std[0])
+
+    def sentence(self, features: Tensor, dropped: Tensor | None = None) -> Tensor:
+        """Text token (B, w) of sentence encodings (B, W); the null token where `dropped` (B,)."""
+        token = self.text(self.normalizer.sentence(features))
+        return token if dropped is None else torch.where(dropped[:, None], self.null.to(token.dtype), token)
+
+    def forward(self, total: Tensor, valid: Tensor, level: Tensor, sentence: Tensor) -> Tensor:
+        """Logits (B, n, K) of level `level` (B,) in 1 … V - 1.
+
+        Args:
+            total: (B, n, d or w), sum of `embed` over the levels below.
+            valid: (B, n) bool.
+            level: (B,), the level to predict.
+            sentence: (B, w) from `sentence`.
+        """
+        x = self.enter(total) if self.compact else total
+        condition = self.conditions(level, sentence)
+        visible = torch.ones(condition.shape[:2], dtype=torch.bool, device=valid.device)
+        return self.logits(self.sequence(x, valid, condition, visible), level)
+
+    def conditions(self, level: Tensor, sentence: Tensor) -> Tensor:
+        """The two slots (B, 2, w): level token and text token."""
+        return torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)
+
+    def logits(self, hidden: Tensor, level: Tensor) -> Tensor:
+        """(B, n, w) -> (B, n, K) float32, with the codes of each sample's own level (B,)."""
+        index = level - 1
+        if not self.compact:
+            hidden = self.norm(F.gelu(self.dense(hidden)))
+            return (
+                torch.bmm(hidden, self.output[index].to(hidden.dtype).transpose(1, 2)).float()
+                + (self.bias[index][:, None])
+            )
+        leaving = self.leave(hidden).float() * self.scale[index][:, None, None]  # (B, n, d)
+        codes = self.codebooks[1:][index]  # (B, K, d)
+        return torch.bmm(leaving, codes.transpose(1, 2)) + self.bias[index][:, None]
+
+
+class LengthEstimator(nn.Module):
+    """Number of tokens from the sentence feature (after MoMask's estimator): classes 1 … n_max."""
+
+    def __init__(self, config: HGM3Config) -> None:
+        super().__init__()
+        self.normalizer = TextNormalizer(config.condition)
+        widths = (config.condition.text_width, *config.length_hidden)
+        layers: list[nn.Module] = []
+        for before, after in zip(widths[:-1], widths[1:], strict=True):
+            layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.LeakyReLU(0.2), nn.Dropout(0.2)]
+        self.layers = nn.Sequential(*layers, nn.Linear(widths[-1], config.max_tokens))
+
+    def forward(self, sentence: Tensor) -> Tensor:
+        """(B, W) -> (B, n_max) logits; class k means k + 1 tokens."""
+        return self.layers(self.normalizer.sentence(sentence))
+
+
+def _given(value: Tensor | None) -> Tensor:
+    if value is None:
+        raise ValueError("a tied head needs the embedding matrix")
+    return value
