@@ -47,9 +47,12 @@ format: $(STAMP) ## Format and fix
 bench: $(STAMP) ## Benchmarks; results belong in docs/performance.md
 	$(BIN)/python -m benchmarks
 
-lock: $(STAMP) ## Write requirements/dev.lock anew
-	$(BIN)/uv pip compile --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
-	  --extra dev --override requirements/torch-free.txt pyproject.toml requirements/torch-deps.in -o requirements/dev.lock
+lock: $(STAMP) ## Write the locks anew
+	for extra in server worker dev; do \
+	  $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+	    --extra $$extra --override requirements/torch-free.txt pyproject.toml requirements/torch-deps.in \
+	    -o requirements/$$extra.lock; \
+	done
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis
