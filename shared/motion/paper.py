@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -114,18 +115,14 @@ class Paper:
             while words and self.length(f"{line} {words[0]}", size) <= width:
                 line += " " + words.pop(0)
             broken.append(line)
-        if not broken:
-            return [""]
-        if words or self.length(broken[-1], size) > width:
-            last = broken[-1]
-            while last and self.length(last + "…", size) > width:
-                last = last[:-1]
-            broken[-1] = last.rstrip() + "…"
-        return [self._shorten(line, size, width) for line in broken]
+        if words and broken:
+            broken[-1] += "…"
+        return [self._shorten(line, size, width) for line in broken] or [""]
 
     def _shorten(self, line: str, size: int, width: float) -> str:
         if self.length(line, size) <= width:
             return line
-        while line and self.length(line + "…", size) > width:
-            line = line[:-1]
-        return line + "…"
+        line = line.rstrip("…")
+        # The longest beginning that fits, by halving: a prompt may be one word of thousands of letters.
+        fits = bisect.bisect_right(range(len(line)), width, key=lambda n: self.length(line[:n] + "…", size)) - 1
+        return line[: max(fits, 0)].rstrip() + "…"

@@ -1,8 +1,8 @@
 """The player: one HTML file that shows motion in 3D, without a network.
 
-Everything is inside the page: style, script, three.js and the motion (root as float32, local rotations as float16, which
-keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy forbids
-the page to fetch anything. Every text is escaped: a prompt is data, whatever is in it.
+Everything is inside the page: style, script, three.js and the motion (root as float32, local rotations as float16,
+which keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy
+forbids the page to fetch anything. Every text is escaped: a prompt is data, whatever is in it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
-from shared.motion.body import Body, dress
+from shared.motion.body import dress
 from shared.motion.clip import MotionClip
+from shared.motion.files import write_atomically
 from shared.motion.paper import one_line
 from shared.motion.render import caption_of, facts_of
 
@@ -61,10 +62,7 @@ def html_player(
         raise InvalidInput(f"there is no theme {theme!r}", hint=f"One of: {', '.join(THEMES)}.")
     texts = [one_line(c) for c in captions] if captions else [one_line(caption_of(c)) for c in rows]
     page = _page(_document(rows, texts), one_line(title or texts[0]) or "Marey", theme)
-    try:
-        path.write_text(page, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise InvalidInput(f"cannot write it: {error.strerror or error}", where=str(path)) from error
+    write_atomically(path, page.encode())
     return path
 
 
@@ -111,7 +109,7 @@ def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str,
                 "facts": one_line(facts_of(clip)),
                 "body": bodies.setdefault(body, len(bodies)),
                 "fps": float(clip.fps),
-                "frames": len(clip.joints),
+                "frames": clip.frames,
                 "root": _base64(np.asarray(clip.root, "<f4")),
                 "rotations": _base64(np.asarray(clip.rotations, "<f2")),
                 "contacts": _base64(np.asarray(clip.contacts, np.uint8)),
@@ -121,8 +119,7 @@ def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str,
 
 
 def _body(clip: MotionClip) -> dict[str, object]:
-    skeleton = clip.skeleton.with_offsets(clip.offsets)
-    body: Body = dress(skeleton)
+    skeleton, body = clip.skeleton, dress(clip.skeleton)
     return {
         "parents": list(skeleton.parents),
         "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],

@@ -1,12 +1,13 @@
 """Contact sheet: motion on one sheet of paper.
 
 A clip is a strip of poses along time, each on its own patch of the floor (grid of half metres, fixed to the world, so
-that travel shows), with the root's trail, its shadow and the feet that touch lit; beside it the path from above, under it
-the lanes of foot contact. Left is blue and right is orange everywhere. Several clips are rows of one sheet.
+that travel shows), with the root's trail, its shadow and the feet that touch lit; beside it the path from above, under
+it the lanes of foot contact. Left is blue and right is orange everywhere. Several clips are rows of one sheet.
 """
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from PIL import Image, ImageChops, ImageDraw, ImageFilter
 from shared.errors import InvalidInput
 from shared.motion.body import Body, Part, dress
 from shared.motion.clip import MotionClip
+from shared.motion.files import write_atomically
 from shared.motion.kinematics import facing, global_rotations
 from shared.motion.paper import Paper, Theme, blend, theme_named
 from shared.motion.raster import Camera, shade
@@ -94,10 +96,9 @@ def contact_sheet(
         for row, clip in enumerate(rows)
     ]
     image = _sheet(strips, title, theme_named(theme))
-    try:
-        image.save(path, format="PNG", compress_level=5)
-    except OSError as error:
-        raise InvalidInput(f"cannot write it: {error.strerror or error}", where=str(path)) from error
+    buffer = io.BytesIO()
+    image.save(buffer, format="PNG", compress_level=5)
+    write_atomically(path, buffer.getvalue())
     return path
 
 
@@ -108,8 +109,7 @@ def caption_of(clip: MotionClip) -> str:
 
 def facts_of(clip: MotionClip) -> str:
     """One line about a clip: length, rate, seed, model, terms."""
-    count = len(clip.joints)
-    facts = [f"{(count - 1) / clip.fps:.1f} s", f"{count} frames at {clip.fps:g} fps"]
+    facts = [f"{clip.seconds:.1f} s", f"{clip.frames} frames at {clip.fps:g} fps"]
     if clip.manifest.get("seed") is not None:
         facts.append(f"seed {clip.manifest['seed']}")
     facts += [str(clip.manifest[key]) for key in ("bundle", "licence") if clip.manifest.get(key)]
@@ -117,7 +117,7 @@ def facts_of(clip: MotionClip) -> str:
 
 
 def _chosen(clip: MotionClip, columns: int, frames: Sequence[int] | None) -> NDArray[np.intp]:
-    count = len(clip.joints)
+    count = clip.frames
     if frames is None:
         return np.unique(np.linspace(0, count - 1, columns).round().astype(np.intp))
     wrong = [f for f in frames if not 0 <= f < count]
@@ -127,10 +127,9 @@ def _chosen(clip: MotionClip, columns: int, frames: Sequence[int] | None) -> NDA
 
 
 def _strip(clip: MotionClip, frames: NDArray[np.intp], caption: str) -> _Strip:
-    skeleton = clip.skeleton.with_offsets(clip.offsets)
-    body, camera = dress(skeleton), Camera()
+    body, camera = dress(clip.skeleton), Camera()
     joints = np.asarray(clip.joints[frames], np.float64)
-    axes = to_matrix(global_rotations(skeleton, np.asarray(clip.rotations[frames], np.float64)))
+    axes = to_matrix(global_rotations(clip.skeleton, np.asarray(clip.rotations[frames], np.float64)))
     limbs = body.points(joints, axes)
     limbs[..., 0] -= joints[:, :1, None, 0]
     limbs[..., 2] -= joints[:, :1, None, 2]
@@ -201,8 +200,8 @@ def _cell(strip: _Strip, column: int, theme: Theme) -> Image.Image:
     rim = _points(pixels(_circle(radius)))
     _patch(image, strip, int(strip.frames[column]), radius, pixels, theme)
     image.paste(theme.shadow, mask=_shadow(strip, column, size, rim, pixels))
-    colours = np.array([theme.parts[limb.part] for limb in strip.body.limbs], np.float32) / 255
-    figure = shade(pixels(strip.limbs[column]), strip.body.radii() * scale, colours, size)
+    colours = np.array([theme.parts[limb.part] for limb in strip.body.limbs]) / 255
+    figure = shade(pixels(strip.limbs[column]), strip.body.radii() * scale, colours.astype(np.float32), size)
     image.paste(Image.fromarray(figure[..., :3]), mask=Image.fromarray(figure[..., 3]))
     return image.resize(CELL, Image.Resampling.BOX)
 
@@ -262,7 +261,7 @@ def _lanes(paper: Paper, strip: _Strip, top: int) -> None:
     if not strip.clip.skeleton.feet:
         return
     draw, theme = ImageDraw.Draw(paper.image), paper.theme
-    count = len(strip.clip.joints)
+    count = strip.clip.frames
     left, right = MARGIN + CELL[0] / 2, MARGIN + (len(strip.frames) - 0.5) * CELL[0]
     at = np.interp(np.arange(count + 1) - 0.5, strip.frames, np.linspace(left, right, len(strip.frames)))
     for lane, side in enumerate(("left", "right")):
@@ -321,8 +320,8 @@ def _plan_grid(
     inset = 4 * PLAN_SMOOTH
     for axis, (low, high) in enumerate(((inset, size[0] - inset), (inset, bottom))):
         reach = size[axis] / scale
-        for at in np.arange(np.ceil((middle[axis] - reach) / step), np.floor((middle[axis] + reach) / step) + 1) * step:
-            pixel = centre[axis] - (at - middle[axis]) * scale
+        for line in range(int((middle[axis] - reach) // step), int((middle[axis] + reach) // step) + 2):
+            pixel = float(centre[axis] - (line * step - middle[axis]) * scale)
             if low < pixel < high:
                 ends = [(pixel, inset), (pixel, bottom)] if axis == 0 else [(inset, pixel), (size[0] - inset, pixel)]
                 draw.line(ends, fill=theme.line, width=PLAN_SMOOTH)
