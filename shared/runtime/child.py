@@ -119,7 +119,7 @@ class Child:
         handlers = {queue: import_handler(reference) for queue, reference in role.handlers.items()}
         self._drain = Drain(
             self._engine,
-            name,
+            self._worker,
             handlers,
             heartbeat=self._heartbeat,
             committer=self._committer,

@@ -134,7 +134,7 @@ HandlerFactory: TypeAlias = Callable[[], Handler]
 
 @dataclass(frozen=True)
 class Role:
-    """What one worker process serves: its name and the handlers of its one child, in order of precedence.
+    """What one worker process serves: its name and the handlers of its one child, served in turns.
 
     `handlers` maps a queue to `module:attribute` of a `HandlerFactory`, a string, so that only the child imports it.
     """

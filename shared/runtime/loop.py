@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
@@ -50,15 +51,15 @@ class Drain:
 
     Args:
         engine: the database.
-        worker: name under which it claims.
-        handlers: by queue, in order of precedence: texts before motions, since they unlock them.
+        worker: name under which it claims from a queue.
+        handlers: by queue; served in turns, so that texts stay ahead of motions and hold none of them up.
         ticked: called at each claim and step of progress: liveness is the age of the last.
     """
 
     def __init__(
         self,
         engine: sa.Engine,
-        worker: str,
+        worker: Callable[[str], str],
         handlers: Mapping[str, Handler],
         *,
         heartbeat: Heartbeat,
@@ -73,6 +74,7 @@ class Drain:
         self._committer = committer
         self._stopping = stopping
         self._ticked = ticked
+        self._turns = deque(handlers)
         self.loaded: dict[str, Loaded] = {}
 
     def drain(self, seconds: float) -> int:
@@ -129,17 +131,19 @@ class Drain:
         return len(taken.items)
 
     def _claim(self) -> Claim | None:
-        for queue, handler in self._handlers.items():
+        for queue in list(self._turns):
             known = self.loaded.get(queue)
             with transaction(self._engine) as conn:
                 taken = claim(
                     conn,
                     queue,
-                    self._worker,
-                    handler.batch_size,
+                    self._worker(queue),
+                    self._handlers[queue].batch_size,
                     prefer_batch_key=known.batch_key if known else None,
                 )
             if taken is not None:
+                self._turns.remove(queue)
+                self._turns.append(queue)
                 return taken
         return None
 

@@ -1,0 +1,145 @@
+"""Starts the real processes, each private to the test, and takes them away again with SIGKILL."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import psutil
+import redis
+import sqlalchemy as sa
+
+from shared.jobs import create_engine, upgrade
+from shared.runtime.child import read_status
+from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from shared.runtime.queue import redis_client
+from tests.support.toy import QUEUE, REFERENCE
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+class Cluster:
+    """Postgres, Valkey, one scheduler and some toy workers on `home`; `environment` adds settings (the store, times)."""
+
+    def __init__(self, home: Path, environment: Mapping[str, str]) -> None:
+        self.home = home
+        self.postgres: EmbeddedServer = start_postgres(home)
+        self.valkey: EmbeddedServer = start_valkey(home)
+        self.engine: sa.Engine = create_engine(self.postgres.url)
+        upgrade(self.engine)
+        self._environment = {
+            **os.environ,
+            "MAREY_HOME": str(home),
+            "MAREY_DATABASE_URL": self.postgres.url,
+            "MAREY_QUEUE_URL": self.valkey.url,
+            "MAREY_LOG_JSON": "true",
+            "OMP_NUM_THREADS": "1",
+            **environment,
+        }
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for name in list(self.processes):
+            self.kill(name)
+        self.engine.dispose()
+        self.valkey.stop()
+        self.postgres.stop()
+
+    # --- starting ---
+
+    def start_scheduler(self, name: str = "scheduler") -> None:
+        """Start a scheduler."""
+        self._start(name, "scheduler")
+
+    def start_worker(self, name: str, *, queue: str = QUEUE, reference: str = REFERENCE, bundle: str = "") -> None:
+        """Start a worker and return at once; `wait_ready` waits for it."""
+        self._start(name, "worker", name, queue, reference, bundle)
+
+    def wait_ready(self, name: str) -> None:
+        """Wait until the worker `name` serves."""
+        self.wait(lambda: (status := read_status(self.home, name)) is not None and status.ready, f"{name} is ready")
+
+    def _start(self, name: str, *arguments: str) -> None:
+        with (self.home / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen(
+                [sys.executable, "-m", "tests.chaos.process", *arguments],
+                cwd=REPOSITORY,
+                env=self._environment,
+                stdout=log,
+                stderr=log,
+            )
+
+    # --- breaking ---
+
+    def kill(self, name: str) -> None:
+        """SIGKILL a process; its children die with it."""
+        process = self.processes.pop(name)
+        process.kill()
+        process.wait()
+
+    def child(self, name: str) -> psutil.Process:
+        """The working child of a worker."""
+        status = read_status(self.home, name)
+        assert status is not None, f"{name} has no child"
+        return psutil.Process(status.pid)
+
+    def kill_child(self, name: str) -> int:
+        """SIGKILL the working child of a worker; its parent starts another."""
+        child = self.child(name)
+        child.kill()
+        return child.pid
+
+    def terminate(self, name: str, timeout: float = 60.0) -> int:
+        """SIGTERM, and the exit code."""
+        process = self.processes.pop(name)
+        process.send_signal(signal.SIGTERM)
+        return process.wait(timeout)
+
+    def flush_queue(self) -> None:
+        """FLUSHALL."""
+        with self.redis() as client:
+            client.flushall()
+
+    def restart_postgres(self, seconds_away: float) -> None:
+        """SIGKILL Postgres and start it again after a while."""
+        self.postgres.kill()
+        time.sleep(seconds_away)
+        self.postgres = start_postgres(self.home)
+
+    def restart_valkey(self, seconds_away: float) -> None:
+        """SIGKILL Valkey and start it again after a while."""
+        self.valkey.kill()
+        time.sleep(seconds_away)
+        self.valkey = start_valkey(self.home)
+
+    # --- watching ---
+
+    def redis(self) -> redis.Redis:
+        """A client of the queue."""
+        return redis_client(self.valkey.url)
+
+    def wait(self, condition: Callable[[], bool], what: str, *, seconds: float = 120.0) -> float:
+        """Poll until `condition` holds; gives the seconds that took. Fails with the ends of all logs."""
+        started = time.monotonic()
+        while not condition():
+            dead = [name for name, process in self.processes.items() if process.poll() is not None]
+            if dead or time.monotonic() - started > seconds:
+                raise AssertionError(f"{'ended: ' + ', '.join(dead) if dead else 'not in time'}: {what}\n{self.logs()}")
+            time.sleep(0.1)
+        return time.monotonic() - started
+
+    def logs(self, lines: int = 40) -> str:
+        """The ends of all logs."""
+        parts: list[str] = []
+        for path in sorted(self.home.glob("*.log")):
+            tail = path.read_text(errors="replace").splitlines()[-lines:]
+            parts.append("\n".join([f"== {path.name}", *tail]))
+        return "\n".join(parts)

@@ -1,0 +1,29 @@
+"""`python -m tests.chaos.process scheduler | worker NAME QUEUE REFERENCE BUNDLE`: a process of the product for the driver.
+
+It is what `marey scheduler` and `marey worker` call, with a toy in place of a model; it dies with the test.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from celery.platforms import set_pdeathsig
+
+from services.scheduler.main import scheduler_main
+from shared.runtime.handler import Role
+from shared.runtime.worker import worker_main
+from shared.settings import settings
+
+
+def main(what: str, *arguments: str) -> int:
+    """Run until told to stop."""
+    set_pdeathsig("SIGKILL")
+    if what == "scheduler":
+        return scheduler_main(settings())
+    name, queue, reference, bundle = arguments
+    role = Role("toy", {queue: reference}, {queue: bundle} if bundle else {})
+    return worker_main(role, settings(), name=name)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

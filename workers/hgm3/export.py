@@ -1,0 +1,79 @@
+"""From generated features to files: the last step of an item, the same in a worker and in `marey generate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from typing import Any
+
+import torch
+from shared.motion.finish import finish_motion
+
+from shared.motion.bvh_write import format_bvh
+from shared.motion.clip import MotionClip
+from shared.runtime.handler import Export, ExportedFile
+from workers.hgm3.generate import Generated, Generator, Request, Settings
+
+MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
+
+
+def manifest_of(generator: Generator, request: Request, settings: Settings) -> dict[str, Any]:
+    """Where a motion comes from: everything that decides it, nothing that differs between two equal runs."""
+    bundle, config = generator.bundle, generator.config
+    text = request.text
+    return {
+        "prompt": text.prompt,
+        "rewritten": text.rewritten,
+        "graph": text.graph.to_json(),
+        "model": bundle.manifest.model,
+        "bundle": bundle.reference,
+        "weights_sha256": bundle.weights_sha256,
+        "random_weights": bundle.manifest.random,
+        "licence": bundle.manifest.licence,
+        "seed": request.seed,
+        "settings": asdict(settings.inference(config.inference)),
+        "software": software_of(generator),
+    }
+
+
+def software_of(generator: Generator) -> dict[str, Any]:
+    """What equal tokens depend on besides the inputs: device kind, number type, threads, versions."""
+    return {
+        "marey": version("marey"),
+        "torch": torch.__version__,
+        "device": generator.device.type,
+        "dtype": str(generator.dtype).removeprefix("torch."),
+        "threads": torch.get_num_threads(),
+    }
+
+
+def finish(
+    generator: Generator,
+    request: Request,
+    generated: Generated,
+    settings: Settings,
+    *,
+    fps: float | None = None,
+    clean: bool = True,
+) -> MotionClip:
+    """The finished clip: decoded, feet cleaned, rotations solved, resampled.
+
+    Args:
+        fps: output rate; None = the model's.
+        clean: lock feet where they stand.
+    """
+    manifest = manifest_of(generator, request, settings)
+    return finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
+
+
+def export_clip(clip: MotionClip, licence: str) -> Export:
+    """The npz and the BVH of a clip, in memory."""
+    contents: Mapping[str, bytes] = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
+    return Export(
+        files=tuple(ExportedFile(name, content, MEDIA_TYPES[name]) for name, content in contents.items()),
+        frames=clip.frames,
+        fps=clip.fps,
+        licence=licence,
+        manifest=clip.manifest,
+    )
