@@ -9,10 +9,11 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,7 +198,7 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         fps=fps,
         features=need("features", "f", None, None).astype(np.float32, copy=False),
         features_fps=features_fps,
-        manifest=manifest,
+        manifest=cast("dict[str, Any]", manifest),
     )
 
 
@@ -215,7 +216,7 @@ def _arrays(data: bytes, where: str) -> dict[str, NDArray[Any]]:
                     f"has no {', '.join(missing)}", where=where, hint="It is no motion that Marey wrote, or an old one."
                 )
             return {key: file[key] for key in KEYS}
-    except (zipfile.BadZipFile, EOFError, KeyError, NotImplementedError):
+    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RuntimeError, MemoryError):
         raise InvalidFile("is no npz file, or a broken one", where=where) from None
     except (ValueError, OSError) as error:
         reason = "holds pickled objects, which are never loaded" if "allow_pickle" in str(error) else "is broken"
