@@ -67,7 +67,7 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
         channels = (
             "3 Zrotation Yrotation Xrotation" if j else "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
         )
-        lines.append(f"{pad}\tCHANNELS {channels}Zrotation Yrotation Xrotation")
+        lines.append(f"{pad}\tCHANNELS {channels}")
         for child in skeleton.children[j]:
             joint(child, depth + 1)
         if not skeleton.children[j]:
