@@ -51,6 +51,10 @@ class WeightAverage:
         finally:
             self._assign(saved)
 
+    def assign(self) -> None:
+        """Put the averaged weights into the module, for good."""
+        self._assign(self.values)
+
     def load(self, values: dict[str, Tensor]) -> None:
         """Restore from a checkpoint."""
         for name in self.values:

@@ -27,7 +27,7 @@ class Clip:
     start: int  # first feature frame
     length: int  # feature frames
     split: str
-    dataset: str
+    dataset: str  # with the part of it, where content names one: bandai-namco/1
     content: str
     style: str
     mirrored: bool
@@ -105,6 +105,11 @@ def content_style_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     return weights / weights.sum()
 
 
+def _part(dataset: str, content: str) -> str:
+    number, slash, _ = content.partition("/")
+    return f"{dataset}/{number}" if slash and number.isdigit() else dataset
+
+
 def _clip(line: str, file: Path, number: int) -> Clip:
     try:
         v = json.loads(line)
@@ -113,7 +118,7 @@ def _clip(line: str, file: Path, number: int) -> Clip:
             start=int(v["start"]),
             length=int(v["length"]),
             split=str(v["split"]),
-            dataset=str(v["dataset"]),
+            dataset=_part(str(v["dataset"]), str(v["content"])),
             content=str(v["content"]),
             style=str(v["style"]),
             mirrored=bool(v["mirrored"]),

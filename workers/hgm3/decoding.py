@@ -14,7 +14,6 @@ from torch import Tensor
 
 from shared.nn.masking import remaining_masks
 from shared.nn.sampling import guide, sample_top_k, uniform
-from shared.nn.transformer import pad_length
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.model import ACTION, MOTION, SPECIFIC, MaskedTransformer, ResidualTransformer
 from workers.hgm3.tokenizer import frame_mask
@@ -121,21 +120,19 @@ def _base_logits(
     model: MaskedTransformer, items: Items, base: Tensor, valid: Tensor, level: int, options: DecodeOptions
 ) -> tuple[Tensor, Tensor]:
     """Logits (B, n, K) with and without condition, from one forward of 2 B sequences."""
-    size, slots = base.shape[1], items.present.shape[1]
-    tokens = model.sequence.place(model.embedding(base.masked_fill(~valid, model.mask_token)))  # (B, n, w)
-    condition = model.condition(items.nodes)
-    null = condition.clone()
-    null[:, 0] = model.condition.null
-    places = model.sequence.positions[:slots]
-    x = torch.cat(
-        [torch.cat([tokens, condition + places], 1), torch.cat([tokens, null + places], 1)]
-    )  # (2 B, n + S, w)
+    condition = model.condition(items.nodes)  # (B, S, w)
+    null = torch.cat([model.condition.null.expand_as(condition[:, :1]), condition[:, 1:]], 1)
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
     first[:, 0] = True
-    readable = torch.cat([torch.cat([valid, visible], 1), torch.cat([valid, first], 1)])
-    hidden = _packed(model.sequence, x, readable, size, trim=options.trim_slots)
-    with_condition, without = model.logits(hidden).chunk(2)
+    logits = model(
+        base.repeat(2, 1),
+        valid.repeat(2, 1),
+        torch.cat([condition, null]),
+        torch.cat([visible, first]),
+        trim=options.trim_slots,
+    )
+    with_condition, without = logits.chunk(2)
     return with_condition, without
 
 
@@ -148,15 +145,10 @@ def decode_residual(
         valid = frame_mask(items.lengths, size)
         below = [model.embed(items.tokens[..., v], v) for v in range(level)]
         total = torch.stack(below).sum(0)  # (B, n, d)
-        x = model.sequence.place(model.enter(total) if model.compact else total)
-        levels = torch.full_like(items.lengths, level)
-        places = model.sequence.positions[:2]
-        text = model.conditions(levels, model.sentence(items.sentence)) + places
-        null = model.conditions(levels, model.null.expand_as(text[:, 0])) + places
-        x = torch.cat([torch.cat([x, text], 1), torch.cat([x, null], 1)])  # (2 B, n + 2, w)
-        readable = torch.cat([valid, torch.ones_like(valid[:, :2])], 1).repeat(2, 1)
-        hidden = _packed(model.sequence, x, readable, size, trim=options.trim_slots)
-        logits = model.logits(hidden, levels.repeat(2))
+        levels = torch.full_like(items.lengths, level).repeat(2)
+        sentence = model.sentence(items.sentence)
+        both = torch.cat([sentence, model.null.expand_as(sentence)])  # (2 B, w)
+        logits = model(total.repeat(2, 1, 1), valid.repeat(2, 1), levels, both, trim=options.trim_slots)
         guided = guide(*logits.chunk(2), config.residual_guidance)
         noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
         drawn = sample_top_k(
@@ -168,21 +160,6 @@ def decode_residual(
         stay = keep()
         items = items if stay is None else items.select(stay)
     return items
-
-
-def _packed(sequence: torch.nn.Module, x: Tensor, readable: Tensor, size: int, *, trim: bool) -> Tensor:
-    """Run `sequence` with the readable rows of each sample first; outputs (B, size, w) at the tokens."""
-    longest = int(readable.sum(1).max()) if trim else readable.shape[1]
-    length = max(pad_length(longest), pad_length(size))
-    order = torch.argsort(~readable, dim=1, stable=True)
-    if length > order.shape[1]:
-        extra = length - order.shape[1]
-        order = torch.cat([order, order[:, -1:].expand(-1, extra)], 1)
-        readable = torch.cat([readable.gather(1, order[:, :-extra]), readable.new_zeros(len(order), extra)], 1)
-    else:
-        order = order[:, :length]
-        readable = readable.gather(1, order)
-    return sequence.packed(x, order, readable)[:, :size]
 
 
 def _schedules(lengths: Tensor, steps: int, options: DecodeOptions) -> Tensor:

@@ -21,7 +21,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.transformer import Transformer, initialize, sinusoidal_positions
+from shared.nn.transformer import Transformer, initialize, pad_length, sinusoidal_positions
 from workers.hgm3.config import ConditionConfig, HGM3Config, TransformerConfig
 
 EDGE_TYPES = 12
@@ -154,27 +154,33 @@ class SequenceModel(nn.Module):
         table = sinusoidal_positions(slots + max_tokens + 8, c.width)
         self.register_buffer("positions", table, persistent=False)
 
-    def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
-        """Embedded tokens (B, n, w) and condition (B, S' <= S, w) to outputs at the tokens (B, n, w).
+    def forward(
+        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, *, trim: bool = True
+    ) -> Tensor:
+        """Embedded tokens (B, n, w) and condition (B, S, w) to outputs at the tokens (B, n, w).
 
-        `valid` (B, n) and `visible` (B, S') say what may be read; S' < S leaves out the last slots, all invisible.
+        Rows that may be read stand first in each sequence: tokens, then slots. Padding follows them all, so leaving it
+        out (`trim`) changes no bit (`pad_length`); outputs where not `valid` mean nothing.
+
+        Args:
+            tokens: (B, n, w).
+            valid: (B, n) bool, each row's first n_i true.
+            condition: (B, S, w).
+            visible: (B, S) bool, slots that may be read.
+            trim: cut padding that the whole batch has.
         """
-        size, slots = tokens.shape[1], condition.shape[1]
-        condition = condition + self.positions[:slots]
-        x = torch.cat([self.place(tokens), condition], 1)  # (B, n + S', w)
-        return self.transformer(x, torch.cat([valid, visible], 1))[:, :size]
-
-    def place(self, tokens: Tensor) -> Tensor:
-        """Embedded tokens (B, n, w) plus their positions, which count from behind the slots."""
-        return tokens + self.positions[self.slots : self.slots + tokens.shape[1]]
-
-    def packed(self, x: Tensor, order: Tensor, visible: Tensor) -> Tensor:
-        """Inference: run on the rows `order` (B, Q) of placed inputs x (B, n + S, w), what is visible standing first.
-
-        Padding then follows everything that is read, and may be cut or added without changing a bit (`pad_length`).
-        """
+        size, slots = valid.shape[1], visible.shape[1]
+        tokens = tokens + self.positions[self.slots : self.slots + size]
+        x = torch.cat([tokens, condition + self.positions[:slots]], 1)  # (B, n + S, w)
+        readable = torch.cat([valid, visible], 1)  # (B, n + S)
+        longest = int(readable.sum(1).max()) if trim else size + slots
+        order = torch.argsort(~readable, dim=1, stable=True)  # readable first, else in place
+        length = pad_length(max(longest, size))
+        order = order[:, torch.arange(length, device=order.device).clamp(max=size + slots - 1)]  # (B, Q)
+        readable = readable.gather(1, order)
+        readable[:, size + slots :] = False
         rows = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))
-        return self.transformer(rows, visible)
+        return self.transformer(rows, readable)[:, :size]
 
 
 class TokenHead(nn.Module):
@@ -209,13 +215,12 @@ class MaskedTransformer(nn.Module):
         self.head = TokenHead(config.masked.width, codes, tied=config.compact)
         initialize(self)
 
-    def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
+    def forward(
+        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, *, trim: bool = True
+    ) -> Tensor:
         """Logits (B, n, K) of tokens (B, n) in 0 … K (K = [MASK]; any value where not `valid`)."""
         embedded = self.embedding(tokens.masked_fill(~valid, self.mask_token))
-        return self.logits(self.sequence(embedded, valid, condition, visible))
-
-    def logits(self, hidden: Tensor) -> Tensor:
-        """(B, n, w) -> (B, n, K) float32."""
+        hidden = self.sequence(embedded, valid, condition, visible, trim=trim)
         return self.head(hidden, self.embedding.weight[:-1] if self.compact else None)
 
 
@@ -286,7 +291,7 @@ class ResidualTransformer(nn.Module):
         token = self.text(self.normalizer.sentence(features))
         return token if dropped is None else torch.where(dropped[:, None], self.null.to(token.dtype), token)
 
-    def forward(self, total: Tensor, valid: Tensor, level: Tensor, sentence: Tensor) -> Tensor:
+    def forward(self, total: Tensor, valid: Tensor, level: Tensor, sentence: Tensor, *, trim: bool = True) -> Tensor:
         """Logits (B, n, K) of level `level` (B,) in 1 … V - 1.
 
         Args:
@@ -296,17 +301,12 @@ class ResidualTransformer(nn.Module):
             sentence: (B, w) from `sentence`.
         """
         x = self.enter(total) if self.compact else total
-        condition = self.conditions(level, sentence)
+        condition = torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)  # (B, 2, w)
         visible = torch.ones(condition.shape[:2], dtype=torch.bool, device=valid.device)
-        return self.logits(self.sequence(x, valid, condition, visible), level)
+        return self._logits(self.sequence(x, valid, condition, visible, trim=trim), level - 1)
 
-    def conditions(self, level: Tensor, sentence: Tensor) -> Tensor:
-        """The two slots (B, 2, w): level token and text token."""
-        return torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)
-
-    def logits(self, hidden: Tensor, level: Tensor) -> Tensor:
+    def _logits(self, hidden: Tensor, index: Tensor) -> Tensor:
         """(B, n, w) -> (B, n, K) float32, with the codes of each sample's own level (B,)."""
-        index = level - 1
         if not self.compact:
             hidden = self.norm(F.gelu(self.dense(hidden)))
             return (

@@ -14,8 +14,9 @@ from workers.hgm3.joints import world_joints
 from workers.hgm3.tokenizer import Tokenizer, biased_std, frame_mask, tokenizer_loss
 from workers.training.loop import StepContext
 
-DIVERSE_SHARE = 0.5
-"""Share of windows drawn from the smaller of two or more data sets: its clips are few and diverse."""
+SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
+"""Share of the windows drawn from a data set; others divide what is left. The first has 6 % of the clips, each of
+another content or style, and three times the error of the second when clips are drawn evenly."""
 
 
 class TokenizerStage:
@@ -76,16 +77,15 @@ class TokenizerStage:
 
 
 def tokenizer_weights(clips: Sequence[Clip]) -> np.ndarray:
-    """Sampling weights (sum 1): longer clips more often (so that frames are equally likely), rare contents and the
-    smallest data set raised."""
+    """Sampling weights (sum 1): longer clips more often, rare contents raised, data sets by their `SHARES`."""
     weights = content_style_weights(clips) * np.array([c.length for c in clips], dtype=np.float64) ** 0.5
-    names = sorted({c.dataset for c in clips})
-    if len(names) > 1:
-        counts = {n: sum(c.dataset == n for c in clips) for n in names}
-        diverse = min(names, key=lambda n: counts[n])
-        small = np.array([c.dataset == diverse for c in clips])
-        weights[small] *= DIVERSE_SHARE / weights[small].sum()
-        weights[~small] *= (1 - DIVERSE_SHARE) / weights[~small].sum()
+    names = [c.dataset for c in clips]
+    for name in sorted(set(names)):
+        rows = np.array([n == name for n in names])
+        named = sum(SHARES.get(n, 0.0) for n in set(names))
+        others = sum(n not in SHARES for n in set(names))
+        share = SHARES.get(name, (1 - named) / max(others, 1))
+        weights[rows] *= share / weights[rows].sum()
     return weights / weights.sum()
 
 

@@ -133,6 +133,8 @@ def start_process_group() -> None:
 def train(stage: Stage, options: RunOptions, config: dict[str, Any]) -> dict[str, float]:
     """Train `stage` until the budget is used; returns its last validation metrics.
 
+    Afterwards the module carries the averaged weights.
+
     `folder/checkpoint` holds the state to resume from; `folder/tensorboard` the curves.
 
     Raises:
@@ -195,6 +197,8 @@ class _Run:
                     self._save()
         if writer:
             writer.close()
+        self.average.assign()
+        self.stage.module.eval()
         return self.metrics
 
     def _one_step(self) -> dict[str, float]:

@@ -1,0 +1,53 @@
+"""What a finished stage leaves for the bundle: weights (the average), configuration, metrics and the data's hash."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from shared.errors import InvalidFile, NotFound
+
+
+@dataclass(frozen=True)
+class Part:
+    """A trained part of a bundle."""
+
+    state: dict[str, Tensor]
+    config: dict[str, Any]
+    metrics: dict[str, float]
+    data_sha256: str
+
+
+def save_part(
+    folder: Path, state: Mapping[str, Tensor], config: dict[str, Any], metrics: Mapping[str, float], data_sha256: str
+) -> None:
+    """Write `weights.safetensors` and `part.json` (last: a part without it is unfinished)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "part.json").unlink(missing_ok=True)
+    save_file({k: v.detach().cpu().contiguous().clone() for k, v in state.items()}, folder / "weights.safetensors")
+    values = {"config": config, "metrics": dict(metrics), "data_sha256": data_sha256}
+    (folder / "part.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
+
+
+def load_part(folder: Path) -> Part:
+    """Read a finished part.
+
+    Raises:
+        NotFound: the stage has not finished.
+        InvalidFile: damaged.
+    """
+    if not (folder / "part.json").is_file():
+        raise NotFound("this stage has not finished", where=str(folder.parent), hint="Train it first, or resume it.")
+    try:
+        values = json.loads((folder / "part.json").read_text(encoding="utf-8"))
+        state = load_file(folder / "weights.safetensors")
+        return Part(state, values["config"], values["metrics"], values["data_sha256"])
+    except (json.JSONDecodeError, KeyError, SafetensorError, FileNotFoundError) as error:
+        raise InvalidFile(f"is no trained part: {error}", where=str(folder)) from error
