@@ -1,0 +1,28 @@
+"""Clips to open in other programs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared.motion.clip import MotionClip
+from shared.motion.rotations import from_rotvec
+from shared.motion.skeleton import KIT, SNAPMOGEN, Skeleton
+from tests.support.walker import walker
+
+
+def tumbling(skeleton: Skeleton, fps: float) -> MotionClip:
+    """Every joint turns any way, past the gimbal lock and through whole turns: no pose a body can take."""
+    random = np.random.default_rng(5)
+    time = np.arange(40)[:, None, None] / 20
+    vectors = random.normal(0, 2.5, (1, len(skeleton), 3)) * np.sin(time * random.uniform(1, 4, (1, len(skeleton), 3)))
+    root = random.normal(0, 1, (40, 3)).cumsum(axis=0)
+    return MotionClip.of(skeleton, from_rotvec(vectors), root, np.zeros((40, 4), bool), fps)
+
+
+CLIPS = {
+    "a walk": walker(turn=0.7),
+    "a walk at 23.976 fps": walker(fps=24000 / 1001),
+    "a walk at 120 fps": walker(seconds=1, fps=120, turn=-1.5),
+    "tumbling KIT joints": tumbling(KIT, 12.5),
+    "tumbling SnapMoGen joints": tumbling(SNAPMOGEN, 30),
+}
