@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from shared.errors import InvalidInput, TooLarge
 from shared.text.prompts import check_prompt
@@ -31,10 +31,12 @@ COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
 FIELDS = (*COLUMNS, "settings")
 SETTINGS = {
     "steps": (1, 100),
-    "guidance": (0.0, 20.0),
-    "temperature": (0.0, 5.0),
-    "top_k": (0.0, 1.0),
-    "residual_guidance": (0.0, 20.0),
+    "guidance": (0.0, 100.0),
+    "temperature": (0.0, 100.0),
+    "top_k": (0.001, 1.0),
+    "residual_guidance": (0.0, 100.0),
+    "residual_temperature": (0.0, 100.0),
+    "residual_top_k": (0.001, 1.0),
 }
 """Sampling settings an item may set, each with its range. One with whole bounds is whole."""
 
@@ -63,7 +65,8 @@ class Item:
     def as_json(self) -> dict[str, Any]:
         """The item as a line of a request body: only what was given."""
         fields = {name: getattr(self, name) for name in FIELDS}
-        return {name: list(v) if isinstance(v, tuple) else v for name, v in fields.items() if v not in (None, (), {})}
+        fields["tags"] = list(self.tags)
+        return {name: value for name, value in fields.items() if value not in (None, [], {})}
 
 
 @dataclass(frozen=True)
@@ -129,20 +132,21 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
         return None, [Problem(line, None, raw.message)]
     if not isinstance(raw, Mapping):
         return None, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
+    given = cast("Mapping[object, object]", raw)
     problems = [
         Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {', '.join(FIELDS)}")
-        for name in raw
+        for name in given
         if name not in FIELDS
     ]
     values: dict[str, Any] = {}
     for name, check in _CHECKS.items():
-        if raw.get(name) is None:
+        if given.get(name) is None:
             continue
         try:
-            values[name] = check(raw[name])
+            values[name] = check(given[name])
         except InvalidInput as error:
             problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
-    if raw.get("prompt") is None:
+    if given.get("prompt") is None:
         problems.append(Problem(line, "prompt", "is missing: say what the person does"))
     seed, variants = values.get("seed"), values.get("variants", 1)
     if seed is not None and seed + variants - 1 > MAX_SEED:
@@ -225,9 +229,10 @@ def _model(value: object) -> str:
 def _tags(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise InvalidInput('is not a list of words: write ["walk", "take 2"]')
-    if len(value) > MAX_TAGS:
-        raise InvalidInput(f"{len(value)} tags are over the limit of {MAX_TAGS}")
-    tags = tuple(_text(tag) for tag in value)
+    given = cast("Sequence[object]", value)
+    if len(given) > MAX_TAGS:
+        raise InvalidInput(f"{len(given)} tags are over the limit of {MAX_TAGS}")
+    tags = tuple(_text(tag) for tag in given)
     for tag in tags:
         if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not tag.isprintable():
             raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
@@ -238,8 +243,8 @@ def _settings(value: object) -> dict[str, float]:
     if not isinstance(value, Mapping):
         raise InvalidInput('is not an object: write {"guidance": 4.5}')
     checked: dict[str, float] = {}
-    for name, given in value.items():
-        if name not in SETTINGS:
+    for name, given in cast("Mapping[object, object]", value).items():
+        if not isinstance(name, str) or name not in SETTINGS:
             raise InvalidInput(f"{str(name)[:60]!r} is not a setting; known are {', '.join(SETTINGS)}")
         low, high = SETTINGS[name]
         try:
@@ -286,12 +291,19 @@ def _whole(value: object, low: int, high: int) -> int:
 def _kind(value: object) -> str:
     if isinstance(value, str):
         return repr(value[:40])
-    kinds = {bool: "true or false", list: "a list", dict: "an object", type(None): "null"}
-    return kinds.get(type(value), repr(value)[:40])
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, list):
+        return "a list"
+    return "an object" if isinstance(value, dict) else ascii(value)[:40]
 
 
-_CHECKS = {
-    "prompt": lambda value: check_prompt(_text(value)),
+def _prompt(value: object) -> str:
+    return check_prompt(_text(value))
+
+
+_CHECKS: dict[str, Callable[[object], object]] = {
+    "prompt": _prompt,
     "name": _name,
     "seconds": _seconds,
     "seed": _seed,

@@ -1,0 +1,1 @@
+"""The HTTP API. One folder a noun: routes, schemas, service."""

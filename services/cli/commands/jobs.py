@@ -105,13 +105,11 @@ def cancel(jobs: Jobs, as_json: console.Json = False) -> None:
 @app.command()
 def retry(
     jobs: Jobs,
-    cancelled: Annotated[
-        bool, typer.Option("--cancelled", help="Cancelled items too, not failed and dead alone.")
-    ] = False,
+    failed_only: Annotated[bool, typer.Option("--failed-only", help="Leave cancelled items as they are.")] = False,
     as_json: console.Json = False,
 ) -> None:
-    """Try failed and dead items again."""
-    _act(jobs, "retry", as_json, states=["failed", "dead", "cancelled"] if cancelled else None)
+    """Try failed, dead and cancelled items again."""
+    _act(jobs, "retry", as_json, failed_only=failed_only or None)
 
 
 @app.command()

@@ -83,7 +83,7 @@ def read_prompts(prompts: list[str] | None, file: str | None, input_format: opti
     return rows.items_from_prompts(prompts)
 
 
-def _follow(client, job: str, folder: Path | None, formats, timeout: float | None, as_json: bool) -> None:  # noqa: ANN001
+def _follow(client, job: str, folder: Path | None, formats, timeout: float | None, as_json: bool) -> None:
     from services.cli.commands.fetch import write_job
     from services.cli.watching import check_ended, watch_job
 

@@ -1,0 +1,129 @@
+"""The application, and the process that serves it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import AsyncIterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from fastapi.routing import APIRoute
+
+from services.api import problems
+from services.api.catalogue import Catalogue
+from services.api.context import Context
+from services.api.guards import BodyGuard, HostGuard
+from services.api.health.metrics import Measure
+from services.api.health.routes import router as health_router
+from services.api.jobs.routes import SCHEMAS
+from services.api.jobs.routes import router as jobs_router
+from services.api.models.routes import router as models_router
+from services.api.motions.routes import router as motions_router
+from services.api.tailer import Tailer
+from services.text.routes import router as texts_router
+from shared.errors import InvalidInput
+from shared.jobs import create_engine
+from shared.runtime.logs import configure_logging
+from shared.settings import Settings, settings
+from shared.storage import open_store
+
+CONNECTIONS = 10
+"""Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
+GRACE_SECONDS = 3
+"""For answers under way at SIGTERM; event streams end at once."""
+DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."
+
+
+def create_app(config: Settings) -> FastAPI:
+    """The application; connects to nothing before it starts."""
+    app = FastAPI(
+        title="Marey",
+        version=version("marey"),
+        description=DESCRIPTION,
+        lifespan=lambda app: _lifespan(app, config),
+        generate_unique_id_function=_operation_id,
+        docs_url=None,
+        redoc_url=None,
+    )
+    problems.install(app)
+    for router in (health_router, jobs_router, motions_router, models_router, texts_router):
+        app.include_router(router)
+    app.add_middleware(BodyGuard)
+    app.add_middleware(HostGuard, allowed=config.allowed_hosts)
+    app.add_middleware(Measure)
+    app.openapi = lambda: openapi(app)
+    return app
+
+
+@contextlib.asynccontextmanager
+async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
+    if config.database_url is None:
+        raise InvalidInput(
+            "the API needs a database",
+            where="MAREY_DATABASE_URL",
+            hint="Set it, or use `marey serve`, which brings one.",
+        )
+    url = config.database_url.get_secret_value()
+    engine = create_engine(url, pool_size=CONNECTIONS, max_overflow=CONNECTIONS)
+    tailer = Tailer(engine, url)
+    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer)
+    tailer.start()
+    try:
+        yield
+    finally:
+        tailer.stop()
+        engine.dispose()
+
+
+def openapi(app: FastAPI) -> dict[str, Any]:
+    """The OpenAPI 3.1 document, with the bodies that are read by hand; `docs/openapi.json` is a copy of it."""
+    if app.openapi_schema:
+        return app.openapi_schema
+    document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+    schemas = document["components"]["schemas"]
+    for model in (*SCHEMAS, problems.ProblemBody):
+        schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas.update(schema.pop("$defs", {}))
+        schemas[model.__name__] = schema
+    _answer_problems(document)
+    app.openapi_schema = document
+    return document
+
+
+def _answer_problems(document: dict[str, Any]) -> None:
+    """FastAPI documents its own 422; ours is a problem like the others."""
+    for path in document["paths"].values():
+        for operation in path.values():
+            operation["responses"].pop("422", None)
+    for name in ("HTTPValidationError", "ValidationError"):
+        document["components"]["schemas"].pop(name, None)
+
+
+def _operation_id(route: APIRoute) -> str:
+    return route.name
+
+
+def write_openapi(path: Path) -> None:
+    """Write the document that is checked in."""
+    document = openapi(create_app(Settings()))
+    path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def serve() -> None:
+    """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
+    config = settings()
+    configure_logging("api", level=config.log_level, json=config.log_json)
+    uvicorn.run(
+        create_app(config),
+        host=config.host,
+        port=config.port,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=GRACE_SECONDS,
+    )

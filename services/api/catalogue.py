@@ -1,0 +1,85 @@
+"""Which exact bundle a request means, and what that bundle allows."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+
+from shared.bundles import Bundle, TextSpec, choose_bundle, list_bundles
+from shared.errors import InvalidBundle, InvalidInput
+from shared.settings import Settings
+from shared.text.keys import resolve
+
+FRESH_SECONDS = 5.0
+"""A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""
+DEFAULT_MODEL = "hgm3"
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A bundle that items can be made with."""
+
+    bundle: Bundle
+    text: TextSpec
+    """With every hash filled in."""
+    min_seconds: float
+    max_seconds: float
+
+    def check_seconds(self, seconds: float | None) -> None:
+        """Raises:
+        InvalidInput: the model cannot make a motion of that length.
+        """
+        if seconds is not None and not self.min_seconds <= seconds <= self.max_seconds:
+            raise InvalidInput(
+                f"{seconds:g} is outside {self.min_seconds:g} to {self.max_seconds:g} seconds, "
+                f"the range of {self.bundle.manifest.name}"
+            )
+
+
+class Catalogue:
+    """Offers by the name they were asked for, remembered for a few seconds. Safe in threads."""
+
+    def __init__(self, config: Settings) -> None:
+        self._config = config
+        self._offers: dict[str, tuple[float, Offer]] = {}
+        self._lock = threading.Lock()
+
+    def offer(self, name: str | None) -> Offer:
+        """The offer for a model (`hgm3`), a bundle or an exact bundle; None = the default model.
+
+        Raises:
+            NotFound, InvalidBundle, Refused: as `choose_bundle`.
+        """
+        wanted = name or DEFAULT_MODEL
+        with self._lock:
+            made, offer = self._offers.get(wanted, (0.0, None))
+            if offer is None or time.monotonic() - made > FRESH_SECONDS:
+                offer = offer_of(choose_bundle(wanted, config=self._config, verify=False), self._config)
+                self._offers[wanted] = (time.monotonic(), offer)
+        return offer
+
+
+def offers(config: Settings) -> list[Offer]:
+    """Every generator's bundle of this machine, by name."""
+    return [offer_of(bundle, config) for bundle in list_bundles(config=config, kind="generator")]
+
+
+def offer_of(bundle: Bundle, config: Settings) -> Offer:
+    """What a generator's bundle allows.
+
+    Raises:
+        InvalidBundle: it is no generator.
+    """
+    manifest = bundle.manifest
+    if manifest.kind != "generator" or manifest.text is None or not manifest.fps:
+        raise InvalidBundle(
+            f"{manifest.name!r} is a {manifest.kind}, not a text-to-motion generator", where=str(bundle.path)
+        )
+    frames = manifest.parameters
+    return Offer(
+        bundle,
+        resolve(manifest.text, config=config),
+        float(frames["min_frames"]) / manifest.fps,
+        float(frames["max_frames"]) / manifest.fps,
+    )

@@ -1,0 +1,46 @@
+"""What the routes share: one engine, one store, one bundle catalogue and one tailer a process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import sqlalchemy as sa
+from fastapi import Depends, Request
+
+from services.api.catalogue import Catalogue
+from services.api.tailer import Tailer
+from shared.jobs import transaction
+from shared.settings import Settings
+from shared.storage import AssetStore
+
+
+@dataclass
+class Context:
+    """Made at start-up, closed at shutdown."""
+
+    config: Settings
+    engine: sa.Engine
+    store: AssetStore
+    catalogue: Catalogue
+    tailer: Tailer
+    seen_ready: bool = False
+    """A worker has had its model loaded: from then on `/readyz` no longer asks for one."""
+
+
+def context(request: Request) -> Context:
+    """The context of this process."""
+    return request.app.state.context
+
+
+Shared = Annotated[Context, Depends(context)]
+
+
+def connection(shared: Shared) -> Iterator[sa.Connection]:
+    """A transaction that lasts as long as the route's function, and commits before the answer is sent."""
+    with transaction(shared.engine) as conn:
+        yield conn
+
+
+Connection = Annotated[sa.Connection, Depends(connection, scope="function")]

@@ -1,0 +1,112 @@
+"""ASGI middleware: which Host is answered, and how large a body may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from services.api.problems import problem_response
+from shared.errors import InvalidInput, MareyError, Refused, TooLarge
+from shared.items import MAX_BODY_BYTES
+
+MAX_OTHER_BODY = 2**20
+"""Bytes of any body but that of a submit."""
+SUBMIT_PATH = "/v1/jobs"
+
+
+class HostGuard:
+    """Answers only requests for hosts it is known by: a web page that rebinds its name to this port gets nothing."""
+
+    def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
+        self.app = app
+        self.allowed = frozenset(host.lower() for host in allowed)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, or refuse."""
+        if scope["type"] != "http" or "*" in self.allowed:
+            await self.app(scope, receive, send)
+            return
+        host = _without_port(Headers(scope=scope).get("host", "")).lower()
+        if host in self.allowed:
+            await self.app(scope, receive, send)
+            return
+        error = Refused(
+            "this server does not answer for that host",
+            where=host[:100],
+            hint="MAREY_ALLOWED_HOSTS names those it does.",
+        )
+        await _refuse(error, scope, receive, send)
+
+
+class BodyGuard:
+    """Reads bodies up to their limit before a route sees them; larger ones are refused. A submit reads its own."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on with the whole body, or refuse."""
+        if scope["type"] != "http" or _is_submit(scope):
+            await self.app(scope, receive, send)
+            return
+        try:
+            body = await read_body(Request(scope, receive), MAX_OTHER_BODY)
+        except MareyError as error:
+            await _refuse(error, scope, receive, send)
+            return
+        sent = False
+
+        async def replay() -> Message:
+            nonlocal sent
+            if sent:
+                return await receive()
+            sent = True
+            return {"type": "http.request", "body": body, "more_body": False}
+
+        await self.app(scope, replay, send)
+
+
+async def read_body(request: Request, limit: int) -> bytes:
+    """The body of a request.
+
+    Raises:
+        TooLarge: over `limit` bytes; it is not read further.
+        InvalidInput: the length it declares is not a number.
+    """
+    declared = request.headers.get("content-length", "0")
+    if not declared.isdecimal():
+        raise InvalidInput("is not a number", where="Content-Length")
+    if int(declared) > limit:
+        raise _too_large(limit)
+    parts: list[bytes] = []
+    size = 0
+    async for part in request.stream():
+        size += len(part)
+        if size > limit:
+            raise _too_large(limit)
+        parts.append(part)
+    return b"".join(parts)
+
+
+def limit_of_submit() -> int:
+    """Bytes of a submit's body."""
+    return MAX_BODY_BYTES
+
+
+def _is_submit(scope: Scope) -> bool:
+    return scope["method"] == "POST" and scope["path"] == SUBMIT_PATH
+
+
+def _without_port(host: str) -> str:
+    return host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
+
+
+def _too_large(limit: int) -> TooLarge:
+    return TooLarge(f"the body is over {limit / 2**20:g} MiB", where="body", hint="Send it in several requests.")
+
+
+async def _refuse(error: MareyError, scope: Scope, receive: Receive, send: Send) -> None:
+    await problem_response(error)(scope, receive, send)

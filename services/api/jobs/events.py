@@ -1,0 +1,62 @@
+"""Events of a job as JSON pages, or as a stream of server-sent events."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator
+from uuid import UUID
+
+from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+
+from services.api.jobs.schemas import EventView, JobView
+from services.api.tailer import Batch, Tailer
+from shared.errors import InvalidInput
+from shared.jobs.states import ENDED
+
+PING_SECONDS = 15.0
+RETRY_MILLISECONDS = 1000
+MAX_SEQ = 2**63 - 1
+
+
+def last_event_id(header: str | None, after: int) -> int:
+    """Where the client stands: `Last-Event-ID`, else the query's `after`.
+
+    Raises:
+        InvalidInput: the header is not a number.
+    """
+    if not header:
+        return after
+    if not header.isascii() or not header.isdecimal() or int(header[:20]) > MAX_SEQ:
+        raise InvalidInput(f"{header[:40]!r} is not the id of an event", where="Last-Event-ID")
+    return int(header)
+
+
+async def stream_events(tailer: Tailer, tenant: str, job: UUID, seq: int) -> AsyncIterator[bytes]:
+    """The events after `seq` as they happen, until the job has ended or is deleted."""
+    yield format_sse_event(retry=RETRY_MILLISECONDS)
+    async with tailer.follow(tenant, job, seq) as subscription:
+        while True:
+            try:
+                batch = await asyncio.wait_for(subscription.queue.get(), PING_SECONDS)
+            except TimeoutError:
+                yield KEEPALIVE_COMMENT
+                continue
+            if batch is None:
+                return
+            for message in messages(batch):
+                yield message
+            if batch[1].state in ENDED:
+                return
+
+
+def messages(batch: Batch) -> list[bytes]:
+    """The events of a batch; the last one carries the job as it stands now."""
+    events, row = batch
+    encoded: list[bytes] = []
+    for event in events:
+        body = EventView.of(event).model_dump(mode="json")
+        if event is events[-1]:
+            body["job"] = JobView.of(row).model_dump(mode="json")
+        encoded.append(format_sse_event(data_str=json.dumps(body), event=event.kind, id=str(event.seq)))
+    return encoded

@@ -1,0 +1,248 @@
+"""`/v1/jobs`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+from uuid import UUID
+
+from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import JSONResponse
+from fastapi.sse import EventSourceResponse
+
+from services.api.auth import Operator, Reader, Submitter
+from services.api.context import Connection, Context, Shared
+from services.api.guards import limit_of_submit, read_body
+from services.api.jobs import service
+from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
+from services.api.jobs.schemas import (
+    CheckedView,
+    EventsView,
+    EventView,
+    ItemView,
+    JobPatch,
+    JobView,
+    NewItemBody,
+    NewJobBody,
+)
+from services.api.motions.schemas import MotionView
+from services.api.problems import RESPONSES
+from services.api.schemas import Cursor, Limit, PageView
+from shared import jobs
+from shared.errors import InvalidInput
+from shared.jobs.states import ENDED
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
+
+NDJSON = "application/x-ndjson"
+JSON = "application/json"
+SSE = "text/event-stream"
+
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[\x21-\x7e]+$",
+        description="The same key and body within 24 hours give the same job; another body is refused.",
+    ),
+]
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=JobView,
+    responses={200: {"model": CheckedView, "description": "`validate_only`: nothing was written"}},
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                JSON: {"schema": {"$ref": "#/components/schemas/NewJobBody"}},
+                NDJSON: {"schema": {"$ref": "#/components/schemas/NewItemBody"}},
+            },
+        }
+    },
+)
+async def submit_job(
+    request: Request,
+    shared: Shared,
+    key: Submitter,
+    name: Annotated[str | None, Query(max_length=200)] = None,
+    comment: Annotated[str | None, Query(max_length=2000)] = None,
+    priority: Annotated[int, Query(ge=-1000, le=1000)] = 0,
+    fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
+    validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,
+    idempotency_key: IdempotencyKey = None,
+) -> Response:
+    """Submit prompts: a JSON object with `items`, or NDJSON with one item a line (at most 100,000, 64 MiB).
+
+    For NDJSON, what concerns the job as a whole stands in the query. All problems of all lines are told at once, and
+    then nothing is written.
+    """
+    body = await read_body(request, limit_of_submit())
+    kind = request.headers.get("content-type", JSON).partition(";")[0].strip().lower()
+    fields = {"name": name, "comment": comment, "priority": priority, "fail_early": fail_early}
+    submission = await run_in_threadpool(_read, kind, body, fields, shared)
+    if validate_only:
+        checked = CheckedView(valid=True, items=submission.count, bundles=submission.bundles)
+        return JSONResponse(checked.model_dump(mode="json"))
+    sha256 = service.request_sha256(str(request.url.query), body)
+    return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
+
+
+def _read(kind: str, body: bytes, fields: dict[str, Any], shared: Context) -> service.Submission:
+    if kind == NDJSON:
+        return service.read_ndjson(body, service.job_fields(fields), shared.catalogue)
+    if kind == JSON:
+        return service.read_document(body, shared.catalogue)
+    raise InvalidInput(
+        f"{kind[:60]!r} is not a kind of body this takes", where="Content-Type", hint=f"{JSON} or {NDJSON}."
+    )
+
+
+def _write(
+    shared: Context, key: jobs.ApiKey, submission: service.Submission, idempotency_key: str | None, sha256: str
+) -> JSONResponse:
+    new = jobs.NewJob(
+        items=submission.new_items(),
+        tenant=key.tenant,
+        idempotency_key=idempotency_key,
+        body_sha256=sha256 if idempotency_key else None,
+        **submission.fields.model_dump(),
+    )
+    with jobs.transaction(shared.engine) as conn:
+        submitted = jobs.submit(conn, new)
+        row = jobs.get_job(conn, key.tenant, submitted.id)
+    headers = {"Location": f"/v1/jobs/{submitted.id}"}
+    if submitted.replayed:
+        headers["Idempotency-Replayed"] = "true"
+    return JSONResponse(JobView.of(row).model_dump(mode="json"), 202, headers=headers)
+
+
+@router.get("")
+def list_jobs(
+    conn: Connection,
+    key: Reader,
+    state: Annotated[list[jobs.JobState] | None, Query()] = None,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> PageView[JobView]:
+    """Jobs, newest first."""
+    page = jobs.list_jobs(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
+    return PageView[JobView](items=[JobView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{job}")
+def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
+    """One job."""
+    return JobView.of(jobs.get_job(conn, key.tenant, job))
+
+
+@router.patch("/{job}")
+def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator) -> JobView:
+    """Change the priority or the comment."""
+    row = jobs.get_job(conn, key.tenant, job)
+    if patch.priority is not None:
+        row = jobs.set_priority(conn, key.tenant, job, patch.priority)
+    if "comment" in patch.model_fields_set:
+        row = jobs.set_comment(conn, key.tenant, job, patch.comment)
+    return JobView.of(row)
+
+
+@router.delete("/{job}", status_code=204, response_class=Response)
+def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
+    """Delete a job that has ended, with its motions."""
+    jobs.delete(conn, key.tenant, job)
+
+
+@router.post("/{job}/pause")
+def pause_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+    """Give out no more items; those being made are finished."""
+    return JobView.of(jobs.pause(conn, key.tenant, job))
+
+
+@router.post("/{job}/resume")
+def resume_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+    """Go on with a paused job."""
+    return JobView.of(jobs.resume(conn, key.tenant, job))
+
+
+@router.post("/{job}/cancel")
+def cancel_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+    """Cancel what is not done yet."""
+    return JobView.of(jobs.cancel(conn, key.tenant, job))
+
+
+@router.post("/{job}/retry")
+def retry_job(
+    job: UUID,
+    conn: Connection,
+    key: Operator,
+    failed_only: Annotated[bool, Query(description="Leave cancelled items as they are.")] = False,
+) -> JobView:
+    """Try failed, dead and cancelled items again."""
+    return JobView.of(jobs.retry(conn, key.tenant, job, failed_only=failed_only))
+
+
+@router.get("/{job}/items")
+def list_items(
+    job: UUID,
+    conn: Connection,
+    key: Reader,
+    state: Annotated[list[jobs.ItemState] | None, Query()] = None,
+    cursor: Cursor = None,
+    limit: Limit = 100,
+) -> PageView[ItemView]:
+    """Items with their motions, in input order, variants within prompt."""
+    page = jobs.list_items(conn, key.tenant, job, states=state or (), cursor=cursor, limit=limit)
+    return PageView[ItemView](items=[ItemView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{job}/motions")
+def list_job_motions(
+    job: UUID, conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 100
+) -> PageView[MotionView]:
+    """Motions of a job, in the order they were made."""
+    page = jobs.list_motions(conn, key.tenant, job=job, cursor=cursor, limit=limit)
+    return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get(
+    "/{job}/events",
+    response_model=EventsView,
+    responses={
+        200: {"content": {SSE: {"schema": {"type": "string"}}}, "description": "Events, as a page or as a stream"},
+        204: {"description": "The job has ended and every event was sent: do not come back"},
+    },
+)
+def list_events(
+    job: UUID,
+    request: Request,
+    shared: Shared,
+    conn: Connection,
+    key: Reader,
+    after: Annotated[int, Query(ge=0, le=MAX_SEQ, description="Events with a greater `seq`.")] = 0,
+    limit: Limit = 500,
+    last: Annotated[str | None, Header(alias="Last-Event-ID", description="Wins over `after`; for streams.")] = None,
+) -> Response:
+    """Events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
+
+    A stream sends at most two progress messages a second, and ends when the job has.
+    """
+    row = jobs.get_job(conn, key.tenant, job)
+    if SSE not in request.headers.get("accept", ""):
+        events = jobs.events_after(conn, key.tenant, job, after, limit)
+        following = events[-1].seq if len(events) == limit else None
+        page = EventsView(items=[EventView.of(event) for event in events], next=following)
+        return JSONResponse(page.model_dump(mode="json"))
+    seq = last_event_id(last, after)
+    if row.state in ENDED and seq >= row.event_seq:
+        return Response(status_code=204)
+    headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+    return EventSourceResponse(stream_events(shared.tailer, key.tenant, job, seq), headers=headers)
+
+
+SCHEMAS = (NewJobBody, NewItemBody)
+"""Bodies that are read by hand, for the OpenAPI document."""

@@ -1,0 +1,180 @@
+"""What the routes of jobs take and give."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.motions.schemas import MotionView
+from services.api.schemas import View
+from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from shared.jobs import EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
+
+MAX_NAME, MAX_COMMENT, MAX_PRIORITY = 200, 2000, 1000
+
+
+class NewItemBody(BaseModel):
+    """One prompt. For the documentation: `shared.items.read_item` is what checks it, and says more."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    prompt: str = Field(min_length=1, description="What the person does, in English, at most 200 words.")
+    name: str | None = Field(None, description="File name of the motion, without its ending.")
+    seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
+    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Of variant 0; variant k uses seed + k.")
+    variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
+    model: str | None = Field(None, description="Model, bundle or exact bundle.")
+    tags: list[str] | None = Field(None, max_length=MAX_TAGS)
+    settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
+
+
+class JobFields(BaseModel):
+    """What concerns the job as a whole."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=r"^[^\x00-\x1f]*$")
+    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+    priority: int = Field(0, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
+    fail_early: float | None = Field(
+        None, ge=0, le=1, description="Share of failed items above which the rest is cancelled."
+    )
+
+
+class NewJobBody(JobFields):
+    """A job as JSON."""
+
+    items: list[NewItemBody] = Field(min_length=1, max_length=MAX_ITEMS)
+
+
+class JobPatch(BaseModel):
+    """Changes to a job; what is not given stays."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    priority: int | None = Field(None, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
+    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+
+
+class CheckedView(View):
+    """The answer to `validate_only`."""
+
+    valid: bool
+    items: int
+    """Motions that would be made."""
+    bundles: list[str]
+
+
+class CountersView(View):
+    """How many items are in each state."""
+
+    ready: int
+    leased: int
+    succeeded: int
+    failed: int
+    dead: int
+    cancelled: int
+
+
+class JobView(View):
+    """A job."""
+
+    id: UUID
+    name: str | None
+    comment: str | None
+    priority: int
+    control: JobControl
+    state: JobState
+    total: int
+    counters: CountersView
+    fail_early: float | None
+    event_seq: int
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+
+    @classmethod
+    def of(cls, row: JobRow) -> JobView:
+        """From a row."""
+        counters = CountersView(**{name: getattr(row, name) for name in CountersView.model_fields})
+        own = {name: getattr(row, name) for name in cls.model_fields if name != "counters"}
+        return cls(counters=counters, **own)
+
+
+class ErrorView(View):
+    """Why an item has no result."""
+
+    type: str
+    message: str
+    where: str | None
+    hint: str | None
+
+    @classmethod
+    def of(cls, problem: Problem) -> ErrorView:
+        """From a row's problem."""
+        return cls(type=problem.type, message=problem.message, where=problem.where, hint=problem.hint)
+
+
+class ItemView(View):
+    """An item, with its motion if it has one."""
+
+    id: UUID
+    job: UUID
+    position: int
+    index: int
+    variant: int
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    seed: int
+    seconds: float | None
+    settings: dict[str, Any]
+    tags: list[str]
+    stage: Stage
+    state: ItemState
+    attempts: int
+    reason: str | None
+    error: ErrorView | None
+    created: datetime
+    finished: datetime | None
+    motion: MotionView | None
+
+    @classmethod
+    def of(cls, row: ItemRow) -> ItemView:
+        """From a row."""
+        apart = {"settings", "tags", "error", "motion"}
+        return cls(
+            settings=dict(row.settings),
+            tags=list(row.tags),
+            error=None if row.problem is None else ErrorView.of(row.problem),
+            motion=None if row.motion is None else MotionView.of(row.motion),
+            **{name: getattr(row, name) for name in cls.model_fields if name not in apart},
+        )
+
+
+class EventView(View):
+    """One event of a job."""
+
+    job: UUID
+    seq: int
+    kind: str
+    item: UUID | None
+    reason: str
+    data: dict[str, Any]
+    at: datetime
+
+    @classmethod
+    def of(cls, row: EventRow) -> EventView:
+        """From a row."""
+        return cls(data=dict(row.data), **{n: getattr(row, n) for n in cls.model_fields if n != "data"})
+
+
+class EventsView(View):
+    """Events after a `seq`, in order."""
+
+    items: list[EventView]
+    next: int | None = Field(description="`after` of the next page; null when there is no more yet.")

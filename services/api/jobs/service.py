@@ -1,0 +1,154 @@
+"""What a submit does before the database sees it: read the body, fix bundles and seeds, hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from services.api.catalogue import Catalogue, Offer
+from services.api.jobs.schemas import JobFields
+from shared.errors import InvalidInput, MareyError, TooLarge
+from shared.items import MAX_ITEMS, MAX_SEED, InvalidItems, Item, Problem, read_items, read_json
+from shared.jobs import NewItem
+from shared.text.keys import feature_key
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A checked request body."""
+
+    fields: JobFields
+    items: list[Item]
+    offers: list[Offer]
+    """The exact bundle of each item."""
+
+    @property
+    def count(self) -> int:
+        """Motions to make."""
+        return sum(item.variants for item in self.items)
+
+    @property
+    def bundles(self) -> list[str]:
+        """Exact bundles, each once."""
+        return sorted({offer.bundle.reference for offer in self.offers})
+
+    def new_items(self) -> Iterator[NewItem]:
+        """One row a motion: prompt times variant, with the seed drawn where none was given."""
+        batch_keys: dict[tuple[str, str], str] = {}
+        for index, (item, offer) in enumerate(zip(self.items, self.offers, strict=True)):
+            reference = offer.bundle.reference
+            settings = json.dumps(dict(item.settings), sort_keys=True)
+            batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
+            seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+            for variant in range(item.variants):
+                yield NewItem(
+                    index=index,
+                    prompt=item.prompt,
+                    model=offer.bundle.manifest.model,
+                    bundle=reference,
+                    batch_key=batch_key,
+                    text_key=feature_key(item.prompt, offer.text),
+                    text_batch_key=_sha256(offer.text.model_dump_json()),
+                    seed=seed + variant,
+                    variant=variant,
+                    name=item.name,
+                    seconds=item.seconds,
+                    settings=dict(item.settings),
+                    tags=item.tags,
+                )
+
+
+def read_ndjson(body: bytes, fields: JobFields, catalogue: Catalogue) -> Submission:
+    """A job of one item a line; `fields` stood in the query.
+
+    Raises:
+        InvalidItems: with the problems of all lines.
+        TooLarge: more than 100,000 items.
+    """
+    lines = body.split(b"\n")
+    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    _check_length(len(filled))
+    return _checked(fields, ((number, read_json(line)) for number, line in filled), catalogue)
+
+
+def read_document(body: bytes, catalogue: Catalogue) -> Submission:
+    """A job as one JSON object with `items`.
+
+    Raises:
+        InvalidItems: with the problems of all items.
+        InvalidInput: the object itself is wrong.
+        TooLarge: more than 100,000 items.
+    """
+    try:
+        document = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
+    if not isinstance(document, dict):
+        raise InvalidInput("the body is not a JSON object", where="body", hint='Write {"items": [{"prompt": "…"}]}.')
+    raws = document.pop("items", None)
+    if not isinstance(raws, list) or not raws:
+        raise InvalidInput("is missing, empty or not a list", where="items", hint='Write {"items": [{"prompt": "…"}]}.')
+    _check_length(len(raws))
+    return _checked(job_fields(document), enumerate(raws, 1), catalogue)
+
+
+def _check_length(lines: int) -> None:
+    if lines > MAX_ITEMS:
+        raise TooLarge(f"{lines} items are over the limit of {MAX_ITEMS} a job", hint="Submit them as several jobs.")
+
+
+def _checked(fields: JobFields, raws: Iterator[tuple[int, object]], catalogue: Catalogue) -> Submission:
+    lines: list[int] = []
+
+    def remembered() -> Iterator[tuple[int, object]]:
+        for line, raw in raws:
+            lines.append(line)
+            yield line, raw
+
+    items = read_items(remembered())
+    offers: list[Offer] = []
+    problems: list[Problem] = []
+    for line, item in zip(lines, items, strict=True):
+        try:
+            offer = catalogue.offer(item.model)
+        except MareyError as error:
+            if error.status >= 500:
+                raise
+            problems.append(Problem(line, "model", f"{error.message}. {error.hint}" if error.hint else error.message))
+            continue
+        try:
+            offer.check_seconds(item.seconds)
+        except InvalidInput as error:
+            problems.append(Problem(line, "seconds", error.message))
+        offers.append(offer)
+    if problems:
+        raise InvalidItems(problems)
+    return Submission(fields, items, offers)
+
+
+def job_fields(values: Mapping[str, Any]) -> JobFields:
+    """What concerns the job as a whole.
+
+    Raises:
+        InvalidItems: with the problems of each field.
+    """
+    try:
+        return JobFields.model_validate(dict(values))
+    except ValidationError as error:
+        problems = [Problem(None, ".".join(map(str, e["loc"])) or "body", e["msg"]) for e in error.errors()]
+        raise InvalidItems(problems) from error
+
+
+def request_sha256(query: str, body: bytes) -> str:
+    """What makes two submits the same request."""
+    return hashlib.sha256(query.encode() + b"\n" + body).hexdigest()
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,1 @@
+"""Models: the bundles that items can be made with."""

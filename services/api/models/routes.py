@@ -1,0 +1,29 @@
+"""`/v1/models`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+
+from services.api.auth import Reader
+from services.api.catalogue import offers
+from services.api.context import Shared
+from services.api.models.schemas import ModelsView, ModelView
+from services.api.problems import RESPONSES
+
+router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
+
+
+@router.get("")
+def list_models(shared: Shared, key: Reader) -> ModelsView:
+    """Bundles that this server can make motions with."""
+    return ModelsView(items=[ModelView.of(offer) for offer in offers(shared.config)])
+
+
+@router.get("/{name}")
+def get_model(
+    name: Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,180}$")], shared: Shared, key: Reader
+) -> ModelView:
+    """The bundle that a model's or bundle's name means."""
+    return ModelView.of(shared.catalogue.offer(name))

@@ -1,0 +1,141 @@
+"""Every error as an RFC 9457 problem, with a stable `type`."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Any
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from shared.errors import InvalidInput, MareyError, NotFound, Unauthenticated, Unreachable
+from shared.items import InvalidItems
+
+TYPE_PREFIX = "urn:marey:problem:"
+MEDIA_TYPE = "application/problem+json"
+RETRY_AFTER = "2"
+"""Seconds: a database or store that restarts is back in about that."""
+
+log = structlog.get_logger(__name__)
+
+
+class FieldProblem(BaseModel):
+    """One thing wrong with a request."""
+
+    line: int | None = Field(default=None, description="Line of the body, from 1; for `items`, the element's number.")
+    field: str | None = Field(default=None, description="The field it is about.")
+    message: str
+
+
+class ProblemBody(BaseModel):
+    """RFC 9457."""
+
+    type: str = Field(description=f"Stable: `{TYPE_PREFIX}` and a name such as `invalid-input`.")
+    title: str
+    status: int
+    detail: str = Field(description="What was wrong.")
+    where: str | None = Field(default=None, description="What it is about.")
+    hint: str | None = Field(default=None, description="What to do about it.")
+    problems: list[FieldProblem] | None = Field(default=None, description="The first 1,000 of them.")
+    total: int | None = Field(default=None, description="How many there are in all.")
+
+
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    code: {"description": "Problem", "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemBody"}}}}
+    for code in ("4XX", "5XX")
+}
+"""What every route may answer besides its own."""
+
+
+def problem_response(error: MareyError) -> JSONResponse:
+    """The problem an expected error is told as."""
+    body = ProblemBody(
+        type=TYPE_PREFIX + error.problem_type,
+        title=error.problem_type.replace("-", " ").capitalize(),
+        status=error.status,
+        detail=_clean(error.message) or "",
+        where=_clean(error.where),
+        hint=_clean(error.hint),
+    )
+    if isinstance(error, InvalidItems):
+        body.total = error.total
+        body.problems = [
+            FieldProblem(line=p.line, field=_clean(p.field), message=_clean(p.message) or "") for p in error.problems
+        ]
+    headers: dict[str, str] = {}
+    if isinstance(error, Unauthenticated):
+        headers["WWW-Authenticate"] = 'Bearer realm="marey"'
+    if isinstance(error, Unreachable):
+        headers["Retry-After"] = RETRY_AFTER
+    return JSONResponse(
+        body.model_dump(mode="json", exclude_none=True), error.status, headers=headers, media_type=MEDIA_TYPE
+    )
+
+
+def install(app: FastAPI) -> None:
+    """Answer problems for our errors, for requests FastAPI refuses, and for bugs."""
+
+    @app.exception_handler(MareyError)
+    def _expected(_: Request, error: MareyError) -> JSONResponse:
+        if error.status >= 500:
+            log.warning("request_failed", error=str(error))
+        return problem_response(error)
+
+    @app.exception_handler(RequestValidationError)
+    def _invalid(_: Request, error: RequestValidationError) -> JSONResponse:
+        return _validation(error)
+
+    @app.exception_handler(HTTPException)
+    def _http(request: Request, error: HTTPException) -> JSONResponse:
+        return _of_status(request, error)
+
+    @app.exception_handler(Exception)
+    def _bug(_: Request, error: Exception) -> JSONResponse:
+        log.error("internal_error", exc_info=error)
+        return problem_response(MareyError("an internal error; the server's log has its traceback"))
+
+
+def _validation(error: RequestValidationError) -> JSONResponse:
+    problems = [
+        FieldProblem(field=_clean(_field(e["loc"])), message=_clean(str(e["msg"])) or "") for e in error.errors()
+    ]
+    names = ", ".join(dict.fromkeys(p.field or "body" for p in problems))
+    body = ProblemBody(
+        type=TYPE_PREFIX + InvalidInput.problem_type,
+        title="Invalid input",
+        status=InvalidInput.status,
+        detail="; ".join(f"{p.field or 'body'}: {p.message}" for p in problems[:5]),
+        where=names,
+        problems=problems[:1000],
+        total=len(problems),
+    )
+    return JSONResponse(body.model_dump(mode="json", exclude_none=True), InvalidInput.status, media_type=MEDIA_TYPE)
+
+
+def _of_status(request: Request, error: HTTPException) -> JSONResponse:
+    if error.status_code == NotFound.status:
+        return problem_response(NotFound("there is nothing at this path", where=_clean(request.url.path)))
+    phrase = HTTPStatus(error.status_code).phrase
+    body = ProblemBody(
+        type=TYPE_PREFIX + phrase.lower().replace(" ", "-"),
+        title=phrase,
+        status=error.status_code,
+        detail=_clean(str(error.detail)) or phrase,
+    )
+    return JSONResponse(
+        body.model_dump(mode="json", exclude_none=True), error.status_code, headers=error.headers, media_type=MEDIA_TYPE
+    )
+
+
+def _field(location: tuple[int | str, ...]) -> str:
+    """`("query", "limit")` → `limit`; the kind of place says nothing a client does not see."""
+    return ".".join(str(part) for part in location[1:]) or str(location[0])
+
+
+def _clean(text: str | None) -> str | None:
+    """Text that UTF-8 can carry: a lone surrogate of a request must not break the answer about it."""
+    return None if text is None else text.encode("utf-8", "backslashreplace").decode()

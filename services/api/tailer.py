@@ -1,0 +1,165 @@
+"""One thread a process that listens for new events and feeds every open event stream."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+import time
+from collections import defaultdict
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass, field
+from uuid import UUID
+
+import sqlalchemy as sa
+import structlog
+
+from shared.errors import NotFound, Unreachable
+from shared.jobs import EVENT_CHANNEL, EventRow, JobRow, Listener, events_after, get_job, transaction
+
+log = structlog.get_logger(__name__)
+
+PERIOD = 0.5
+"""Seconds between two readings of one job: two progress messages a second at most, however fast it goes."""
+WAIT = 0.25
+QUEUE_LIMIT = 1000
+"""Batches a slow client may lag behind before its stream is closed; it comes back with Last-Event-ID."""
+PROGRESS = "progress"
+
+Batch = tuple[list[EventRow], JobRow]
+CLOSED = None
+
+
+@dataclass(eq=False)
+class Subscription:
+    """One open stream."""
+
+    tenant: str
+    job: UUID
+    seq: int
+    loop: asyncio.AbstractEventLoop
+    queue: asyncio.Queue[Batch | None] = field(default_factory=lambda: asyncio.Queue(QUEUE_LIMIT))
+
+    def put(self, batch: Batch | None) -> None:
+        """From any thread."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: so is the stream
+            self.loop.call_soon_threadsafe(self._put, batch)
+
+    def _put(self, batch: Batch | None) -> None:
+        if self.queue.full():
+            self.queue.get_nowait()
+            batch = CLOSED
+        self.queue.put_nowait(batch)
+
+
+class Tailer:
+    """Reads the new events of the jobs that somebody follows, once for all who do."""
+
+    def __init__(self, engine: sa.Engine, url: str) -> None:
+        self._engine = engine
+        self._url = url
+        self._lock = threading.Lock()
+        self._subscriptions: dict[UUID, set[Subscription]] = defaultdict(set)
+        self._due: dict[UUID, float] = {}
+        self._read: dict[UUID, float] = {}
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="tailer", daemon=True)
+
+    def start(self) -> None:
+        """Begin to listen."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Close every stream and stop."""
+        self._stopping.set()
+        with self._lock:
+            for subscription in (s for all_of_job in self._subscriptions.values() for s in all_of_job):
+                subscription.put(CLOSED)
+        self._thread.join(timeout=5)
+
+    @contextlib.asynccontextmanager
+    async def follow(self, tenant: str, job: UUID, seq: int) -> AsyncIterator[Subscription]:
+        """A subscription to a job's events with a greater `seq`; those that stand already come first."""
+        subscription = Subscription(tenant, job, seq, asyncio.get_running_loop())
+        with self._lock:
+            self._subscriptions[job].add(subscription)
+            self._due[job] = 0.0
+        try:
+            yield subscription
+        finally:
+            with self._lock:
+                self._subscriptions[job].discard(subscription)
+                if not self._subscriptions[job]:
+                    for table in (self._subscriptions, self._due, self._read):
+                        table.pop(job, None)
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                with Listener(self._url, (EVENT_CHANNEL,)) as listener:
+                    self._mark_all()  # what was told while nobody listened
+                    while not self._stopping.is_set():
+                        self._mark(n.payload for n in listener.wait(WAIT))
+                        self._read_due()
+            except Unreachable as error:
+                log.warning("tailer_disconnected", error=error.message)
+                self._stopping.wait(1.0)
+            except Exception:
+                log.exception("tailer_failed")
+                self._stopping.wait(1.0)
+
+    def _mark_all(self) -> None:
+        with self._lock:
+            for job in self._subscriptions:
+                self._due[job] = 0.0
+
+    def _mark(self, payloads: Iterator[str]) -> None:
+        with self._lock:
+            for payload in payloads:
+                job = UUID(payload)
+                if job in self._subscriptions:
+                    self._due.setdefault(job, self._read.get(job, 0.0) + PERIOD)
+
+    def _read_due(self) -> None:
+        now = time.monotonic()
+        with self._lock:
+            due = [job for job, at in self._due.items() if at <= now]
+            for job in due:
+                del self._due[job]
+                self._read[job] = now
+        for job in due:
+            try:
+                self._feed(job)
+            except Unreachable:
+                with self._lock:
+                    if job in self._subscriptions:
+                        self._due[job] = now
+                raise
+
+    def _feed(self, job: UUID) -> None:
+        with self._lock:
+            followers = list(self._subscriptions.get(job, ()))
+        if not followers:
+            return
+        seq = min(s.seq for s in followers)
+        try:
+            with transaction(self._engine) as conn:
+                row = get_job(conn, followers[0].tenant, job)
+                events: list[EventRow] = []
+                while page := events_after(conn, followers[0].tenant, job, events[-1].seq if events else seq):
+                    events.extend(page)
+        except NotFound:  # deleted
+            for follower in followers:
+                follower.put(CLOSED)
+            return
+        for follower in followers:
+            new = [event for event in events if event.seq > follower.seq]
+            if new:
+                follower.seq = new[-1].seq
+                follower.put((last_progress_only(new), row))
+
+
+def last_progress_only(events: list[EventRow]) -> list[EventRow]:
+    """The events without those progress ones that a later one in the list makes stale."""
+    last = max((e.seq for e in events if e.kind == PROGRESS), default=None)
+    return [event for event in events if event.kind != PROGRESS or event.seq == last]

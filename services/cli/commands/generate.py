@@ -1,0 +1,154 @@
+"""`marey generate`: prompts to files in this process, without a server."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from services.cli import console, options, rows
+from services.cli.commands.submit import read_prompts
+from services.cli.names import Naming, check_template, file_name, slug
+from shared.errors import Conflict, InvalidInput
+from shared.items import MAX_SEED, Item
+
+if TYPE_CHECKING:
+    from services.cli.roles import Wanted
+    from shared.bundles import Bundle
+    from shared.motion.clip import MotionClip
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One motion to make: prompt times variant."""
+
+    item: Item
+    variant: int
+    wanted: Wanted
+    naming: Naming
+
+
+def generate(
+    prompts: options.Prompts = None,
+    file: options.PromptFile = None,
+    input_format: options.PromptFormat = None,
+    model: options.Model = None,
+    bundle: options.Bundle = None,
+    seconds: options.Seconds = None,
+    seed: options.Seed = None,
+    variants: options.Variants = None,
+    formats: options.Formats = None,
+    output: options.Folder = Path(),
+    name_template: options.Template = options.TEMPLATE,
+    overwrite: options.Overwrite = False,
+    as_json: console.Json = False,
+) -> None:
+    """Make motions here and now, without a server or a queue."""
+    from services.cli.fetching import check_folder
+    from services.cli.roles import OneShot, needs_extra
+
+    check_template(name_template)
+    items = read_prompts(prompts, file, input_format)
+    items = rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants)
+    try:
+        from shared.bundles import choose_bundle
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    config = settings()
+    chosen = choose_bundle(bundle or _one_model(items), config=config)
+    planned = _plan(items, chosen)
+    kinds = [f.value for f in formats or options.FileFormat]
+    check_folder(output)
+    studio = OneShot(chosen, config)
+    if chosen.manifest.random:
+        console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")
+    with console.bar() as bar:
+        task = bar.add_task("generating", total=len(planned))
+        made = studio.make([p.wanted for p in planned])
+        for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
+            line = _write(plan, clip, elapsed, chosen, output, name_template, kinds, overwrite=overwrite)
+            bar.advance(task)
+            if as_json:
+                console.result_json(line)
+            else:
+                for path in line["files"].values():
+                    console.result(console.home_relative(path))
+
+
+def _one_model(items: Iterable[Item]) -> str:
+    """The model all items are for; one process loads one.
+
+    Raises:
+        InvalidInput: they name several.
+    """
+    models = sorted({item.model or "hgm3" for item in items})
+    if len(models) > 1:
+        raise InvalidInput(
+            f"the prompts name {len(models)} models: {', '.join(models)}",
+            hint="Generate them one model at a time, or submit them to a server.",
+        )
+    return models[0]
+
+
+def _plan(items: list[Item], bundle: Bundle) -> list[Planned]:
+    from services.cli.roles import Wanted
+
+    def of(index: int, item: Item) -> Iterator[Planned]:
+        seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+        for variant in range(item.variants):
+            wanted = Wanted(item.prompt, seed + variant, item.seconds, item.settings)
+            name = item.name or slug(item.prompt)
+            naming = Naming(index + 1, name, seed + variant, variant, bundle.manifest.model, "local")
+            yield Planned(item, variant, wanted, naming)
+
+    return [plan for index, item in enumerate(items) for plan in of(index, item)]
+
+
+def _write(
+    plan: Planned,
+    clip: MotionClip,
+    elapsed: float,
+    bundle: Bundle,
+    folder: Path,
+    template: str,
+    kinds: list[str],
+    *,
+    overwrite: bool,
+) -> dict[str, Any]:
+    from shared.motion.bvh import format_bvh
+    from shared.motion.files import write_atomically
+
+    contents = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
+    paths = {kind: folder / file_name(template, plan.naming, kind) for kind in kinds}
+    changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
+    for kind in changed:
+        if paths[kind].exists() and not overwrite:
+            raise Conflict(
+                "is there already and holds something else",
+                where=str(paths[kind]),
+                hint="Choose another folder, or --overwrite.",
+            )
+    for kind in changed:
+        write_atomically(paths[kind], contents[kind])
+    return {
+        "job": None,
+        "item": None,
+        "motion": hashlib.sha256(contents["npz"]).hexdigest(),
+        "name": plan.item.name,
+        "prompt": plan.item.prompt,
+        "variant": plan.variant,
+        "model": bundle.manifest.model,
+        "bundle": bundle.reference,
+        "licence": bundle.manifest.licence,
+        "seed": plan.wanted.seed,
+        "state": "succeeded",
+        "error": None,
+        "frames": clip.frames,
+        "fps": clip.fps,
+        "elapsed": elapsed,
+        "files": {kind: str(path.absolute()) for kind, path in paths.items()},
+    }

@@ -1,0 +1,93 @@
+"""`marey models …`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import console
+
+app = typer.Typer(help="Models that motions can be made with.", no_args_is_help=True)
+
+Local = Annotated[bool, typer.Option("--local", help="The bundles of this machine, whatever a server has.")]
+
+
+@app.command("list")
+def list_models(local: Local = False, as_json: console.Json = False) -> None:
+    """List the bundles of the server, or of this machine when none runs."""
+    found = _local_models() if local or not _server_named() else _ask("/v1/models")["items"]
+    if as_json:
+        for model in found:
+            console.result_json(model)
+        return
+    columns = ("name", "model", "version", "licence", "length", "weights")
+    console.table(columns, ((*(m[c] for c in columns[:4]), _length(m), _weights(m)) for m in found))
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A model, a bundle or an exact bundle.")],
+    local: Local = False,
+    as_json: console.Json = False,
+) -> None:
+    """Show one bundle: terms, data, metrics."""
+    found = _local_model(name) if local or not _server_named() else _ask(f"/v1/models/{name}")
+    if as_json:
+        console.result_json(found)
+        return
+    for field in ("name", "bundle", "model", "version", "config", "skeleton", "fps", "encoder", "licence"):
+        console.result(f"{field:<12} {found[field]}")
+    console.result(f"{'length':<12} {_length(found)}")
+    console.result(f"{'weights':<12} {_weights(found)}")
+    for source in found["data"]:
+        console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
+    for metric, value in found["metrics"].items():
+        console.result(f"{'metric':<12} {metric} = {value:g}")
+
+
+def _server_named() -> bool:
+    import os
+
+    from services.cli.place import home
+
+    return bool(os.environ.get("MAREY_SERVER")) or (home() / "server.json").exists()
+
+
+def _ask(path: str) -> Any:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        return client.get(path)
+
+
+def _local_models() -> list[dict[str, Any]]:
+    from services.cli.roles import needs_extra
+
+    try:
+        from services.api.catalogue import offers
+        from services.api.models.schemas import ModelView
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    return [ModelView.of(offer).model_dump(mode="json") for offer in offers(settings())]
+
+
+def _local_model(name: str) -> dict[str, Any]:
+    from services.cli.roles import needs_extra
+
+    try:
+        from services.api.catalogue import Catalogue
+        from services.api.models.schemas import ModelView
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    return ModelView.of(Catalogue(settings()).offer(name)).model_dump(mode="json")
+
+
+def _length(model: dict[str, Any]) -> str:
+    return f"{model['min_seconds']:g} to {model['max_seconds']:g} s"
+
+
+def _weights(model: dict[str, Any]) -> str:
+    return "random: never trained" if model["random"] else "trained"

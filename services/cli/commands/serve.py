@@ -1,0 +1,71 @@
+"""`marey serve`, `worker`, `scheduler` and `api`: the processes of a server."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from services.cli.roles import DEFAULT_ROLES
+
+
+def serve(
+    roles: Annotated[
+        str, typer.Option("--with", help="Workers: + joins queues in one child, a comma separates children.")
+    ] = DEFAULT_ROLES,
+    port: Annotated[int | None, typer.Option("--port", help="Port of the API; 0 = any that is free.")] = None,
+    host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
+) -> None:
+    """Run everything here, with its own database and queue, until Ctrl-C."""
+    from services.cli.roles import needs_extra, parse_roles
+
+    try:
+        from services.cli.supervisor import Supervisor, any_port
+        from shared.settings import Settings, settings
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    changes: dict[str, object] = {}
+    if host is not None:
+        changes["host"] = host
+    if port is not None:
+        changes["port"] = port or any_port(host or settings().host)
+    config: Settings = settings().model_copy(update=changes)
+    Supervisor(config, parse_roles(roles)).run()
+
+
+def worker(
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues to serve: hgm3, text, or hgm3+text.")],
+) -> None:
+    """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
+    from services.cli.roles import needs_extra, parse_roles, role_of
+
+    queues = parse_roles(model.replace(",", "+"))[0]
+    try:
+        from shared.runtime.worker import worker_main
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    raise typer.Exit(worker_main(role_of(queues, settings()), settings()))
+
+
+def scheduler() -> None:
+    """Run relay and sweeper; a second one beside it is harmless."""
+    from services.cli.roles import needs_extra
+
+    try:
+        from services.scheduler.main import scheduler_main
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    raise typer.Exit(scheduler_main(settings()))
+
+
+def api() -> None:
+    """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
+    from services.cli.roles import needs_extra
+
+    try:
+        from services.api.app import serve as serve_api
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    serve_api()

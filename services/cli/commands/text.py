@@ -1,0 +1,64 @@
+"""`marey text …`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console, options
+from services.cli.commands.submit import read_prompts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+app = typer.Typer(help="Prompts and their semantic graphs.", no_args_is_help=True)
+
+BATCH = 64
+
+
+@app.command()
+def parse(
+    prompts: options.Prompts = None,
+    file: options.PromptFile = None,
+    input_format: options.PromptFormat = None,
+    model: Annotated[str, typer.Option("--model", help="Model or bundle whose labeller and rewriter to use.")] = "hgm3",
+    as_json: console.Json = False,
+) -> None:
+    """Show the graph a prompt becomes. Needs no server."""
+    from services.cli.roles import needs_extra
+
+    texts = [item.prompt for item in read_prompts(prompts, file, input_format)]
+    try:
+        for graph in _graphs(texts, model):
+            if as_json:
+                console.result_json(graph)
+            else:
+                _draw(graph)
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+
+
+def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
+    from shared.bundles import choose_bundle
+    from shared.errors import InvalidInput
+    from shared.text.pipeline import TextPipeline
+
+    spec = choose_bundle(model, verify=False).manifest.text
+    if spec is None:
+        raise InvalidInput(f"{model!r} does not read prompts", hint="Name a generator.")
+    pipeline = TextPipeline.load(spec)
+    for start in range(0, len(texts), BATCH):
+        for graph in pipeline.parse(texts[start : start + BATCH]):
+            yield graph.to_json()
+
+
+def _draw(graph: dict[str, Any]) -> None:
+    names = {node["id"]: node["text"] for node in graph["nodes"]}
+    console.result(graph["text"])
+    for node in graph["nodes"]:
+        if node["level"] == "action":
+            console.result(f"  {node['text']}")
+            for edge in graph["edges"]:
+                if edge["from"] == node["id"]:
+                    console.result(f"    {edge['role'] or edge['type']}: {names[edge['to']]}")

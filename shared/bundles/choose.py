@@ -1,0 +1,38 @@
+"""Which bundle a person means who names a model, a bundle or a folder."""
+
+from __future__ import annotations
+
+from shared.bundles.bundle import Bundle, find_bundle, list_bundles
+from shared.bundles.manifest import MANIFEST_NAME
+from shared.errors import NotFound
+from shared.settings import Settings, settings
+
+
+def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:
+    """The generator bundle for a model (`hgm3`), a bundle's name, exact reference or path.
+
+    A model's own bundle is `<model>-starter` where there is one; else the first, by name, that was trained; else the
+    first with random weights.
+
+    Raises:
+        NotFound: neither a bundle nor a model of that name.
+        InvalidBundle, Refused: as `find_bundle`.
+    """
+    config = config or settings()
+    if "/" in name or name.startswith(".") or "@" in name or _is_there(name, config):
+        return find_bundle(name, config=config, verify=verify)
+    if _is_there(f"{name}-starter", config):
+        return find_bundle(f"{name}-starter", config=config, verify=verify)
+    found = [b for b in list_bundles(config=config, kind="generator") if b.manifest.model == name]
+    if not found:
+        known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))
+        raise NotFound(
+            f"there is no model or bundle named {name!r}",
+            hint=f"Known here: {known or 'none'}. `marey models list` shows them.",
+        )
+    chosen = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name))
+    return find_bundle(chosen.manifest.name, config=config, verify=verify)
+
+
+def _is_there(name: str, config: Settings) -> bool:
+    return any((folder / name / MANIFEST_NAME).is_file() for folder in (config.models, config.home / "models"))

@@ -1,0 +1,20 @@
+"""The small client stays small."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+HEAVY = ("torch", "numpy", "pydantic", "sqlalchemy", "fastapi", "celery", "psycopg", "redis", "httpx2")
+
+
+def test_the_command_line_imports_no_server_and_no_numbers() -> None:
+    code = "import services.cli.main, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(HEAVY) & set(done.stdout.split())
+
+
+def test_the_client_needs_nothing_but_its_own_packages() -> None:
+    code = "import services.cli.client, services.cli.watching, services.cli.fetching, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(HEAVY[:-1]) & set(done.stdout.split())

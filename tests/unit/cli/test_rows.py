@@ -1,0 +1,130 @@
+"""Files of prompts: what is read, and what is said about what cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from services.cli.rows import items_from_file, with_defaults
+from shared.errors import InvalidFile, InvalidInput, NotFound
+from shared.items import InvalidItems, Item
+
+
+def write(folder: Path, name: str, content: str | bytes) -> str:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return str(path)
+
+
+def problems(folder: Path, name: str, content: str | bytes) -> list[str]:
+    with pytest.raises(InvalidItems) as caught:
+        items_from_file(write(folder, name, content))
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
+    header = "prompt,name,seconds,seed,variants,model,tags\n"
+    text = header + '"walks, then runs",a,2.5,7,3,hgm3,walk; run\na person waves,,,,,,\n'
+    assert items_from_file(write(tmp_path, "p.csv", text)) == [
+        Item("walks, then runs", "a", 2.5, 7, 3, "hgm3", ("walk", "run")),
+        Item("a person waves"),
+    ]
+
+
+@pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+def test_a_byte_order_mark_and_windows_lines_change_nothing(tmp_path: Path, bom: bytes, newline: bytes) -> None:
+    path = write(tmp_path, "p.csv", bom + newline.join([b"prompt,seed", b"a person waves,3", b""]))
+    assert items_from_file(path) == [Item("a person waves", seed=3)]
+
+
+def test_a_jsonl_line_may_hold_settings(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.jsonl", '{"prompt": "a person waves", "settings": {"guidance": 3}}\n\n')
+    assert items_from_file(path) == [Item("a person waves", settings={"guidance": 3.0})]
+
+
+def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
+    assert [item.prompt for item in items_from_file(path)] == ["a person waves", "a person bows"]
+
+
+def test_an_unknown_column_is_an_error_that_lists_the_known_ones(tmp_path: Path) -> None:
+    found = problems(tmp_path, "p.csv", "prompt,duration\na person waves,3\n")
+    assert found == [
+        "line 1: 'duration' is not a known column; known columns are prompt, name, seconds, seed, variants, model, tags"
+    ]
+
+
+def test_every_problem_is_told_with_its_line(tmp_path: Path) -> None:
+    text = 'prompt,seconds,seed\na person waves,2,1\n,2,1\n"a person\nbows",long,1\na person runs,0.1,-1\na,b,c,d\n'
+    assert [line.split(":")[:2] for line in problems(tmp_path, "p.csv", text)] == [
+        ["line 3", " prompt"],
+        ["line 4", " seconds"],
+        ["line 6", " seconds"],
+        ["line 6", " seed"],
+        ["line 7", " has 4 cells, the first line 3"],
+    ]
+
+
+def test_one_bad_line_among_a_thousand_is_found(tmp_path: Path) -> None:
+    lines = [f"a person waves {i} times" for i in range(1000)]
+    lines[5] = "a person\0waves"
+    assert problems(tmp_path, "p.csv", "\n".join(["prompt", *lines])) == [
+        "line 7: prompt: the prompt holds a NUL byte. Is the file plain UTF-8 text?"
+    ]
+
+
+def test_broken_json_is_told_with_its_line_and_the_rest_is_still_read(tmp_path: Path) -> None:
+    found = problems(
+        tmp_path, "p.jsonl", '{"prompt": "a person waves"}\n{"prompt": \n[1]\n{"prompt": "bows", "speed": 2}\n'
+    )
+    assert [line.split(":")[0] for line in found] == ["line 2", "line 3", "line 4"]
+    assert "speed: is not a known field; known are prompt," in found[2]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("prompt\na person waves".encode("utf-16"), "UTF-16"),
+        (b"prompt\na person waves\ngar\xe7on waves\n", "line 3: is not UTF-8"),
+    ],
+)
+def test_a_file_in_another_encoding_is_refused_with_what_to_do(tmp_path: Path, content: bytes, said: str) -> None:
+    with pytest.raises(InvalidFile, match=said) as caught:
+        items_from_file(write(tmp_path, "p.csv", content))
+    assert caught.value.hint is not None
+    assert "UTF-8" in caught.value.hint
+
+
+def test_a_csv_that_breaks_off_inside_a_quote_names_the_line(tmp_path: Path) -> None:
+    assert problems(tmp_path, "p.csv", 'prompt\na person waves\n"a person bows')[0].startswith("line 3: is not CSV")
+
+
+def test_a_file_that_is_not_there_or_tells_no_format_or_holds_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(NotFound):
+        items_from_file(str(tmp_path / "none.csv"))
+    with pytest.raises(InvalidInput, match="ending"):
+        items_from_file(write(tmp_path, "prompts.xlsx", "a"))
+    with pytest.raises(InvalidInput, match="no prompt"):
+        items_from_file(write(tmp_path, "p.csv", "prompt\n"))
+
+
+def test_options_of_the_command_stand_in_where_a_line_says_nothing() -> None:
+    items = [Item("a person waves", seconds=2.0), Item("a person bows")]
+    assert [i.seconds for i in with_defaults(items, seconds=4.0, seed=1)] == [2.0, 4.0]
+    with pytest.raises(InvalidItems, match=r"seconds: 1000 is outside 0\.5 to 60"):
+        with_defaults(items, seconds=1000.0)
+
+
+@given(st.binary(max_size=300), st.sampled_from(["csv", "jsonl", "txt"]))
+def test_no_file_breaks_the_reader(tmp_path_factory: pytest.TempPathFactory, content: bytes, ending: str) -> None:
+    path = tmp_path_factory.getbasetemp() / f"any.{ending}"
+    path.write_bytes(content)
+    try:
+        items = items_from_file(str(path))
+    except InvalidInput:
+        return
+    assert items
