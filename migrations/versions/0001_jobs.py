@@ -90,7 +90,7 @@ TABLES = (
         state TEXT GENERATED ALWAYS AS (
             CASE
                 WHEN ready + leased > 0 THEN
-                    CASE WHEN control = 'paused' THEN 'paused' WHEN ready = total THEN 'queued' ELSE 'running' END
+                    CASE WHEN control = 'paused' THEN 'paused' WHEN started_at IS NULL THEN 'queued' ELSE 'running' END
                 WHEN total = 0 THEN 'queued'
                 WHEN succeeded = total THEN 'succeeded'
                 WHEN control = 'cancelled' THEN 'cancelled'

@@ -8,16 +8,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
         job = submit(conn, NewJob(items))
 """
 
-from shared.jobs.claim import (
-    beat,
-    claim,
-    heartbeat,
-    list_workers,
-    live_workers,
-    load_texts,
-    retire,
-    waiting_batches,
-)
+from shared.jobs.claim import claim, heartbeat, load_texts, waiting_batches
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
@@ -66,6 +57,7 @@ from shared.jobs.types import (
     WorkerBeat,
     WorkerRow,
 )
+from shared.jobs.workers import beat, list_workers, live_workers, retire
 
 __all__ = [
     "DEFAULT_TENANT",

@@ -1,14 +1,71 @@
-"""Claim a batch, keep its lease, and know who works."""
+"""Claim a batch, and keep its lease."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from uuid import UUID
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
-from shared.jobs.policy import Policy
-from shared.jobs.types import Claim, Heartbeat, WorkerBeat, WorkerRow
+from shared.jobs import schema
+from shared.jobs.journal import CLOCK, LockedJob, among, interval, lock_job, record
+from shared.jobs.policy import Policy, policy
+from shared.jobs.states import ItemState, JobControl, Stage
+from shared.jobs.types import Claim, ClaimedItem, Heartbeat
+
+LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
+
+# In order: tenant with the smallest share running, priority, age. The first lanes, and the first with the key that the
+# worker has loaded.
+LANES = sa.text("""
+    WITH share AS (
+        SELECT tenant_id, sum(leased) AS running FROM job WHERE leased > 0 GROUP BY tenant_id
+    ), ordered AS (
+        SELECT lane.job_id, lane.batch_key,
+               extract(epoch FROM clock_timestamp() - lane.waiting_since)::float8 AS waited,
+               row_number() OVER (
+                   ORDER BY coalesce(share.running, 0), job.priority DESC, job.created_at, job.id, lane.waiting_since,
+                            lane.batch_key
+               ) AS place
+        FROM lane JOIN job ON job.id = lane.job_id LEFT JOIN share ON share.tenant_id = job.tenant_id
+        WHERE lane.queue = :queue AND lane.ready + lane.solo > 0 AND job.control = 'run'
+    )
+    SELECT job_id, batch_key, waited, place FROM ordered WHERE place <= :tried
+    UNION
+    (SELECT job_id, batch_key, waited, place FROM ordered WHERE batch_key = :prefer ORDER BY place LIMIT 1)
+    ORDER BY place
+""")
+
+PICK = sa.text("""
+    WITH picked AS MATERIALIZED (
+        SELECT id FROM item
+        WHERE job_id = :job AND queue = :queue AND batch_key = :batch_key
+          AND state = 'ready' AND run_after IS NULL AND solo = :solo
+        ORDER BY position
+        LIMIT :limit
+        FOR UPDATE SKIP LOCKED
+    )
+    UPDATE item SET state = 'leased', lease_token = :token FROM picked WHERE item.id = picked.id
+    RETURNING item.id, item.position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle,
+              item.text_key, item.seed, item.seconds, item.settings, item.tags, item.attempts, item.stage
+""")
+
+WAITING = sa.text("""
+    SELECT lane.queue, sum(ceil(lane.ready::numeric / size.items) + lane.solo)::int AS batches
+    FROM lane JOIN job ON job.id = lane.job_id
+         JOIN unnest(CAST(:queues AS text[]), CAST(:sizes AS int[])) AS size(queue, items) ON size.queue = lane.queue
+    WHERE lane.ready + lane.solo > 0 AND job.control = 'run'
+    GROUP BY lane.queue
+""")
+
+
+@dataclass(frozen=True)
+class _Lane:
+    job: UUID
+    batch_key: str
+    waited: float
 
 
 def claim(
@@ -26,7 +83,21 @@ def claim(
     job. With `prefer_batch_key` (the bundle and settings a worker has loaded) such a lane goes first until the one that
     is next in order has waited 30 s.
     """
-    raise NotImplementedError
+    rules = rules or policy()
+    found = conn.execute(LANES, {"queue": queue, "tried": LANES_TRIED, "prefer": prefer_batch_key})
+    lanes = [_Lane(row.job_id, row.batch_key, row.waited) for row in found]
+    contended: list[_Lane] = []
+    for lane in _preferred_first(lanes, prefer_batch_key, rules.patience):
+        job = lock_job(conn, lane.job, skip_locked=True)
+        if job is None:
+            contended.append(lane)
+        elif (taken := _take(conn, job, queue, lane.batch_key, worker, limit, rules)) is not None:
+            return taken
+    for lane in contended:  # only lanes that others are changing right now: wait for them
+        job = lock_job(conn, lane.job)
+        if job is not None and (taken := _take(conn, job, queue, lane.batch_key, worker, limit, rules)) is not None:
+            return taken
+    return None
 
 
 def heartbeat(
@@ -44,34 +115,88 @@ def heartbeat(
         progressed: the decode loop moved since the last heartbeat, or a bundle is being loaded or compiled. Without
             progress for 120 s the lease is not renewed.
     """
-    raise NotImplementedError
+    rules = rules or policy()
+    table = schema.lease.c
+    if progressed:
+        renewal = {"expires_at": CLOCK + interval(rules.lease), "progress_at": CLOCK}
+    else:
+        moves = table.progress_at > CLOCK - interval(rules.stall)
+        renewal = {"expires_at": sa.case((moves, CLOCK + interval(rules.lease)), else_=table.expires_at)}
+    renewed = conn.execute(sa.update(schema.lease).where(table.token == lease_token).values(renewal))
+    if renewed.rowcount == 0:
+        return Heartbeat(lost=True, gone=frozenset(open_items))
+    held = set(conn.execute(sa.select(schema.item.c.id).where(schema.item.c.lease_token == lease_token)).scalars())
+    return Heartbeat(lost=False, gone=frozenset(open_items) - held)
 
 
 def load_texts(conn: sa.Connection, keys: Sequence[str]) -> dict[str, bytes]:
     """The feature blobs of these keys, those that are known, in one query."""
-    raise NotImplementedError
+    table = schema.text_features.c
+    rows = conn.execute(sa.select(table.key, table.blob).where(among(table.key, set(keys))))
+    return {row.key: row.blob for row in rows}
 
 
 def waiting_batches(conn: sa.Connection, batch_sizes: Mapping[str, int]) -> dict[str, int]:
     """How many batches wait, by queue, where a batch of queue q holds `batch_sizes[q]` items. Only queues with some."""
-    raise NotImplementedError
+    sizes = {"queues": list(batch_sizes), "sizes": list(batch_sizes.values())}
+    return {row.queue: row.batches for row in conn.execute(WAITING, sizes)}
 
 
-def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
-    """Note that a worker lives."""
-    raise NotImplementedError
+def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, patience: float) -> list[_Lane]:
+    """The lanes in the order to try: one that fits what is loaded first, unless the next in order lost its patience."""
+    ordered = list(lanes)
+    if prefer is not None and ordered and ordered[0].waited < patience:
+        fitting = next((lane for lane in ordered if lane.batch_key == prefer), None)
+        if fitting is not None:
+            ordered.remove(fitting)
+            ordered.insert(0, fitting)
+    return ordered
 
 
-def retire(conn: sa.Connection, worker: str) -> None:
-    """Forget a worker that stops in good order."""
-    raise NotImplementedError
+def _take(
+    conn: sa.Connection, job: LockedJob, queue: str, batch_key: str, worker: str, limit: int, rules: Policy
+) -> Claim | None:
+    if job.control is not JobControl.RUN:
+        return None
+    token = uuid4()
+    conn.execute(
+        sa.insert(schema.lease).values(
+            token=token,
+            job_id=job.id,
+            queue=queue,
+            worker=worker,
+            solo=False,
+            claimed_at=CLOCK,
+            progress_at=CLOCK,
+            expires_at=CLOCK + interval(rules.lease),
+        )
+    )
+    of_lane = {"job": job.id, "queue": queue, "batch_key": batch_key, "token": token}
+    solo = False
+    rows = conn.execute(PICK, of_lane | {"solo": False, "limit": limit}).mappings().all()
+    if not rows:  # those that lost a lease in company run alone, after the others
+        solo = True
+        rows = conn.execute(PICK, of_lane | {"solo": True, "limit": 1}).mappings().all()
+    if not rows:
+        conn.execute(sa.delete(schema.lease).where(schema.lease.c.token == token))
+        return None
+    if solo:
+        conn.execute(sa.update(schema.lease).where(schema.lease.c.token == token).values(solo=True))
+    lane = schema.lane.c
+    conn.execute(
+        sa.update(schema.lane)
+        .where(lane.job_id == job.id, lane.queue == queue, lane.batch_key == batch_key)
+        .values({(lane.solo if solo else lane.ready): (lane.solo if solo else lane.ready) - len(rows)})
+        .values(waiting_since=CLOCK)
+    )
+    record(conn, job, moved={(ItemState.READY, ItemState.LEASED): len(rows)})
+    items = sorted((_claimed(row) for row in rows), key=lambda item: item.position)
+    stage = Stage(rows[0]["stage"])
+    return Claim(token, job.tenant, job.id, queue, stage, batch_key, items[0].bundle, solo, tuple(items))
 
 
-def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[str, int]:
-    """How many workers live, by queue."""
-    raise NotImplementedError
-
-
-def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[WorkerRow]:
-    """Every worker seen within a day, newest heartbeat first."""
-    raise NotImplementedError
+def _claimed(row: sa.RowMapping) -> ClaimedItem:
+    values: dict[str, Any] = dict(row)
+    del values["stage"]
+    values["tags"] = tuple(row["tags"])
+    return ClaimedItem(**values)

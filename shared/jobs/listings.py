@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import base64
+import binascii
+from collections import defaultdict
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, TypeVar
 from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs.states import ItemState, JobState
-from shared.jobs.types import EventRow, ItemRow, JobRow, MotionRow, Page
+from shared.errors import InvalidInput, NotFound
+from shared.jobs import schema
+from shared.jobs.journal import among, no_such_job
+from shared.jobs.states import ItemState, JobControl, JobState, Stage
+from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionRow, Page, Problem
+
+LARGEST_PAGE = 1000
+Row = TypeVar("Row")
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
@@ -17,14 +27,25 @@ def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    table = schema.job.c
+    row = conn.execute(_jobs().where(table.tenant_id == tenant, table.id == job)).mappings().one_or_none()
+    if row is None:
+        raise no_such_job(job)
+    return _job(row)
 
 
 def list_jobs(
     conn: sa.Connection, tenant: str, *, states: Collection[JobState] = (), cursor: str | None = None, limit: int = 50
 ) -> Page[JobRow]:
     """Jobs, newest first; of these states, if any are given."""
-    raise NotImplementedError
+    table = schema.job.c
+    query = _jobs().where(table.tenant_id == tenant)
+    if states:
+        query = query.where(table.state.in_([str(state) for state in states]))
+    if cursor is not None:
+        query = query.where(table.id < _read_cursor(cursor, UUID))
+    rows = conn.execute(query.order_by(table.id.desc()).limit(_limit(limit) + 1)).mappings().all()
+    return _page([_job(row) for row in rows], limit, lambda row: str(row.id))
 
 
 def list_items(
@@ -41,7 +62,23 @@ def list_items(
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    get_job(conn, tenant, job)
+    table = schema.item.c
+    query = sa.select(
+        *(table.id, table.job_id.label("job"), table.position, table.index, table.variant, table.name, table.prompt),
+        *(table.model, table.bundle, table.seed, table.seconds, table.settings, table.tags, table.stage, table.state),
+        *(table.attempts, table.solo, table.run_after, table.reason, table.problem),
+        table.created_at.label("created"),
+        table.finished_at.label("finished"),
+    ).where(table.job_id == job)
+    if states:
+        query = query.where(table.state.in_([str(state) for state in states]))
+    if cursor is not None:
+        query = query.where(table.position > _read_cursor(cursor, int))
+    rows = conn.execute(query.order_by(table.position).limit(_limit(limit) + 1)).mappings().all()
+    items = [row["id"] for row in rows if row["state"] == ItemState.SUCCEEDED]
+    by_item = {motion.item: motion for motion in _motions(conn, among(schema.motion.c.item_id, items))}
+    return _page([_item(row, by_item.get(row["id"])) for row in rows], limit, lambda row: str(row.position))
 
 
 def list_motions(
@@ -52,7 +89,17 @@ def list_motions(
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    table = schema.motion.c
+    wanted = table.tenant_id == tenant
+    if job is not None:
+        get_job(conn, tenant, job)
+        wanted &= table.job_id == job
+    if cursor is not None:
+        after = _read_cursor(cursor, UUID)
+        wanted &= table.id > after if job is not None else table.id < after
+    order = table.id if job is not None else table.id.desc()
+    motions = _motions(conn, wanted, order=order, limit=_limit(limit) + 1)
+    return _page(motions, limit, lambda row: str(row.id))
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
@@ -61,7 +108,11 @@ def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
     Raises:
         NotFound: the tenant has no such motion.
     """
-    raise NotImplementedError
+    table = schema.motion.c
+    found = _motions(conn, (table.tenant_id == tenant) & (table.id == motion))
+    if not found:
+        raise NotFound("there is no such motion", where=f"motion {motion}")
+    return found[0]
 
 
 def events_after(conn: sa.Connection, tenant: str, job: UUID, seq: int = 0, limit: int = 500) -> list[EventRow]:
@@ -70,4 +121,112 @@ def events_after(conn: sa.Connection, tenant: str, job: UUID, seq: int = 0, limi
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    get_job(conn, tenant, job)
+    table = schema.job_event.c
+    rows = conn.execute(
+        sa.select(table.job_id, table.seq, table.kind, table.item_id, table.reason, table.data, table.at)
+        .where(table.job_id == job, table.seq > seq)
+        .order_by(table.seq)
+        .limit(_limit(limit))
+    )
+    return [EventRow(*row) for row in rows]
+
+
+# --- rows ---
+
+
+def _jobs() -> sa.Select[*tuple[Any, ...]]:
+    table = schema.job.c
+    return sa.select(
+        table.id,
+        table.tenant_id.label("tenant"),
+        *(table.name, table.comment, table.priority, table.control, table.state, table.total),
+        *(table[str(state)] for state in ItemState),
+        *(table.fail_early, table.event_seq),
+        table.created_at.label("created"),
+        table.started_at.label("started"),
+        table.finished_at.label("finished"),
+    )
+
+
+def _job(row: sa.RowMapping) -> JobRow:
+    values: dict[str, Any] = dict(row)
+    values.update(control=JobControl(row["control"]), state=JobState(row["state"]))
+    return JobRow(**values)
+
+
+def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
+    values: dict[str, Any] = dict(row)
+    problem = row["problem"]
+    values.update(
+        stage=Stage(row["stage"]),
+        state=ItemState(row["state"]),
+        tags=tuple(row["tags"]),
+        problem=None if problem is None else Problem(**problem),
+        motion=motion,
+    )
+    return ItemRow(**values)
+
+
+def _motions(
+    conn: sa.Connection,
+    wanted: sa.ColumnElement[bool],
+    *,
+    order: sa.ColumnElement[object] | None = None,
+    limit: int | None = None,
+) -> list[MotionRow]:
+    """Motions with their files: two queries, however many."""
+    motion, item = schema.motion.c, schema.item.c
+    query = (
+        sa.select(
+            *(motion.id, motion.tenant_id.label("tenant"), motion.job_id.label("job"), motion.item_id.label("item")),
+            *(item.name, item.prompt, item.model, item.bundle, motion.licence, item.seed, item.variant),
+            *(motion.frames, motion.fps, motion.elapsed, motion.metadata.label("metadata")),
+            motion.created_at.label("created"),
+        )
+        .join(schema.item, item.id == motion.item_id)
+        .where(wanted)
+    )
+    rows = conn.execute(query.order_by(motion.id if order is None else order).limit(limit)).mappings().all()
+    files = _files(conn, [row["id"] for row in rows])
+    return [MotionRow(**row, files=tuple(files[row["id"]])) for row in rows]
+
+
+def _files(conn: sa.Connection, motions: Sequence[UUID]) -> dict[UUID, list[MotionFile]]:
+    file, asset = schema.motion_file.c, schema.asset.c
+    rows = conn.execute(
+        sa.select(file.motion_id, file.format, asset.sha256, asset.size, asset.media_type)
+        .join(schema.asset, asset.id == file.asset_id)
+        .where(among(file.motion_id, motions))
+        .order_by(file.format)
+    )
+    files: defaultdict[UUID, list[MotionFile]] = defaultdict(list)
+    for motion, *values in rows:
+        files[motion].append(MotionFile(*values))
+    return files
+
+
+# --- pages ---
+
+
+def _limit(limit: int) -> int:
+    if not 1 <= limit <= LARGEST_PAGE:
+        raise InvalidInput(f"{limit} is not between 1 and {LARGEST_PAGE}", where="limit")
+    return limit
+
+
+def _page(rows: Sequence[Row], limit: int, mark: Callable[[Row], str]) -> Page[Row]:
+    """The first `limit` rows of one more than asked for; the cursor is the mark of the last."""
+    kept = tuple(rows[:limit])
+    if len(rows) <= limit:
+        return Page(kept, None)
+    return Page(kept, base64.urlsafe_b64encode(mark(kept[-1]).encode()).decode().rstrip("="))
+
+
+def _read_cursor(cursor: str, kind: Callable[[str], Row]) -> Row:
+    try:
+        return kind(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
+    except (binascii.Error, ValueError) as error:
+        raise InvalidInput(
+            "this is no cursor of this listing", where="cursor", hint="Use the one the last page gave."
+        ) from error

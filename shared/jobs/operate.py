@@ -6,7 +6,13 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs.types import JobRow
+from shared.errors import Conflict, InvalidInput
+from shared.jobs import schema
+from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
+from shared.jobs.listings import get_job
+from shared.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
+from shared.jobs.types import PRIORITY_LIMIT, JobRow
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:
@@ -16,7 +22,11 @@ def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by 
         NotFound: the tenant has no such job.
         Conflict: the job has ended.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    _refuse_ended(locked, "paused")
+    if locked.control is not JobControl.PAUSED:
+        record(conn, locked, [NewEvent("paused", reason)], control=JobControl.PAUSED)
+    return get_job(conn, tenant, job)
 
 
 def resume(conn: sa.Connection, tenant: str, job: UUID, reason: str = "resumed by operator") -> JobRow:
@@ -26,7 +36,14 @@ def resume(conn: sa.Connection, tenant: str, job: UUID, reason: str = "resumed b
         NotFound: the tenant has no such job.
         Conflict: the job has ended.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    _refuse_ended(locked, "resumed")
+    if locked.control is not JobControl.RUN:
+        record(conn, locked, [NewEvent("resumed", reason)], control=JobControl.RUN)
+        lane = schema.lane.c
+        waiting = sa.select(lane.queue).where(lane.job_id == job, lane.ready + lane.solo > 0).distinct()
+        notify(conn, QUEUE_CHANNEL, conn.execute(waiting).scalars().all())
+    return get_job(conn, tenant, job)
 
 
 def cancel(conn: sa.Connection, tenant: str, job: UUID, reason: str = "cancelled by operator") -> JobRow:
@@ -35,7 +52,10 @@ def cancel(conn: sa.Connection, tenant: str, job: UUID, reason: str = "cancelled
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    if locked.state not in ENDED:
+        cancel_open_items(conn, locked, Cause.OPERATOR, reason, control=JobControl.CANCELLED)
+    return get_job(conn, tenant, job)
 
 
 def retry(
@@ -47,7 +67,33 @@ def retry(
         NotFound: the tenant has no such job.
         Conflict: no item can be retried.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    wanted = RETRYABLE - {ItemState.CANCELLED} if failed_only else RETRYABLE
+    moved = {(state, ItemState.READY): getattr(locked, state) for state in wanted if getattr(locked, state)}
+    if not moved:
+        raise Conflict(
+            "no item of this job can be retried",
+            where=f"job {job}",
+            hint=f"Items that are {', '.join(sorted(wanted))} can.",
+        )
+    table = schema.item
+    rows = conn.execute(
+        sa.update(table)
+        .where(table.c.job_id == job, table.c.state.in_(sorted(wanted)))
+        .values(
+            state=ItemState.READY,
+            attempts=0,
+            solo=False,
+            problem=None,
+            finished_at=None,
+            reason=f"{Cause.OPERATOR}: {reason}",
+        )
+        .returning(table.c.queue, table.c.batch_key)
+    ).all()
+    change_lanes(conn, job, returned((row.queue, row.batch_key, False) for row in rows))
+    control = JobControl.RUN if locked.control is JobControl.CANCELLED else None
+    record(conn, locked, [NewEvent("retried", reason, data={"items": len(rows)})], moved=moved, control=control)
+    return get_job(conn, tenant, job)
 
 
 def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int) -> JobRow:
@@ -57,7 +103,12 @@ def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int) -> 
         NotFound: the tenant has no such job.
         InvalidInput: out of range.
     """
-    raise NotImplementedError
+    if not -PRIORITY_LIMIT <= priority <= PRIORITY_LIMIT:
+        raise InvalidInput(f"{priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
+    locked = lock_job_of(conn, tenant, job)
+    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(priority=priority))
+    record(conn, locked, [NewEvent("priority", f"priority set to {priority}", data={"priority": priority})])
+    return get_job(conn, tenant, job)
 
 
 def set_comment(conn: sa.Connection, tenant: str, job: UUID, comment: str | None) -> JobRow:
@@ -66,7 +117,10 @@ def set_comment(conn: sa.Connection, tenant: str, job: UUID, comment: str | None
     Raises:
         NotFound: the tenant has no such job.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(comment=comment))
+    record(conn, locked, [NewEvent("comment", comment or "comment removed")])
+    return get_job(conn, tenant, job)
 
 
 def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
@@ -76,4 +130,42 @@ def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
         NotFound: the tenant has no such job.
         Conflict: the job has open items; cancel it first.
     """
-    raise NotImplementedError
+    locked = lock_job_of(conn, tenant, job)
+    if locked.state not in ENDED:
+        raise Conflict(
+            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
+        )
+    conn.execute(sa.delete(schema.job).where(schema.job.c.id == job))
+    notify(conn, EVENT_CHANNEL, [str(job)])
+
+
+def cancel_open_items(
+    conn: sa.Connection, job: LockedJob, cause: Cause, reason: str, *, control: JobControl | None
+) -> None:
+    """Cancel what is ready or leased of a job under lock; its leases end."""
+    table = schema.item
+    conn.execute(
+        sa.update(table)
+        .where(table.c.job_id == job.id, table.c.state.in_(sorted(OPEN)))
+        .values(
+            state=ItemState.CANCELLED,
+            lease_token=None,
+            run_after=None,
+            finished_at=CLOCK,
+            reason=f"{cause}: {reason}",
+        )
+    )
+    conn.execute(sa.delete(schema.lane).where(schema.lane.c.job_id == job.id))
+    conn.execute(sa.delete(schema.lease).where(schema.lease.c.job_id == job.id))
+    moved = {(ItemState.READY, ItemState.CANCELLED): job.ready, (ItemState.LEASED, ItemState.CANCELLED): job.leased}
+    event = NewEvent("cancelled", reason, data={"items": job.ready + job.leased, "cause": cause})
+    record(conn, job, [event], moved=moved, control=control)
+
+
+def _refuse_ended(job: LockedJob, verb: str) -> None:
+    if job.state in ENDED:
+        raise Conflict(
+            f"the job is {job.state} and cannot be {verb}",
+            where=f"job {job.id}",
+            hint="`marey jobs retry` starts its failed, dead and cancelled items again.",
+        )

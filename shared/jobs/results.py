@@ -2,22 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from uuid import UUID
 
 import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import insert
 
-from shared.jobs.policy import Policy
-from shared.jobs.types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
+from shared.jobs import schema
+from shared.jobs.ids import new_id
+from shared.jobs.journal import (
+    CLOCK,
+    LaneChange,
+    LockedJob,
+    NewEvent,
+    among,
+    change_lanes,
+    interval,
+    lock_job,
+    record,
+    returned,
+)
+from shared.jobs.operate import cancel_open_items
+from shared.jobs.policy import Policy, policy
+from shared.jobs.states import Cause, ItemState, Stage
+from shared.jobs.types import AssetDigest, Committed, ItemFailure, NewMotion, NewText, Problem
 
 
 def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetDigest]) -> bool:
     """Announce what is about to be PUT (rows `writing`), in a transaction of its own before the PUT.
 
+    Content that is there already is announced again: the garbage collector leaves it alone while this lease lives.
+
     Returns:
         False when the lease is gone: put nothing.
     """
-    raise NotImplementedError
+    lease = schema.lease.c
+    query = sa.select(schema.job.c.tenant_id).join(schema.lease, lease.job_id == schema.job.c.id)
+    tenant = conn.execute(
+        query.where(lease.token == lease_token).with_for_update(read=True, key_share=True, of=schema.lease)
+    ).scalar_one_or_none()
+    if tenant is None:
+        return False
+    table = schema.asset
+    rows = [  # in order of content, so that two announcements never wait for each other
+        {
+            "id": new_id(),
+            "tenant_id": tenant,
+            "sha256": asset.sha256,
+            "size": asset.size,
+            "media_type": asset.media_type,
+            "state": "writing",
+            "announced_at": CLOCK,
+        }
+        for asset in sorted({asset.sha256: asset for asset in assets}.values(), key=lambda asset: asset.sha256)
+    ]
+    if not rows:
+        return True
+    announced = conn.execute(
+        insert(table)
+        .values(rows)
+        .on_conflict_do_update(index_elements=["tenant_id", "sha256"], set_={"announced_at": CLOCK})
+        .returning(table.c.id)
+    ).scalars()
+    writers = [{"asset_id": asset, "lease_token": lease_token} for asset in announced]
+    conn.execute(insert(schema.asset_writer).on_conflict_do_nothing(), writers)
+    return True
 
 
 def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[NewMotion]) -> Committed:
@@ -25,7 +75,17 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 
     The files must lie in the asset store and have been announced by `begin_assets`.
     """
-    raise NotImplementedError
+    held = _hold(conn, lease_token, [motion.item for motion in motions])
+    if held is None:
+        return Committed((), tuple(motion.item for motion in motions))
+    done = [motion for motion in motions if motion.item in held.items]
+    if done:
+        _store_motions(conn, held.job, done)
+        _end(conn, [motion.item for motion in done], ItemState.SUCCEEDED, Cause.COMMITTED)
+        event = NewEvent("progress", f"{len(done)} motions stored", data={"items": len(done)})
+        record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): len(done)})
+        drop_empty_lease(conn, lease_token)
+    return held.committed([motion.item for motion in motions])
 
 
 def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText]) -> Committed:
@@ -33,7 +93,20 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
 
     Ready items of the same job with the same key go with them.
     """
-    raise NotImplementedError
+    held = _hold(conn, lease_token, [text.item for text in texts])
+    if held is None:
+        return Committed((), tuple(text.item for text in texts))
+    done = [text for text in texts if text.item in held.items]
+    for text in done:
+        if text.key != held.items[text.item].text_key:
+            raise ValueError(f"features {text.key} are not those of item {text.item}")
+    if done:
+        blobs = {text.key: text.blob for text in done}
+        rows = [{"key": key, "blob": blobs[key]} for key in sorted(blobs)]  # in order: two commits may share keys
+        conn.execute(insert(schema.text_features).values(rows).on_conflict_do_nothing())
+        _leave_text_stage(conn, held.job, [text.item for text in done], list(blobs))
+        drop_empty_lease(conn, lease_token)
+    return held.committed([text.item for text in texts])
 
 
 def fail_items(
@@ -41,9 +114,243 @@ def fail_items(
 ) -> Committed:
     """Record errors: permanent ones end the item `failed`; retryable ones cost an attempt and come back after a delay,
     or end it `dead` when the attempts are used up."""
-    raise NotImplementedError
+    rules = rules or policy()
+    held = _hold(conn, lease_token, [failure.item for failure in failures])
+    if held is None:
+        return Committed((), tuple(failure.item for failure in failures))
+    ends: dict[tuple[ItemState, ItemState], int] = {}
+    events: list[NewEvent] = []
+    for failure in failures:
+        row = held.items.get(failure.item)
+        if row is not None:
+            after, event = _fail(conn, row, failure, rules)
+            ends[ItemState.LEASED, after] = ends.get((ItemState.LEASED, after), 0) + 1
+            events.append(event)
+    if events:
+        job = record(conn, held.job, events, moved=ends)
+        drop_empty_lease(conn, lease_token)
+        _fail_early(conn, job)
+    return held.committed([failure.item for failure in failures])
 
 
 def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence[UUID] | None = None) -> Committed:
     """Give items back (all of the lease, by default), at no cost of an attempt: SIGTERM, a store or database outage."""
-    raise NotImplementedError
+    held = _hold(conn, lease_token, items)
+    if held is None:
+        return Committed((), tuple(items or ()))
+    if held.items:
+        give_back(conn, held.job, list(held.items.values()), Cause.RELEASED, reason)
+        event = NewEvent("released", reason, data={"items": len(held.items)})
+        record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.READY): len(held.items)})
+        drop_empty_lease(conn, lease_token)
+    return held.committed(list(held.items) if items is None else items)
+
+
+# --- what the sweeper uses too ---
+
+
+@dataclass(frozen=True)
+class HeldItem:
+    """An item under a lease, its row locked."""
+
+    id: UUID
+    queue: str
+    batch_key: str
+    solo: bool
+    attempts: int
+    text_key: str
+    position: int
+
+
+def held_items(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None = None) -> list[HeldItem]:
+    """The items that a lease holds (of these, if given), in input order, locked. The job's lock must be held."""
+    table = schema.item.c
+    query = sa.select(
+        *(table.id, table.queue, table.batch_key, table.solo, table.attempts, table.text_key, table.position)
+    ).where(table.lease_token == lease_token)
+    if items is not None:
+        query = query.where(among(table.id, items))
+    return [HeldItem(*row) for row in conn.execute(query.order_by(table.position).with_for_update())]
+
+
+def give_back(
+    conn: sa.Connection,
+    job: LockedJob,
+    items: Sequence[HeldItem],
+    cause: Cause,
+    reason: str,
+    *,
+    solo: bool = False,
+    attempts: int = 0,
+) -> None:
+    """Leased items become ready, in their lanes; `solo` marks them, `attempts` are added. Counters are the caller's."""
+    table = schema.item
+    values: dict[str, object] = {
+        "state": ItemState.READY,
+        "lease_token": None,
+        "reason": f"{cause}: {reason}",
+        "attempts": table.c.attempts + attempts,
+    }
+    if solo:
+        values["solo"] = True
+    conn.execute(sa.update(table).where(among(table.c.id, [item.id for item in items])).values(values))
+    change_lanes(conn, job.id, returned((item.queue, item.batch_key, item.solo or solo) for item in items))
+
+
+def end_dead(conn: sa.Connection, item: HeldItem, problem: Problem) -> NewEvent:
+    """A leased item has used up its attempts."""
+    attempts = item.attempts + 1
+    _end(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=_document(problem), attempts=attempts)
+    return NewEvent("item_dead", problem.message, item.id, {"attempts": attempts, "problem": _document(problem)})
+
+
+def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
+    """A lease ends with its last item."""
+    holds = sa.exists().where(schema.item.c.lease_token == lease_token)
+    conn.execute(sa.delete(schema.lease).where(schema.lease.c.token == lease_token, ~holds))
+
+
+# --- helpers ---
+
+
+@dataclass(frozen=True)
+class _Held:
+    job: LockedJob
+    items: Mapping[UUID, HeldItem]
+
+    def committed(self, asked: Iterable[UUID]) -> Committed:
+        asked = tuple(dict.fromkeys(asked))
+        ours = tuple(item for item in asked if item in self.items)
+        return Committed(ours, tuple(item for item in asked if item not in self.items))
+
+
+def _hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> _Held | None:
+    """Lock the job, then those of the items that this lease still holds. The fence of every write."""
+    lease = schema.lease.c
+    job_id = conn.execute(sa.select(lease.job_id).where(lease.token == lease_token)).scalar_one_or_none()
+    job = None if job_id is None else lock_job(conn, job_id)
+    if job is None:
+        return None
+    return _Held(job, {item.id: item for item in held_items(conn, lease_token, items)})
+
+
+def _end(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
+    values = {"state": state, "lease_token": None, "reason": str(cause), "finished_at": CLOCK} | more
+    conn.execute(sa.update(schema.item).where(among(schema.item.c.id, items)).values(values))
+
+
+def _document(problem: Problem) -> dict[str, object]:
+    return asdict(problem)
+
+
+def _store_motions(conn: sa.Connection, job: LockedJob, motions: Sequence[NewMotion]) -> None:
+    assets = _mark_stored(conn, job.tenant, {file.sha256 for motion in motions for file in motion.files.values()})
+    ids = {motion.item: new_id() for motion in motions}
+    conn.execute(
+        sa.insert(schema.motion),
+        [
+            {
+                "id": ids[motion.item],
+                "tenant_id": job.tenant,
+                "job_id": job.id,
+                "item_id": motion.item,
+                "licence": motion.licence,
+                "frames": motion.frames,
+                "fps": motion.fps,
+                "elapsed": motion.elapsed,
+                "metadata": dict(motion.metadata),
+            }
+            for motion in motions
+        ],
+    )
+    files = [
+        {"motion_id": ids[motion.item], "format": name, "asset_id": assets[file.sha256]}
+        for motion in motions
+        for name, file in motion.files.items()
+    ]
+    if files:
+        conn.execute(sa.insert(schema.motion_file), files)
+
+
+def _mark_stored(conn: sa.Connection, tenant: str, digests: set[str]) -> dict[str, UUID]:
+    """Announced assets are stored now; their ids by digest. Locked in the order in which `begin_assets` locks."""
+    table = schema.asset
+    ours = (table.c.tenant_id == tenant) & among(table.c.sha256, digests)
+    rows = conn.execute(
+        sa.select(table.c.sha256, table.c.id).where(ours).order_by(table.c.sha256).with_for_update()
+    ).all()
+    assets: dict[str, UUID] = {row.sha256: row.id for row in rows}
+    if missing := digests - assets.keys():
+        raise ValueError(f"assets committed without begin_assets: {sorted(missing)}")
+    conn.execute(sa.update(table).where(ours, table.c.state == "writing").values(state="stored"))
+    return assets
+
+
+def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID], keys: Sequence[str]) -> None:
+    table = schema.item
+    waiting = (
+        (table.c.job_id == job.id)
+        & (table.c.state == ItemState.READY)
+        & (table.c.stage == Stage.TEXT)
+        & among(table.c.text_key, keys)
+    )
+    siblings = conn.execute(
+        sa.select(table.c.id, table.c.queue, table.c.batch_key, table.c.solo, table.c.run_after)
+        .where(waiting)
+        .with_for_update()
+    ).all()
+    lanes = returned((row.queue, row.batch_key, row.solo) for row in siblings if row.run_after is None)
+    change_lanes(conn, job.id, {lane: LaneChange(-gain.ready, -gain.solo) for lane, gain in lanes.items()})
+    moved = conn.execute(
+        sa.update(table)
+        .where(among(table.c.id, [*items, *(row.id for row in siblings)]))
+        .values(
+            stage=Stage.GENERATE,
+            queue=table.c.model,
+            batch_key=table.c.generate_batch_key,
+            state=ItemState.READY,
+            lease_token=None,
+            run_after=None,
+            solo=False,  # a new stage, other code: it starts with a clean sheet
+            attempts=0,
+            reason=str(Cause.TEXT_READY),
+        )
+        .returning(table.c.queue, table.c.batch_key)
+    ).all()
+    change_lanes(conn, job.id, returned((row.queue, row.batch_key, False) for row in moved))
+    event = NewEvent("progress", f"{len(moved)} prompts parsed", data={"items": 0, "prompts": len(moved)})
+    record(conn, job, [event], moved={(ItemState.LEASED, ItemState.READY): len(items)})
+
+
+def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:
+    document = _document(failure.problem)
+    message = failure.problem.message
+    if not failure.retryable:
+        _end(conn, [item.id], ItemState.FAILED, Cause.ERROR, problem=document)
+        return ItemState.FAILED, NewEvent("item_failed", message, item.id, {"problem": document})
+    attempts = item.attempts + 1
+    if attempts >= rules.max_attempts:
+        return ItemState.DEAD, end_dead(conn, item, failure.problem)
+    delay = min(rules.backoff * 2 ** (attempts - 1), rules.backoff_limit)
+    conn.execute(
+        sa.update(schema.item)
+        .where(schema.item.c.id == item.id)
+        .values(
+            state=ItemState.READY,
+            lease_token=None,
+            attempts=attempts,
+            run_after=CLOCK + interval(delay),
+            reason=f"{Cause.ERROR}: {message}",
+            problem=document,
+        )
+    )
+    data = {"attempts": attempts, "delay": delay, "problem": document}
+    return ItemState.READY, NewEvent("item_retried", f"again in {delay:g} s: {message}", item.id, data)
+
+
+def _fail_early(conn: sa.Connection, job: LockedJob) -> None:
+    broken = job.failed + job.dead
+    if job.fail_early is None or broken <= job.fail_early * job.total or job.ready + job.leased == 0:
+        return
+    reason = f"{broken} of {job.total} items failed, more than the share of {job.fail_early:g} allowed"
+    cancel_open_items(conn, job, Cause.FAIL_EARLY, reason, control=None)

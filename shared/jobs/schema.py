@@ -37,7 +37,7 @@ def _one_of(column: str, values: list[str]) -> str:
 # The rule of `states.job_state`.
 JOB_STATE = """CASE
   WHEN ready + leased > 0 THEN
-    CASE WHEN control = 'paused' THEN 'paused' WHEN ready = total THEN 'queued' ELSE 'running' END
+    CASE WHEN control = 'paused' THEN 'paused' WHEN started_at IS NULL THEN 'queued' ELSE 'running' END
   WHEN total = 0 THEN 'queued'
   WHEN succeeded = total THEN 'succeeded'
   WHEN control = 'cancelled' THEN 'cancelled'
@@ -146,9 +146,7 @@ item = sa.Table(
     ),
     sa.Index("ix_item_run_after", "run_after", postgresql_where=sa.text("run_after IS NOT NULL")),
     sa.Index("ix_item_lease_token", "lease_token", postgresql_where=sa.text("lease_token IS NOT NULL")),
-    sa.Index(
-        "ix_item_text_key", "job_id", "text_key", postgresql_where=sa.text("state = 'ready' AND stage = 'text'")
-    ),
+    sa.Index("ix_item_text_key", "job_id", "text_key", postgresql_where=sa.text("state = 'ready' AND stage = 'text'")),
 )
 
 lane = sa.Table(

@@ -114,17 +114,16 @@ class Counters(Protocol):
     def cancelled(self) -> int: ...
 
 
-def job_state(control: JobControl, counters: Counters) -> JobState:
+def job_state(control: JobControl, counters: Counters, *, started: bool) -> JobState:
     """The state of a job, from what its operator wants and how its items stand.
 
-    Open items left: paused if the operator says so, running once any item was leased or ended, else queued.
-    None left: succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded;
+    Open items left: paused if the operator says so, running once any item was ever leased, else queued. None left: succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded;
     else failed.
     """
     if counters.ready + counters.leased > 0:
         if control is JobControl.PAUSED:
             return JobState.PAUSED
-        return JobState.QUEUED if counters.ready == counters.total else JobState.RUNNING
+        return JobState.RUNNING if started else JobState.QUEUED
     if counters.total == 0:
         return JobState.QUEUED  # only inside the transaction that submits it
     if counters.succeeded == counters.total:

@@ -2,9 +2,34 @@
 
 from __future__ import annotations
 
-import sqlalchemy as sa
+import itertools
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import cast
+from uuid import UUID
 
-from shared.jobs.types import NewJob, SubmittedJob
+import psycopg
+import sqlalchemy as sa
+from psycopg import sql
+from sqlalchemy.dialects.postgresql import insert
+
+from shared.errors import InvalidInput
+from shared.jobs import schema
+from shared.jobs.errors import IdempotencyMismatch
+from shared.jobs.ids import new_id
+from shared.jobs.journal import CLOCK, Lane, LaneChange, NewEvent, among, change_lanes, interval, lock_job, record
+from shared.jobs.policy import policy
+from shared.jobs.states import JobState, Stage
+from shared.jobs.types import PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, NewItem, NewJob, SubmittedJob
+
+CHUNK = 2000  # items held in memory at a time, and keys of one look-up
+
+COLUMNS = (
+    *("id", "job_id", "position", "index", "variant", "name", "prompt", "model", "bundle", "seed", "seconds"),
+    *("settings", "tags", "text_key", "generate_batch_key", "stage", "queue", "batch_key"),
+)
+COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
 
 
 def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
@@ -14,7 +39,133 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     of the same body within 24 hours answers the first one's job, `replayed`.
 
     Raises:
-        InvalidInput: no items, or a value out of its range.
+        InvalidInput: no items, or a value out of its range; nothing is written (roll the transaction back).
         IdempotencyMismatch: the key was used with another body.
     """
-    raise NotImplementedError
+    if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
+        raise InvalidInput(f"{job.priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
+    if job.fail_early is not None and not 0 <= job.fail_early <= 1:
+        raise InvalidInput(f"{job.fail_early} is not a share between 0 and 1", where="fail_early")
+    for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
+        _check_text(text, where)
+    identifier = new_id()
+    earlier = _take_key(conn, job, identifier)
+    if earlier is not None:
+        return earlier
+    conn.execute(
+        sa.insert(schema.job).values(
+            id=identifier,
+            tenant_id=job.tenant,
+            name=job.name,
+            comment=job.comment,
+            priority=job.priority,
+            fail_early=job.fail_early,
+        )
+    )
+    lanes = _write_items(conn, identifier, job.items)
+    total = sum(lanes.values())
+    if total == 0:
+        raise InvalidInput("there is nothing to submit", where="items")
+    _begin(conn, identifier, total)
+    change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
+    return SubmittedJob(identifier, replayed=False, items=total)
+
+
+def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:
+    conn.execute(sa.update(schema.job).where(schema.job.c.id == identifier).values(total=total, ready=total))
+    locked = lock_job(conn, identifier)
+    assert locked is not None
+    record(conn, locked, [NewEvent("submitted", f"submitted with {total} items", data={"to": JobState.QUEUED})])
+
+
+def _take_key(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob | None:
+    """Take the idempotency key for this job, or answer the job that has it. Waits for a submit under way with it."""
+    if job.idempotency_key is None:
+        return None
+    if job.body_sha256 is None:
+        raise InvalidInput("an idempotency key needs the digest of the body", where="body_sha256")
+    table = schema.idempotency
+    values = {"body_sha256": job.body_sha256, "job_id": identifier, "created_at": CLOCK}
+    forgotten = table.c.created_at < CLOCK - interval(policy().idempotency)
+    ours = conn.execute(
+        insert(table)
+        .values(tenant_id=job.tenant, key=job.idempotency_key, **values)
+        .on_conflict_do_update(
+            index_elements=["tenant_id", "key"],
+            set_=values,
+            where=forgotten,
+        )
+        .returning(table.c.job_id)
+    ).one_or_none()
+    if ours is not None:
+        return None
+    earlier = conn.execute(
+        sa.select(table.c.body_sha256, table.c.job_id, schema.job.c.total)
+        .join(schema.job, schema.job.c.id == table.c.job_id)
+        .where(table.c.tenant_id == job.tenant, table.c.key == job.idempotency_key)
+    ).one()
+    if earlier.body_sha256 != job.body_sha256:
+        raise IdempotencyMismatch(
+            "this idempotency key was used with another body",
+            where=f"idempotency key {job.idempotency_key}",
+            hint="Use a new key for a new submit.",
+        )
+    return SubmittedJob(earlier.job_id, replayed=True, items=earlier.total)
+
+
+def _write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem]) -> Counter[Lane]:
+    """COPY the items in chunks; how many each lane has got."""
+    lanes: Counter[Lane] = Counter()
+    connection = cast("psycopg.Connection", conn.connection.driver_connection)
+    positions = itertools.count()
+    for chunk in _chunks(items):
+        known = _known_texts(conn, {item.text_key for item in chunk})
+        with connection.cursor() as cursor, cursor.copy(COPY) as copy:
+            for item, position in zip(chunk, positions, strict=False):
+                _check_item(item)
+                stage = Stage.GENERATE if item.text_key in known else Stage.TEXT
+                lane = (TEXT_QUEUE, item.text_batch_key) if stage is Stage.TEXT else (item.model, item.batch_key)
+                lanes[lane] += 1
+                copy.write_row(_row(item, job, position, stage, lane))
+    return lanes
+
+
+def _chunks(items: Iterable[NewItem]) -> Iterator[list[NewItem]]:
+    source = iter(items)
+    while chunk := list(itertools.islice(source, CHUNK)):
+        yield chunk
+
+
+def _row(item: NewItem, job: UUID, position: int, stage: Stage, lane: Lane) -> tuple[object, ...]:
+    return (
+        *(new_id(), job, position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle),
+        *(item.seed, item.seconds, json.dumps(dict(item.settings)), list(item.tags), item.text_key, item.batch_key),
+        *(str(stage), *lane),
+    )
+
+
+def _known_texts(conn: sa.Connection, keys: set[str]) -> set[str]:
+    table = schema.text_features.c
+    return set(conn.execute(sa.select(table.key).where(among(table.key, keys))).scalars())
+
+
+def _check_item(item: NewItem) -> None:
+    where = f"items[{item.index}]"
+    _check_text(item.prompt, f"{where}.prompt")
+    _check_text(item.name, f"{where}.name")
+    for tag in item.tags:
+        _check_text(tag, f"{where}.tags")
+    if not 0 <= item.seed < SEED_LIMIT:
+        raise InvalidInput(f"{item.seed} is not a seed: 0 … {SEED_LIMIT - 1}", where=f"{where}.seed")
+
+
+def _check_text(text: str | None, where: str) -> None:
+    """Postgres holds any text but NUL and half surrogate pairs."""
+    if text is None or (text.isascii() and "\0" not in text):
+        return
+    if "\0" in text:
+        raise InvalidInput("there is a NUL character in it", where=where, hint="Remove it.")
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise InvalidInput("it is not valid Unicode", where=where, hint="Save the file as UTF-8.") from error

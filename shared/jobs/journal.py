@@ -1,0 +1,232 @@
+"""The job row: its lock, its counters, its events. Every change of an item goes through `record`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import ARRAY, insert
+
+from shared.errors import NotFound
+from shared.jobs import schema
+from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from shared.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
+
+CLOCK = sa.func.clock_timestamp()
+"""Database time at this statement; `now()` is that of the transaction's begin, before it waited for locks."""
+
+
+def among(column: sa.Column[Any], values: Iterable[object]) -> sa.ColumnElement[bool]:
+    """`column = ANY(array)`: one parameter, however many values."""
+    return column == sa.any_(sa.literal(list(values), ARRAY(column.type)))
+
+
+def interval(seconds: float) -> sa.Function[object]:
+    """A length of time for comparisons with `CLOCK`."""
+    return sa.func.make_interval(0, 0, 0, 0, 0, 0, seconds)
+
+
+Lane = tuple[str, str]
+"""Queue and batch key."""
+
+
+@dataclass(frozen=True)
+class LockedJob:
+    """A job row under our lock."""
+
+    id: UUID
+    tenant: str
+    control: JobControl
+    fail_early: float | None
+    started: bool
+    total: int
+    ready: int
+    leased: int
+    succeeded: int
+    failed: int
+    dead: int
+    cancelled: int
+
+    @property
+    def state(self) -> JobState:
+        """As the column of that name."""
+        return job_state(self.control, self, started=self.started)
+
+    def counters(self) -> dict[str, int]:
+        """Items by state, and `total`."""
+        return {"total": self.total} | {str(state): getattr(self, state) for state in ItemState}
+
+
+@dataclass(frozen=True)
+class NewEvent:
+    """An event to write; counters and state are added."""
+
+    kind: str
+    reason: str
+    item: UUID | None = None
+    data: Mapping[str, object] = field(default_factory=dict[str, object])
+
+
+@dataclass(frozen=True)
+class LaneChange:
+    """How much a lane gains (or loses, negative)."""
+
+    ready: int = 0
+    solo: int = 0
+
+
+def lock_job(
+    conn: sa.Connection, job: UUID, *, tenant: str | None = None, skip_locked: bool = False
+) -> LockedJob | None:
+    """Lock a job row until the transaction ends; None when there is none (or, with `skip_locked`, none free)."""
+    table = schema.job.c
+    query = sa.select(
+        table.id,
+        table.tenant_id.label("tenant"),
+        table.control,
+        table.fail_early,
+        table.started_at.is_not(None).label("started"),
+        table.total,
+        *(table[str(state)] for state in ItemState),
+    ).where(table.id == job)
+    if tenant is not None:
+        query = query.where(table.tenant_id == tenant)
+    # NO KEY: rows that refer to the job may be inserted by others meanwhile.
+    row = conn.execute(query.with_for_update(key_share=True, skip_locked=skip_locked)).mappings().one_or_none()
+    if row is None:
+        return None
+    values: dict[str, Any] = dict(row)
+    values["control"] = JobControl(row["control"])
+    return LockedJob(**values)
+
+
+def lock_job_of(conn: sa.Connection, tenant: str, job: UUID) -> LockedJob:
+    """Lock a tenant's job.
+
+    Raises:
+        NotFound: the tenant has no such job.
+    """
+    locked = lock_job(conn, job, tenant=tenant)
+    if locked is None:
+        raise no_such_job(job)
+    return locked
+
+
+def no_such_job(job: UUID) -> NotFound:
+    """The error for a job that is not there, or somebody else's."""
+    return NotFound("there is no such job", where=f"job {job}", hint="`marey jobs list` shows yours.")
+
+
+def record(
+    conn: sa.Connection,
+    job: LockedJob,
+    events: Sequence[NewEvent] = (),
+    *,
+    moved: Mapping[tuple[ItemState, ItemState], int] | None = None,
+    control: JobControl | None = None,
+) -> LockedJob:
+    """Write what happened to a job under lock: counters, control, times, events with their numbers, notification.
+
+    Args:
+        moved: how many items went from one state to another.
+        events: in order. When the job's state changes an event `state` follows them.
+    """
+    after = _moved(replace(job, control=control or job.control), moved or {})
+    if after.state is not job.state:
+        change = NewEvent("state", f"{job.state} → {after.state}", data={"from": job.state, "to": after.state})
+        events = [*events, change]
+    table = schema.job
+    ended = after.state in ENDED
+    last = conn.execute(
+        sa.update(table)
+        .where(table.c.id == job.id)
+        .values(
+            control=after.control,
+            **{str(state): getattr(after, state) for state in ItemState},
+            event_seq=table.c.event_seq + len(events),
+            started_at=sa.func.coalesce(table.c.started_at, CLOCK) if after.started else None,
+            finished_at=sa.func.coalesce(table.c.finished_at, CLOCK) if ended else None,
+        )
+        .returning(table.c.event_seq)
+    ).scalar_one()
+    if events:
+        _write_events(conn, after, events, first=last - len(events) + 1)
+    return after
+
+
+def change_lanes(conn: sa.Connection, job: UUID, changes: Mapping[Lane, LaneChange]) -> None:
+    """Add to lanes of a job under lock (and make them), tell the relay of those that gained; or take from them."""
+    table = schema.lane
+    gains = {lane: change for lane, change in changes.items() if change.ready >= 0 and change.solo >= 0}
+    if gains:
+        new = insert(table).values(
+            [
+                {"job_id": job, "queue": queue, "batch_key": key, "ready": change.ready, "solo": change.solo}
+                for (queue, key), change in gains.items()
+            ]
+        )
+        was_empty = table.c.ready + table.c.solo == 0
+        conn.execute(
+            new.on_conflict_do_update(
+                index_elements=["job_id", "queue", "batch_key"],
+                set_={
+                    "ready": table.c.ready + new.excluded.ready,
+                    "solo": table.c.solo + new.excluded.solo,
+                    "waiting_since": sa.case((was_empty, CLOCK), else_=table.c.waiting_since),
+                },
+            )
+        )
+        notify(conn, QUEUE_CHANNEL, {queue for queue, _ in gains})
+    for (queue, key), change in changes.items():
+        if (queue, key) not in gains:
+            conn.execute(
+                sa.update(table)
+                .where(table.c.job_id == job, table.c.queue == queue, table.c.batch_key == key)
+                .values(ready=table.c.ready + change.ready, solo=table.c.solo + change.solo)
+            )
+
+
+def returned(items: Iterable[tuple[str, str, bool]]) -> dict[Lane, LaneChange]:
+    """The gains of lanes to which these items (queue, batch key, solo) return."""
+    counts = Counter(items)
+    return {
+        (queue, key): LaneChange(ready=counts[queue, key, False], solo=counts[queue, key, True])
+        for queue, key, _ in counts
+    }
+
+
+def notify(conn: sa.Connection, channel: str, payloads: Iterable[str]) -> None:
+    """NOTIFY when this transaction commits; equal ones are sent once."""
+    for payload in payloads:
+        conn.execute(sa.select(sa.func.pg_notify(channel, payload)))
+
+
+def _moved(job: LockedJob, moved: Mapping[tuple[ItemState, ItemState], int]) -> LockedJob:
+    counts = {str(state): int(getattr(job, state)) for state in ItemState}
+    for (before, after), count in moved.items():
+        counts[before] -= count
+        counts[after] += count
+    return replace(job, started=job.started or counts[ItemState.LEASED] > 0, **counts)
+
+
+def _write_events(conn: sa.Connection, job: LockedJob, events: Sequence[NewEvent], *, first: int) -> None:
+    common = {"counters": job.counters(), "state": job.state}
+    conn.execute(
+        sa.insert(schema.job_event).values(at=CLOCK),
+        [
+            {
+                "job_id": job.id,
+                "seq": seq,
+                "kind": event.kind,
+                "item_id": event.item,
+                "reason": event.reason,
+                "data": {**event.data, **common},
+            }
+            for seq, event in enumerate(events, first)
+        ],
+    )
+    notify(conn, EVENT_CHANNEL, [str(job.id)])

@@ -1,0 +1,61 @@
+"""Who works: a row per worker, renewed by its heartbeat."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import insert
+
+from shared.jobs import schema
+from shared.jobs.journal import CLOCK, interval
+from shared.jobs.policy import Policy, policy
+from shared.jobs.types import WorkerBeat, WorkerRow
+
+
+def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
+    """Note that a worker lives."""
+    values = {
+        "queue": worker.queue,
+        "host": worker.host,
+        "pid": worker.pid,
+        "device": worker.device,
+        "bundle": worker.bundle,
+        "batch_key": worker.batch_key,
+        "seen_at": CLOCK,
+    }
+    conn.execute(
+        insert(schema.worker)
+        .values(id=worker.id, started_at=CLOCK, **values)
+        .on_conflict_do_update(index_elements=["id"], set_=values)
+    )
+
+
+def retire(conn: sa.Connection, worker: str) -> None:
+    """Forget a worker that stops in good order."""
+    conn.execute(sa.delete(schema.worker).where(schema.worker.c.id == worker))
+
+
+def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[str, int]:
+    """How many workers live, by queue."""
+    table = schema.worker.c
+    rows = conn.execute(
+        sa.select(table.queue, sa.func.count().label("workers")).where(_live(rules or policy())).group_by(table.queue)
+    )
+    return {row.queue: row.workers for row in rows}
+
+
+def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[WorkerRow]:
+    """Every worker seen within a day, newest heartbeat first."""
+    table = schema.worker.c
+    rows = conn.execute(
+        sa.select(
+            *(table.id, table.queue, table.host, table.pid, table.device, table.bundle),
+            table.started_at.label("started"),
+            table.seen_at.label("seen"),
+            _live(rules or policy()).label("live"),
+        ).order_by(table.seen_at.desc(), table.id)
+    )
+    return [WorkerRow(**row) for row in rows.mappings()]
+
+
+def _live(rules: Policy) -> sa.ColumnElement[bool]:
+    return schema.worker.c.seen_at > CLOCK - interval(rules.worker_live)
