@@ -61,9 +61,7 @@ class Splits(BaseModel):
 
     def by_clip(self) -> dict[str, str]:
         """Split of each clip."""
-        return {
-            name: split for split in ("train", "val", "test", "compositional") for name in getattr(self, split)
-        }
+        return {name: split for split in ("train", "val", "test", "compositional") for name in getattr(self, split)}
 
 
 def pack_bandai_namco(
@@ -108,7 +106,9 @@ def pack_cmu(
     """
     path = captions or source.parent / "cmu-captions.json"
     if not path.is_file():
-        raise NotFound("no caption file", where=str(path), hint="Give it with --captions, or put it beside the archive.")
+        raise NotFound(
+            "no caption file", where=str(path), hint="Give it with --captions, or put it beside the archive."
+        )
     try:
         table = {name: str(row["description"]) for name, row in json.loads(path.read_text("utf-8")).items()}
     except (ValueError, KeyError, TypeError, AttributeError) as error:

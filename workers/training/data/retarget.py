@@ -101,7 +101,9 @@ def retarget(source: SourceMotion, rig: Rig) -> Array:
         out[:, hip] = out[:, 0] + _turn(hips, _REST[hip])
         out[:, toe] = scale * leg[:, 3]
         out[:, ankle] = out[:, toe] - _turn(_sole(leg, source.lateral[:, lateral], rig), _REST[toe])
-        out[:, knee], reached = _two_bones(out[:, hip], out[:, ankle], leg, forward, (_LENGTH[knee], _LENGTH[ankle]))
+        out[:, knee], reached = two_bones(
+            out[:, hip], out[:, ankle], _knee_pole(leg, forward), (_LENGTH[knee], _LENGTH[ankle])
+        )
         out[:, toe] += reached - out[:, ankle]
         out[:, ankle] = reached
 
@@ -152,19 +154,21 @@ def _ankle_shift(legs: tuple[Array, Array], rig: Rig, scale: float) -> tuple[flo
     return float(bone * np.cos(pitch) - _REST[10, 2]), float(-_REST[10, 1] - bone * np.sin(pitch))
 
 
-def _two_bones(
-    hip: Array, ankle: Array, leg: Array, forward: Array, lengths: tuple[float, float]
-) -> tuple[Array, Array]:
-    """Knee (T, 3) by the cosine rule in the plane of the source's knee, and the ankle, pulled in where out of reach."""
+def _knee_pole(leg: Array, forward: Array) -> Array:
+    """(T, 3) where the source's knee points, off the line from hip to ankle, with a little forward added."""
+    axis = normalize(leg[:, 2] - leg[:, 0])
+    bend = leg[:, 1] - leg[:, 0]
+    return bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None] + _KNEE_PRIOR * forward
+
+
+def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float]) -> tuple[Array, Array]:
+    """Knee (T, 3) by the cosine rule, bent towards `pole`, and the ankle (T, 3), pulled in where it is out of reach."""
     upper, lower = lengths
     line = ankle - hip
     distance = np.linalg.norm(line, axis=-1, keepdims=True)
     axis = line / distance
     distance = np.clip(distance, abs(upper - lower) + 1e-3, (upper + lower) * _MAX_REACH)
-    source_axis = normalize(leg[:, 2] - leg[:, 0])
-    bend = leg[:, 1] - leg[:, 0]
-    bend = bend - source_axis * np.einsum("ti,ti->t", bend, source_axis)[:, None] + _KNEE_PRIOR * forward
-    pole = normalize(bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None])
+    pole = normalize(pole - axis * np.einsum("ti,ti->t", pole, axis)[:, None])
     along = (distance**2 + upper**2 - lower**2) / (2 * distance)
     aside = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     return hip + along * axis + aside * pole, hip + distance * axis

@@ -1,0 +1,293 @@
+"""Captions from facts, by a seeded grammar (`grammar.toml`). Every statement is a label that the motion confirmed, or a
+number that was measured on it; a phrase whose field was not measured, or whose condition does not hold, is not used."""
+
+from __future__ import annotations
+
+import hashlib
+import random
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from workers.training.data.describe import LOCOMOTION, Facts
+from workers.training.data.english import conjugate, number, sentence, with_adjective
+
+_FIELD = re.compile(r"{(\w+)}")
+_PRONOUNS = {"a man": "his", "a guy": "his", "he": "his", "a woman": "her", "a lady": "her", "she": "her"}
+_UNADJECTIVED = ("he", "she", "someone", "somebody")
+LONG_WORDS = (30, 60)
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a style is said."""
+
+    after: tuple[str, ...]
+    adjective: tuple[str, ...]
+    sentence: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """`grammar.toml`."""
+
+    subjects: tuple[str, ...]
+    acts: dict[str, tuple[str, ...]]
+    details: dict[str, tuple[str, ...]]
+    pace: dict[str, tuple[str, ...]]
+    height: dict[str, tuple[str, ...]]
+    styles: dict[str, Style]
+    two: tuple[str, ...]
+    three: tuple[str, ...]
+
+
+@lru_cache(maxsize=1)
+def grammar() -> Grammar:
+    """The grammar of the package."""
+    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("grammar.toml").read_text("utf-8"))
+    return Grammar(
+        subjects=tuple(table["subjects"]),
+        acts={act: tuple(rows["phrases"]) for act, rows in table["acts"].items()},
+        details={name: tuple(rows) for name, rows in table["details"].items()},
+        pace={name: tuple(rows) for name, rows in table["pace"].items()},
+        height={name: tuple(rows) for name, rows in table["height"].items()},
+        styles={
+            name: Style(tuple(rows["after"]), tuple(rows["adjective"]), tuple(rows["sentence"]))
+            for name, rows in table["styles"].items()
+        },
+        two=tuple(table["join"]["two"]),
+        three=tuple(table["join"]["three"]),
+    )
+
+
+def seeded(*parts: object) -> random.Random:
+    """A generator that depends on the parts alone, on every machine."""
+    return random.Random(hashlib.sha256("\0".join(map(str, parts)).encode()).digest())
+
+
+# -- what may be said of a motion ----------------------------------------------------------------------------------------
+
+
+def pace_of(facts: Facts) -> str | None:
+    """slow, medium or fast; None when the body does not travel."""
+    slow, fast = {"run": (1.9, 3.2), "dash": (2.2, 3.4)}.get(facts.act, (0.75, 1.45))
+    if facts.act not in LOCOMOTION or facts.gait.path < 0.8:
+        return None
+    return "slow" if facts.gait.speed < slow else "fast" if facts.gait.speed > fast else "medium"
+
+
+def height_of(facts: Facts) -> str | None:
+    """How high the hand goes that is up (the lower one of both)."""
+    if facts.side not in ("left", "right", "both"):
+        return None
+    hands = [h for h, name in zip(facts.hands, ("left", "right"), strict=True) if facts.side in (name, "both")]
+    head, peak = min(h.head for h in hands), min(h.peak for h in hands)
+    if head > 0.12:
+        return "above_head"
+    if head > -0.1:
+        return "head_high"
+    return "shoulder_high" if -0.18 < peak < 0.1 else None
+
+
+def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
+    """What the braces of phrases may be filled with; what was not measured is absent."""
+    words = rng.random() < 0.5
+    out = {"seconds": number(facts.gait.duration, words=words)} if facts.gait.duration > 1.4 else {}
+    if facts.act in LOCOMOTION:
+        if facts.gait.path > 1.5:
+            out["metres"] = number(facts.gait.path, words=words)
+        if 2 <= facts.gait.steps <= 20:
+            out["steps"] = number(facts.gait.steps, words=words)
+        if facts.act == "turn":
+            out["degrees"] = str(round(abs(facts.gait.turn) / 10) * 10)
+    if facts.side:
+        hands = f"{facts.side} hands" if facts.side == "both" else f"{facts.side} hand"
+        out |= {"side": facts.side, "it": "them" if facts.side == "both" else "it"}
+        out |= {"arms": hands.replace("hand", "arm"), "wrists": hands, "hands": hands}
+        out |= {"hands_his": hands if facts.side == "both" else f"{pronoun} {hands}"}
+        if facts.side != "both":
+            out["other"] = "right" if facts.side == "left" else "left"
+        if facts.act == "wave":
+            swings = max(h.swings for h in facts.hands) // 2
+            if swings >= 2:
+                out["count"] = number(swings, words=words)
+    g = grammar()
+    if pace := pace_of(facts):
+        out["pace"] = rng.choice(g.pace[pace])
+    if height := height_of(facts):
+        out["height"] = rng.choice(g.height[height])
+    return out
+
+
+def _fill(phrase: str, values: dict[str, str]) -> str | None:
+    """The phrase with its fields filled, or None when one was not measured."""
+    if any(name not in values for name in _FIELD.findall(phrase)):
+        return None
+    text = _FIELD.sub(lambda match: values[match.group(1)], phrase)
+    return text.replace("the both ", "both ")
+
+
+def _details(facts: Facts) -> list[str]:
+    """Names of the details that are true of the motion."""
+    names = ["duration"]
+    if facts.act in LOCOMOTION:
+        names += ["travel", "steps"] + (["turn"] if facts.act == "turn" else [])
+    if facts.act in ("wave", "raise", "guide"):
+        if height := height_of(facts):
+            names.append(height)
+        others = [h for h, name in zip(facts.hands, ("left", "right"), strict=True) if name != facts.side]
+        if facts.side != "both" and others and others[0].peak < -0.28:
+            names.append("idle_arm")
+        if facts.act == "wave":
+            names.append("waves")
+    if facts.act in ("wave", "raise", "guide", "bow", "call") and facts.gait.path < 0.1:
+        names.append("in_place")
+    if facts.act in ("bow", "call"):
+        names.append("deep_lean" if facts.lean > 40 else "slight_lean" if facts.lean < 25 else "")
+    elif facts.lean < 8:
+        names.append("upright")
+    return [name for name in names if name]
+
+
+# -- sentences -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Voice:
+    """Who does it, in which verb form."""
+
+    subject: str
+    form: str
+    pronoun: str
+
+    def clause(self, phrase: str) -> str:
+        """Subject and conjugated phrase."""
+        verb = conjugate(phrase, "gerund" if self.form == "progressive" else self.form)
+        if self.form == "progressive":
+            verb = "is " + verb
+        return f"{self.subject} {verb}" if self.subject else verb
+
+
+def _voice(rng: random.Random, *, plain: bool, adjective: str = "") -> _Voice:
+    """`plain` leaves out captions without a subject ("walking forward")."""
+    draw = rng.random()
+    subject = rng.choice(grammar().subjects)
+    pronoun = _PRONOUNS.get(subject, "their")
+    if not plain and draw < 0.3 and not adjective:
+        return _Voice("", "base" if draw < 0.15 else "gerund", rng.choice(["the", "their"]))
+    if adjective and subject in _UNADJECTIVED:
+        subject, pronoun = "a person", "their"
+    return _Voice(with_adjective(subject, adjective), "progressive" if draw > 0.82 else "third", pronoun)
+
+
+def _phrase(facts: Facts, rng: random.Random, pronoun: str) -> str:
+    """A verb phrase of the act, filled; verbs still in angle brackets."""
+    phrases = list(grammar().acts[facts.act])
+    values = fields(facts, rng, pronoun)
+    rng.shuffle(phrases)
+    for phrase in phrases:
+        filled = _fill(phrase, values)
+        if filled is not None:
+            return filled + (_times(facts.repeats, rng) if facts.repeats > 1 else "")
+    raise AssertionError(f"no phrase of {facts.act} without fields")
+
+
+def _times(repeats: int, rng: random.Random) -> str:
+    if rng.random() < 0.3:
+        return rng.choice(["", " repeatedly", " again and again" if repeats > 2 else ""])
+    return " twice" if repeats == 2 else f" {number(repeats, words=True)} times"
+
+
+def short_caption(facts: Facts, rng: random.Random) -> str:
+    """A few words: the act, and its style as an adverb, an adjective or not at all."""
+    style = grammar().styles[facts.style]
+    draw = rng.random()
+    adjective = rng.choice(style.adjective) if style.adjective and draw < 0.3 else ""
+    voice = _voice(rng, plain=False, adjective=adjective)
+    text = voice.clause(_phrase(facts, rng, voice.pronoun))
+    after = "" if adjective or draw > 0.88 else rng.choice(style.after)
+    if after and rng.random() < 0.12 and voice.subject:
+        return sentence(f"{after}, {text}")
+    return _loosen(f"{text} {after}", rng)
+
+
+def long_caption(facts: Facts, rng: random.Random) -> str:
+    """30 to 60 words: what is done, how, for how long, how far and with what."""
+    g = grammar()
+    style = g.styles[facts.style]
+    voice = _voice(rng, plain=True)
+    values = fields(facts, rng, voice.pronoun)
+    parts = [voice.clause(_phrase(facts, rng, voice.pronoun)) + " " + rng.choice(style.after)]
+    names = _details(facts)
+    rng.shuffle(names)
+    said = [text for name in names if (text := _fill(rng.choice(g.details[name]), values))]
+    first, rest = said[:2], said[2:]
+    sentences = [sentence(", ".join([parts[0], *first])), rng.choice(style.sentence)]
+    for text in rest:
+        sentences.append(sentence(f"{rng.choice(_OPENERS)} {text}"))
+    again = _voice(rng, plain=True)
+    while len(" ".join(sentences).split()) < LONG_WORDS[0]:
+        more = again.clause(_phrase(facts, rng, again.pronoun))
+        sentences.append(sentence(f"{rng.choice(_AGAIN)} {more}"))
+    words, kept = 0, []
+    for text in sentences:
+        words += len(text.split())
+        if kept and words > LONG_WORDS[1]:
+            break
+        kept.append(text)
+    return " ".join(kept)
+
+
+_OPENERS = ("All this is done", "It happens", "The motion goes on", "One sees it done")
+_AGAIN = ("In other words,", "Seen from outside,", "That is to say,", "To put it differently,", "In short,")
+
+
+def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
+    """Two or three acts in their order, with verbs of each."""
+    g = grammar()
+    voice = _voice(rng, plain=False)
+    same = len({facts.style for facts in parts}) == 1
+    phrases = []
+    for facts in parts:
+        after = rng.choice(g.styles[facts.style].after) if not same and rng.random() < 0.6 else ""
+        phrases.append(f"{_phrase(facts, rng, voice.pronoun)} {after}".strip())
+    frame = rng.choice(g.two if len(parts) == 2 else g.three)
+    text = (
+        frame.replace("{a}", phrases[0]).replace("{b_ing}", conjugate(phrases[1], "gerund")).replace("{b}", phrases[1])
+    )
+    text = text.replace("{c}", phrases[-1])
+    after = rng.choice(g.styles[parts[0].style].after) if same and rng.random() < 0.7 else ""
+    if text.startswith("first ") and voice.subject:
+        return _loosen("first " + voice.clause(text.removeprefix("first ")) + f" {after}", rng)
+    return _loosen(f"{voice.clause(text)} {after}", rng)
+
+
+def _loosen(text: str, rng: random.Random) -> str:
+    """Mostly a proper sentence; sometimes as people type: no capital, no full stop."""
+    proper = sentence(text)
+    return proper if rng.random() < 0.6 else proper[:-1][:1].lower() + proper[:-1][1:]
+
+
+def captions(parts: Sequence[Facts], seed: str, count: int = 4) -> tuple[str, ...]:
+    """Different captions of a clip, all true of it: short ones, and a long one last where there is one act.
+
+    Args:
+        parts: the acts of the clip in order.
+        seed: the clip's id: the same clip has the same captions everywhere.
+        count: how many.
+    """
+    rng = seeded("captions", seed)
+    out: dict[str, None] = {}
+    if parts[0].text:
+        out |= dict.fromkeys(parts[0].text)
+    if len(parts) == 1 and not parts[0].text:
+        out[long_caption(parts[0], rng)] = None
+    for _ in range(20):
+        if len(out) >= count or parts[0].text:
+            break
+        out[short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)] = None
+    return tuple(reversed(out))

@@ -1,0 +1,55 @@
+"""The little English that captions need: verb forms, articles, numbers in words."""
+
+from __future__ import annotations
+
+import re
+
+_DOUBLE = {"run", "jog", "step", "put", "let", "spin", "cut", "jab", "drag", "hop", "stop", "get", "slip", "nod"}
+_WORDS = "zero one two three four five six seven eight nine ten eleven twelve".split()
+_VERB = re.compile(r"<([a-z]+)>")
+
+
+def third(verb: str) -> str:
+    """`walk` to `walks`, `push` to `pushes`, `carry` to `carries`."""
+    if re.search(r"(s|sh|ch|x|z|o)$", verb):
+        return verb + "es"
+    if re.search(r"[^aeiou]y$", verb):
+        return verb[:-1] + "ies"
+    return verb + "s"
+
+
+def gerund(verb: str) -> str:
+    """`walk` to `walking`, `run` to `running`, `wave` to `waving`."""
+    if verb in _DOUBLE:
+        return verb + verb[-1] + "ing"
+    if verb.endswith("e") and not verb.endswith(("ee", "oe", "ye")):
+        return verb[:-1] + "ing"
+    return verb + "ing"
+
+
+def conjugate(phrase: str, form: str) -> str:
+    """Put each <verb> of a phrase into a form: `third` (walks), `gerund` (walking) or `base` (walk)."""
+    how = {"third": third, "gerund": gerund, "base": str}[form]
+    return _VERB.sub(lambda match: how(match.group(1)), phrase)
+
+
+def number(value: float, *, words: bool) -> str:
+    """A whole number, in words up to twelve when asked for."""
+    whole = round(value)
+    return _WORDS[whole] if words and 0 <= whole < len(_WORDS) else str(whole)
+
+
+def with_adjective(subject: str, adjective: str) -> str:
+    """`a person`, `old` to `an old person`; pronouns and `somebody` take none."""
+    match = re.fullmatch(r"(a|an|the) (.+)", subject)
+    if not match or not adjective:
+        return subject
+    article = "the" if match[1] == "the" else "an" if adjective[0] in "aeiou" else "a"
+    return f"{article} {adjective} {match[2]}"
+
+
+def sentence(text: str) -> str:
+    """Capital letter, single spaces, one full stop."""
+    text = re.sub(r"\s+", " ", text).strip().rstrip(".")
+    text = re.sub(r"\s+,", ",", text)
+    return text[:1].upper() + text[1:] + "."

@@ -1,0 +1,101 @@
+"""What stands in a prepared folder: manifest and clip lines, as models."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+FORMAT = "marey-prepared-1"
+FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS, MANIFEST, TEXTS = (
+    "features.npy",
+    "joints.npy",
+    "roots.npy",
+    "clips.jsonl",
+    "statistics.npz",
+    "manifest.json",
+    "texts.npz",
+)
+FILES = (FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS)
+
+
+class FileEntry(BaseModel):
+    """A file of the folder."""
+
+    model_config = ConfigDict(frozen=True)
+
+    sha256: str
+    bytes: int
+
+
+class SourceEntry(BaseModel):
+    """One archive that the data came from, with its terms."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    title: str
+    licence: str
+    credit: str
+    url: str
+
+
+class Manifest(BaseModel):
+    """`manifest.json`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: str
+    sources: tuple[SourceEntry, ...]
+    layout: str
+    facing_sigma: float
+    fps: float
+    skeleton: str
+    dim: int
+    frames: int
+    clips: int
+    splits: dict[str, int]
+    lengths: dict[str, dict[str, int]]
+    """By split, how many clips have so many seconds (`0-1`, `1-2`, …)."""
+    kinds: dict[str, int]
+    """captured, mirrored, looped, spliced."""
+    captions: int
+    left_out: dict[str, str]
+    """Captured clips that are not used, each with the reason."""
+    compositional_pairs: tuple[tuple[str, str], ...]
+    files: dict[str, FileEntry]
+
+
+class Measured(BaseModel):
+    """What was measured on a clip; angles in degrees, positive to the left."""
+
+    model_config = ConfigDict(frozen=True)
+
+    seconds: float
+    path: float
+    turn: float
+    speed: float
+    steps: int
+    side: str
+
+
+class Clip(BaseModel):
+    """One line of `clips.jsonl`.
+
+    `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of its
+    first part. `acts` are the acts in order, as the caption grammar calls them.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    id: str
+    start: int
+    length: int
+    joints_start: int
+    split: str
+    dataset: str
+    content: str
+    style: str
+    mirrored: bool
+    spliced: tuple[str, ...]
+    acts: tuple[str, ...]
+    measured: Measured
+    captions: tuple[str, ...]
