@@ -47,6 +47,14 @@ class RoleLabeller(Protocol):
         ...
 
 
+class PredicateFinder(Protocol):
+    """Finds the predicates alone."""
+
+    def predicates(self, words: Sequence[str]) -> list[int]:
+        """Word indices of the predicates of a sentence, in order."""
+        ...
+
+
 def spans_to_arguments(tags: Sequence[str]) -> tuple[Argument, ...]:
     """Read BIO tags (`B-ARG0 I-ARG0 O B-V`) as arguments; `V` itself is none.
 

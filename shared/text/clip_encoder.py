@@ -1,0 +1,50 @@
+"""Text encoder `clip-vit-b32`: the text tower of CLIP ViT-B/32, 512-d (Radford et al. 2021), as in MoMask and HGM³."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from shared.errors import InvalidFile
+from shared.text.encoders import WIDTHS, Encoding, weights_sha256
+from shared.text.pretrained import load_pretrained, read_config
+
+MAX_TOKENS = 77
+
+
+class ClipEncoder:
+    """Pooled = projected state of the end token. Token states pass the same projection: one space for all nodes (ours;
+    GraphMotion mixes projected sentences with unprojected tokens). Tokens past 77 are left out; the sentence is then
+    that of the first 75 words' pieces and the end token.
+    """
+
+    name = "clip-vit-b32"
+    width = WIDTHS["clip-vit-b32"]
+
+    def __init__(self, folder: Path) -> None:
+        from transformers import CLIPTextModelWithProjection, CLIPTokenizer
+
+        config = read_config(folder)
+        text = config.get("text_config") or config
+        if not str(config.get("model_type", "")).startswith("clip") or text.get("hidden_size") != self.width:
+            raise InvalidFile(
+                "is not the text tower of CLIP ViT-B/32 (hidden size 512)",
+                where=str(folder),
+                hint="The folder needs the files of openai/clip-vit-base-patch32.",
+            )
+        self.sha256 = weights_sha256(folder)
+        self._tokenizer: Any = load_pretrained(CLIPTokenizer, folder)
+        self._model: Any = load_pretrained(CLIPTextModelWithProjection, folder, weights=True)
+
+    @torch.inference_mode()
+    def encode(self, text: str) -> Encoding:
+        """Encode one text; tokens past 77 are left out."""
+        inputs = self._tokenizer(
+            text, truncation=True, max_length=MAX_TOKENS, return_offsets_mapping=True, return_tensors="pt"
+        )
+        offsets = tuple((int(a), int(b)) for a, b in inputs.pop("offset_mapping")[0].tolist())
+        output = self._model(**inputs)
+        tokens = self._model.text_projection(output.last_hidden_state[0])
+        return Encoding(output.text_embeds[0].numpy(), tokens.numpy(), offsets)
