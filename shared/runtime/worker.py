@@ -9,11 +9,13 @@ import os
 import signal
 import socket
 import threading
+import warnings
 from dataclasses import asdict
 from typing import Any
 
 import psutil
 from celery import signals
+from celery.platforms import SecurityWarning
 
 from shared.errors import InvalidInput
 from shared.runtime.app import create_app
@@ -54,6 +56,8 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
     os.environ[ROLE_VARIABLE] = json.dumps(asdict(role))
     os.environ[NAME_VARIABLE] = name
     os.environ["MAREY_DATABASE_URL"] = chosen.database_url.get_secret_value()  # the child is a fresh interpreter
+    # Celery warns root of pickle, which this app does not accept.
+    warnings.filterwarnings("ignore", category=SecurityWarning)
     app = create_app(chosen.queue_url.get_secret_value())
     signals.setup_logging.connect(_keep_logging, weak=False)
     signals.worker_shutting_down.connect(_stop_children, weak=False)

@@ -24,7 +24,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 class Cluster:
-    """Postgres, Valkey, one scheduler and some toy workers on `home`; `environment` adds settings (the store, times)."""
+    """Postgres, Valkey, one scheduler and some toy workers on `home`; `environment` adds settings (store, times)."""
 
     def __init__(self, home: Path, environment: Mapping[str, str]) -> None:
         self.home = home
@@ -85,17 +85,17 @@ class Cluster:
         process.kill()
         process.wait()
 
-    def child(self, name: str) -> psutil.Process:
-        """The working child of a worker."""
+    def child(self, name: str) -> int:
+        """Process of the working child of a worker; 0 while there is none."""
         status = read_status(self.home, name)
-        assert status is not None, f"{name} has no child"
-        return psutil.Process(status.pid)
+        return status.pid if status is not None and psutil.pid_exists(status.pid) else 0
 
     def kill_child(self, name: str) -> int:
         """SIGKILL the working child of a worker; its parent starts another."""
-        child = self.child(name)
-        child.kill()
-        return child.pid
+        pid = self.child(name)
+        assert pid, f"{name} has no child"
+        os.kill(pid, signal.SIGKILL)
+        return pid
 
     def terminate(self, name: str, timeout: float = 60.0) -> int:
         """SIGTERM, and the exit code."""

@@ -1,4 +1,4 @@
-"""`python -m tests.chaos.process scheduler | worker NAME QUEUE REFERENCE BUNDLE`: a process of the product for the driver.
+"""A process of the product for the driver: `scheduler`, or `worker NAME QUEUE REFERENCE BUNDLE`.
 
 It is what `marey scheduler` and `marey worker` call, with a toy in place of a model; it dies with the test.
 """

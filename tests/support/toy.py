@@ -88,7 +88,7 @@ class ToyHandler:
                 raise RuntimeError("a bug")
             case Deed.REFUSE:
                 return Failed(item.id, InvalidInput("this cannot be danced"))
-            case Deed.ONCE if item.attempts < 2:
+            case Deed.ONCE if item.attempts == 0:
                 return Failed(item.id, InvalidInput("not this time"), retryable=True)
             case Deed.AWAY:
                 raise Unreachable("what the toy needs does not answer")
@@ -102,7 +102,7 @@ class ToyHandler:
 def deed(item: ClaimedItem) -> Deed:
     """What the prompt asks for."""
     word = item.prompt.split()[0]
-    return Deed(word) if word in Deed else Deed.WALK
+    return Deed(word) if word in set(Deed) else Deed.WALK
 
 
 def export(item: ClaimedItem) -> Export:

@@ -37,6 +37,22 @@ def test_a_line_is_json_with_its_service_from_every_thread(capsys: pytest.Captur
     assert written[0]["items"] == 32
 
 
+@pytest.mark.parametrize("json_lines", [True, False])
+def test_a_traceback_shows_no_local_variables(capsys: pytest.CaptureFixture[str], json_lines: bool) -> None:
+    configure_logging("worker", json=json_lines)
+
+    def fail(prompt: str) -> None:
+        raise ValueError(len(prompt))
+
+    try:
+        fail("a secret " + "scene")
+    except ValueError:
+        logger("test").exception("failed")
+    written = capsys.readouterr().err
+    assert "ValueError" in written
+    assert "secret scene" not in written
+
+
 def test_prompts_and_secrets_are_withheld_whoever_logs_them(capsys: pytest.CaptureFixture[str]) -> None:
     configure_logging("api", json=True)
     logger("test").info("submitted", prompt="a secret scene", password="hunter2", url="redis://:pw@host")
