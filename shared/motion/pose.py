@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -163,15 +164,14 @@ class _Solver:
         self.world[:, body] = self._body(body, bodies[body])
         before = self._parent(chain[0])
         swings: list[Array] = []
-        for j, child in zip(chain[:-1], chain[1:], strict=True):
+        for j, child in pairwise(chain):
             if j != chain[0]:
                 self.places[:, j] = self.places[:, self.tree.parents[j]] + rotate(before, self.offsets[j])
             before = multiply(between(rotate(before, self.offsets[child]), self._direction(j, child)), before)
             swings.append(before)
         rest = multiply(conjugate(before), self.world[:, body])
         axis = normalize(self.offsets[body])
-        twist = np.unwrap(2 * np.arctan2(rest[:, 1:] @ axis, rest[:, 0]))
-        twist -= 2 * np.pi * np.round(np.median(twist) / (2 * np.pi))
+        twist = _unwrap(2 * np.arctan2(rest[:, 1:] @ axis, rest[:, 0]))
         for k, (j, swing) in enumerate(zip(chain[:-1], swings, strict=True), start=1):
             bone = normalize(self.offsets[chain[k]])
             self.world[:, j] = multiply(swing, _turn(bone, twist * k / len(chain)))
@@ -198,8 +198,7 @@ class _Solver:
             weight = weight * (along > 0)
         length = np.sqrt(np.maximum(squared, 1e-18))
         seen = smooth(np.stack([weight * along / length, weight * beside / length], axis=1), PLANE_SECONDS * self.fps)
-        twist = np.unwrap(np.arctan2(seen[:, 1], seen[:, 0] + PLANE_PRIOR))
-        twist -= 2 * np.pi * np.round(np.median(twist) / (2 * np.pi))
+        twist = _unwrap(np.arctan2(seen[:, 1], seen[:, 0] + PLANE_PRIOR))
         return smooth(twist[:, None], 0.5 * PLANE_SECONDS * self.fps)[:, 0]
 
 
@@ -211,6 +210,12 @@ def smooth(values: Array, sigma: float) -> Array:
     kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
     padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
     return np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0) @ (kernel / kernel.sum())
+
+
+def _unwrap(angles: Array) -> Array:
+    """(T,) angles without jumps, in the full turn around zero that holds most of them."""
+    unwrapped = np.asarray(np.unwrap(angles), np.float64)
+    return unwrapped - 2 * np.pi * np.round(np.median(unwrapped) / (2 * np.pi))
 
 
 def _turn(axis: Array, angle: Array) -> Array:
@@ -245,8 +250,8 @@ def fit_rotation(rest: Array, seen: Array) -> Array:
 def measure_offsets(joints: Array, skeleton: Skeleton) -> Array:
     """The T-pose with the proportions of a moving body.
 
-    Single bones keep the direction of the skeleton's T-pose and take the median of their lengths over time; rigid bodies
-    (pelvis, chest) take the median place of their points in the body's own frame; both are made symmetrical.
+    Single bones keep the direction of the skeleton's T-pose and take the median of their lengths over time; rigid
+    bodies (pelvis, chest) take the median place of their points in the body's own frame; all is made symmetrical.
 
     Args:
         joints: (T, J, 3) metres.
@@ -282,7 +287,7 @@ def _rest_vector(skeleton: Skeleton, offsets: Array, j: int, k: int) -> Array:
 
 
 def _bodies(skeleton: Skeleton) -> dict[int, tuple[int, ...]]:
-    """Joints with several bones, and the ends of those; a child without distance (SnapMoGen's pelvis) is the same body."""
+    """Joints with several bones, and their ends; a child at no distance (SnapMoGen's pelvis) is the same body."""
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
 
     def points(j: int) -> tuple[int, ...]:

@@ -257,3 +257,18 @@ def skeleton_of(names: tuple[str, ...], parents: tuple[int, ...], offsets: NDArr
         if known.joint_names == names and known.parents == parents:
             return known.with_offsets(offsets)
     return Skeleton("other", names, parents, np.asarray(offsets, np.float32), mirror_by_name(names))
+
+
+def known_order(names: tuple[str, ...], parents: tuple[int, ...]) -> tuple[Skeleton, tuple[int, ...]] | None:
+    """One of our skeletons with the same joints and bones in any order, and for each of its joints the index here.
+
+    A BVH file lists joints depth first, which is not the order of HumanML3D's arrays.
+    """
+    parent_names = {n: names[p] if p >= 0 else "" for n, p in zip(names, parents, strict=True)}
+    for known in SKELETONS.values():
+        theirs = {
+            n: known.joint_names[p] if p >= 0 else "" for n, p in zip(known.joint_names, known.parents, strict=True)
+        }
+        if theirs == parent_names:
+            return known, tuple(names.index(n) for n in known.joint_names)
+    return None

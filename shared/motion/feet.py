@@ -1,0 +1,317 @@
+"""Foot contacts, and feet that stay where they stand.
+
+Generated feet slide a little while they stand, and sink into the floor or float. Here each stretch in which a toe
+stands gets one place (lock); what that moves the foot by is spread over the swings before and after it by Hermite
+curves, which meet value and speed at both ends (blend), so nothing pops. The legs follow by two-bone inverse
+kinematics in closed form: lengths stay, the knee keeps its plane, and where a leg is too short the hips come down.
+
+The idea of locking and blending is MoMask's (EricGuo5513/momask-codes, visualization/remove_fs.py, MIT, after Holden's
+write-up); thresholds here are in metres and seconds, so they hold for any frame rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from shared.motion.kinematics import facing
+from shared.motion.pose import smooth
+from shared.motion.rotations import Array, between, normalize, rotate
+from shared.motion.skeleton import Skeleton
+
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ContactRule:
+    """When a foot stands. Metres, seconds; heights are over the height at which this joint stands."""
+
+    enter_speed: float = 0.30
+    leave_speed: float = 0.60
+    toe_height: float = 0.04
+    ankle_height: float = 0.05
+    shortest: float = 0.10  # a shorter stand is a touch in passing
+    gap: float = 0.10  # a shorter lift is noise
+    slide: float = 0.15  # a foot that goes farther than this within one stand is meant to slide
+
+
+RULE = ContactRule()
+LONG_SWING = 0.8  # seconds; over a longer one the correction is taken back to zero in between
+RELEASE = 0.35  # seconds that this takes
+FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint lies inside the foot, so it stands at up to 3 cm
+STILL = 0.015  # metres that an ankle, or a toe in height, may stray for noise; more is a heel or a foot that rolls
+MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot gives way
+
+
+def clean_feet(
+    joints: Array, skeleton: Skeleton, fps: float, *, contacts: Bool | None = None, rule: ContactRule = RULE
+) -> tuple[Array, Bool]:
+    """Put the floor at y = 0, keep feet where they stand, and out of the floor.
+
+    Args:
+        joints: (T, J, 3) metres, Y up.
+        skeleton: knows its feet, hips and legs.
+        fps: frames a second.
+        contacts: (T, 4) when they are known; otherwise they are found.
+        rule: thresholds.
+
+    Returns:
+        (T, J, 3) float64 with every bone as long as before, and contacts (T, 4).
+
+    Raises:
+        InvalidInput: the skeleton has no feet.
+    """
+    joints = np.array(joints, np.float64)
+    _need_feet(skeleton)
+    joints[..., 1] -= floor_height(joints, skeleton)
+    stands = find_contacts(joints, skeleton, fps, rule=rule) if contacts is None else np.array(contacts, bool)
+    before = joints.copy()
+    for side in range(2):
+        ankle, toe = skeleton.feet[2 * side : 2 * side + 2]
+        stands[:, 2 * side + 1] &= ~_slides(joints[:, toe], stands[:, 2 * side + 1], rule)
+        _plant(joints, skeleton, (ankle, toe), stands[:, 2 * side : 2 * side + 2], fps)
+    _follow(before, joints, skeleton, fps)
+    return joints, stands
+
+
+def floor_height(joints: Array, skeleton: Skeleton) -> float:
+    """By how much the floor is off y = 0: nothing while toes stand within `FLOOR_BAND`, nor for a body in the air.
+
+    The height at which toes stand is the tenth percentile of the lowest toe's: bouncing and tiptoe do not lift it.
+    """
+    height = float(np.quantile(joints[:, list(skeleton.feet[1::2]), 1].min(axis=1), 0.1))
+    return 0.0 if height > 0.5 else height - float(np.clip(height, *FLOOR_BAND))
+
+
+def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: ContactRule = RULE) -> Bool:
+    """(T, 4) which feet stand: L ankle, L toe, R ankle, R toe.
+
+    A foot begins to stand when it is low and slow, and stands until it is high or clearly fast. Low is relative to the
+    tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
+    """
+    _need_feet(skeleton)
+    places = joints[:, list(skeleton.feet)]
+    speed = np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps if len(joints) > 1 else np.zeros((1, 4))
+    ground = np.quantile(places[..., 1], 0.1, axis=0)
+    ground = np.minimum(ground, ground[[2, 3, 0, 1]])
+    low = places[..., 1] - ground < np.array([rule.ankle_height, rule.toe_height] * 2)
+    stands = np.zeros(speed.shape, bool)
+    for foot in range(4):
+        stay = low[:, foot] & (speed[:, foot] < rule.leave_speed)
+        slow = low[:, foot] & (speed[:, foot] < rule.enter_speed)
+        for begin, end in runs(stay):
+            inside = np.flatnonzero(slow[begin:end])
+            if len(inside):
+                stands[begin + inside[0] : begin + inside[-1] + 1, foot] = True
+        for begin, end in runs(~stands[:, foot]):
+            if begin and end < len(stands) and (end - begin) / fps <= rule.gap and low[begin:end, foot].all():
+                stands[begin:end, foot] = True
+        for begin, end in runs(stands[:, foot]):
+            if (end - begin) / fps < rule.shortest:
+                stands[begin:end, foot] = False
+    return stands
+
+
+def runs(mask: Bool) -> list[tuple[int, int]]:
+    """(begin, end) of each stretch of True, end exclusive."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(b), int(e)) for b, e in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def skate(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> float:
+    """Mean horizontal speed in m/s of toes between two frames in which they stand; 0 when they never do."""
+    toes = list(skeleton.feet[1::2])
+    speed = np.linalg.norm(np.diff(joints[:, toes], axis=0)[..., [0, 2]], axis=-1) * fps
+    both = contacts[1:, 1::2] & contacts[:-1, 1::2]
+    return float(speed[both].mean()) if both.any() else 0.0
+
+
+def _need_feet(skeleton: Skeleton) -> None:
+    if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
+        raise InvalidInput("this skeleton's feet are not known", where=skeleton.name)
+
+
+def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:
+    """Frames of stands that are no stands: the toe strays too far from its mean place."""
+    mask = np.zeros(len(toe), bool)
+    for begin, end in runs(stands):
+        stray = np.linalg.norm((toe[begin:end] - toe[begin:end].mean(axis=0))[:, [0, 2]], axis=1).max()
+        mask[begin:end] = stray > rule.slide
+    return mask
+
+
+def _plant(joints: Array, skeleton: Skeleton, foot: tuple[int, int], stands: Bool, fps: float) -> None:
+    """Move one foot, in place: the toe to its locks, the ankle with it and to its own where both stand."""
+    ankle, toe = foot
+    chain = _foot_chain(skeleton, toe)
+    lengths = [np.linalg.norm(joints[:, a] - joints[:, b], axis=-1, keepdims=True) for a, b in _pairs(chain)]
+    shift = np.zeros((len(joints), 3))
+    for begin, end in runs(stands[:, 1]):
+        places = joints[begin:end, toe]
+        shift[begin:end] = places.mean(axis=0) - places
+        height = float(np.median(places[:, 1]))
+        if np.abs(places[:, 1] - height).max() <= STILL:
+            shift[begin:end, 1] = np.clip(height, *FLOOR_BAND) - places[:, 1]
+        else:
+            shift[begin:end, 1] = np.clip(height, *FLOOR_BAND) - height
+    shift = _fill(shift, stands[:, 1], fps)
+    for j in chain:
+        joints[:, j] += shift
+    joints[:, toe, 1] = _over_floor(joints[:, toe, 1])
+    turn, still = np.zeros((len(joints), 3)), np.zeros(len(joints), bool)
+    for begin, end in runs(stands[:, 0] & stands[:, 1]):
+        correction = joints[begin:end, ankle].mean(axis=0) - joints[begin:end, ankle]
+        if np.linalg.norm(correction, axis=1).max() <= STILL:
+            turn[begin:end], still[begin:end] = correction, True
+    turn = _fill(turn, still, fps)
+    for j in chain[1:]:
+        joints[:, j] += turn
+    for (child, parent), length in zip(_pairs(chain), lengths, strict=True):
+        joints[:, parent] = joints[:, child] + length * normalize(joints[:, parent] - joints[:, child])
+
+
+def _foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
+    """Joints from the toe up to the end of the leg: toe, …, the knee's child."""
+    knees = {skeleton.children[hip][0] for hip in skeleton.facing[:2]}
+    chain = [toe]
+    while skeleton.parents[chain[-1]] not in knees:
+        chain.append(skeleton.parents[chain[-1]])
+    return chain
+
+
+def _pairs(chain: list[int]) -> list[tuple[int, int]]:
+    return list(pairwise(chain))
+
+
+def _fill(values: Array, known: Bool, fps: float) -> Array:
+    """Values of the known stretches, and between them cubic Hermite curves that meet value and slope at both ends.
+
+    Over gaps longer than `LONG_SWING`, and before the first and after the last stretch, the curve runs to zero within
+    `RELEASE` seconds.
+    """
+    values = np.where(known[:, None], values, 0.0)
+    release = max(2, round(RELEASE * fps))
+    slopes = np.gradient(values, axis=0) if len(values) > 1 else values
+    stretches = runs(known)
+    for begin, end in stretches:  # one-sided, from inside
+        inner = values[begin : min(begin + 3, end)], values[max(begin, end - 3) : end]
+        slopes[begin] = np.diff(inner[0], axis=0).mean(axis=0) if end - begin > 1 else 0
+        slopes[end - 1] = np.diff(inner[1], axis=0).mean(axis=0) if end - begin > 1 else 0
+    last = None
+    for begin, end in [*stretches, (len(values) + release, 0)]:
+        first = last if last is not None else -release
+        if last is not None and begin < len(values) and (begin - last) / fps <= LONG_SWING:
+            _bridge(values, last, begin, values[last], values[begin], slopes[last], slopes[begin])
+        else:
+            zero = np.zeros(values.shape[1])
+            if last is not None:
+                stop = min(last + release, max(begin - 1, last + 1))
+                _bridge(values, last, stop, values[last], zero, slopes[last], zero)
+            if begin < len(values):
+                start = max(begin - release, first + 1 if last is None else last + release)
+                start = min(start, begin - 1)
+                _bridge(values, start, begin, zero, values[begin], zero, slopes[begin])
+        last = end - 1
+    return values
+
+
+def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: Array) -> None:
+    """Fill frames between a and b (both exclusive) with a cubic Hermite curve, as far as they are in the clip."""
+    frames = np.arange(max(a + 1, 0), min(b, len(values)))
+    n = b - a
+    t = ((frames - a) / n)[:, None]
+    values[frames] = (
+        (1 + 2 * t) * (1 - t) ** 2 * va + t * (1 - t) ** 2 * n * sa + t**2 * (3 - 2 * t) * vb + t**2 * (t - 1) * n * sb
+    )
+
+
+def _over_floor(height: Array) -> Array:
+    """Heights bent up smoothly so that none is below zero; 2 cm up it is a third of a millimetre, 5 cm up nothing."""
+    return 0.5 * (height + np.sqrt(height**2 + 0.005**2))
+
+
+def _follow(before: Array, joints: Array, skeleton: Skeleton, fps: float) -> None:
+    """Legs between the hips and the moved feet, in place; the hips come down where a leg would be too short."""
+    r_hip, l_hip = skeleton.facing[:2]
+    chains = [_foot_chain(skeleton, toe) for toe in skeleton.feet[1::2]]
+    legs = [(hip, skeleton.children[hip][0], chain[-1]) for hip, chain in zip((l_hip, r_hip), chains, strict=True)]
+    drop = smooth_above(np.max([_needed_drop(before, joints, leg) for leg in legs], axis=0), 0.1 * fps)
+    body = [j for j in range(len(skeleton)) if j not in chains[0] + chains[1]]
+    joints[:, body, 1] -= drop[:, None]
+    ahead = smooth(facing(before, skeleton), 0.2 * fps)
+    for (hip, knee, ankle), chain in zip(legs, chains, strict=True):
+        _give_way(before[:, [hip, knee, ankle]], joints, hip, chain)
+        joints[:, knee] = two_bone_knee(before[:, [hip, knee, ankle]], joints[:, hip], joints[:, ankle], ahead)
+
+
+def _give_way(leg: Array, joints: Array, hip: int, chain: list[int]) -> None:
+    """A foot beyond the straight leg's reach is drawn to where it reaches, in place."""
+    length = np.linalg.norm(np.diff(leg, axis=1), axis=2).sum(axis=1)
+    across = joints[:, chain[-1]] - joints[:, hip]
+    over = np.maximum(np.linalg.norm(across, axis=1) - length, 0.0)
+    joints[:, chain] -= (over[:, None] * normalize(across))[:, None]
+
+
+def _needed_drop(before: Array, joints: Array, leg: tuple[int, int, int]) -> Array:
+    """(T,) by how much the hip must come down for the leg to reach, no straighter than 0.9995 or than it was."""
+    hip, knee, ankle = leg
+    length = np.linalg.norm(before[:, hip] - before[:, knee], axis=1) + np.linalg.norm(
+        before[:, knee] - before[:, ankle], axis=1
+    )
+    was = np.linalg.norm(before[:, hip] - before[:, ankle], axis=1)
+    reach = np.maximum(0.9995 * length, was)
+    across = joints[:, ankle] - joints[:, hip]
+    flat = across[:, 0] ** 2 + across[:, 2] ** 2
+    room = np.sqrt(np.maximum(reach**2 - flat, 0.0))
+    needed = -across[:, 1] - room
+    return np.clip(np.where(across[:, 1] < 0, needed, 0.0), 0.0, MAX_DROP)
+
+
+def smooth_above(values: Array, sigma: float) -> Array:
+    """A smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
+    radius = min(int(3 * sigma + 0.5), len(values) - 1)
+    if radius < 1 or not values.any():
+        return values
+    padded = np.pad(values, radius, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1).max(axis=1)
+    return smooth(highest[:, None], sigma)[:, 0]
+
+
+def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
+    """Where the knee goes when hip and ankle move, both bones keeping their lengths.
+
+    The leg is turned as a whole to its new direction and then bent or stretched in its plane; a leg that moved nowhere
+    keeps its knee to the last digit. A straight leg that must bend does so ahead.
+
+    Args:
+        leg: (T, 3, 3) hip, knee and ankle as they were.
+        hip, ankle: (T, 3) where they are now; out of reach, the leg points there and is straight.
+        ahead: (T, 3) where knees bend to.
+
+    Returns:
+        (T, 3).
+    """
+    upper, whole = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 0]
+    l1, l2 = np.linalg.norm(upper, axis=1), np.linalg.norm(leg[:, 2] - leg[:, 1], axis=1)
+    turn = between(whole, ankle - hip)
+    axis = normalize(ankle - hip)
+    knee = rotate(turn, upper)
+
+    def bend(distance: Array) -> tuple[Array, Array]:
+        """Of the knee: along the line from hip to ankle, and off it."""
+        distance = np.clip(distance, np.abs(l1 - l2) + 1e-9, l1 + l2)
+        along = (distance**2 + l1**2 - l2**2) / (2 * distance)
+        return along, np.sqrt(np.maximum(l1**2 - along**2, 0.0))
+
+    along_was, off_was = bend(np.linalg.norm(whole, axis=1))
+    along, off = bend(np.linalg.norm(ankle - hip, axis=1))
+    pole = knee - along_was[:, None] * axis
+    prior = ahead - axis * np.einsum("ti,ti->t", ahead, axis)[:, None]
+    pole = normalize(pole + 0.03 * prior)  # 3 cm off the line is a bend of 9 degrees: enough to know the plane
+    knee = knee + (off - off_was)[:, None] * pole
+    plane = knee - axis * np.einsum("ti,ti->t", knee, axis)[:, None]
+    return hip + along[:, None] * axis + off[:, None] * normalize(plane + 1e-9 * prior)

