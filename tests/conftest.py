@@ -1,8 +1,8 @@
 """Real servers for every test that needs one: started once a run (and once per xdist worker), on first use.
 
 `database_url` a migrated database of the test's own · `engine` its engine · `queue_url` an empty Valkey ·
-`folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start (and kill)
-servers of their own with `shared.runtime.embedded`.
+`folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start
+(and kill) servers of their own with `shared.runtime.embedded`.
 """
 
 from __future__ import annotations

@@ -117,8 +117,8 @@ class Counters(Protocol):
 def job_state(control: JobControl, counters: Counters, *, started: bool) -> JobState:
     """The state of a job, from what its operator wants and how its items stand.
 
-    Open items left: paused if the operator says so, running once any item was ever leased, else queued. None left: succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded;
-    else failed.
+    Open items left: paused if the operator says so, running once any item was ever leased, else queued. None left:
+    succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded; else failed.
     """
     if counters.ready + counters.leased > 0:
         if control is JobControl.PAUSED:

@@ -1,6 +1,7 @@
 """OpenStack Swift with its S3 API, all four servers in this process.
 
-`python -m tests.servers.swift_server FOLDER ACCOUNT_PORT CONTAINER_PORT OBJECT_PORT S3_PORT`. A real S3 server: signatures and expiries are checked, data is on disk. Prints "ready" when all four listen.
+`python -m tests.servers.swift_server FOLDER ACCOUNT_PORT CONTAINER_PORT OBJECT_PORT S3_PORT`. A real S3 server:
+signatures and expiries are checked, data is on disk. Prints "ready" when all four listen.
 """
 
 # ruff: noqa: E402 - eventlet patches the standard library before anything else imports it
@@ -130,7 +131,7 @@ def main(folder: Path, ports: dict[str, int]) -> None:
     print("ready", flush=True)
     with contextlib.suppress(KeyboardInterrupt):
         while os.getppid() == parent:
-            eventlet.sleep(0.5)
+            eventlet.sleep(1)
 
 
 if __name__ == "__main__":

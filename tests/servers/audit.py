@@ -1,0 +1,70 @@
+"""What must hold of the tables of jobs at any moment, whatever happened: for state machines and chaos runs."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+CHECKS = {
+    "counters are not those of the items": """
+        SELECT job.id, job.total, count(item.id) FROM job LEFT JOIN item ON item.job_id = job.id GROUP BY job.id
+        HAVING (job.total, job.ready, job.leased, job.succeeded, job.failed, job.dead, job.cancelled) <>
+          (count(item.id), count(*) FILTER (WHERE item.state = 'ready'), count(*) FILTER (WHERE item.state = 'leased'),
+           count(*) FILTER (WHERE item.state = 'succeeded'), count(*) FILTER (WHERE item.state = 'failed'),
+           count(*) FILTER (WHERE item.state = 'dead'), count(*) FILTER (WHERE item.state = 'cancelled'))
+    """,
+    "a lane does not count its claimable items": """
+        SELECT * FROM
+          (SELECT job_id, queue, batch_key,
+                  count(*) FILTER (WHERE NOT solo) AS ready, count(*) FILTER (WHERE solo) AS solo
+           FROM item WHERE state = 'ready' AND run_after IS NULL GROUP BY job_id, queue, batch_key) AS items
+          FULL JOIN (SELECT * FROM lane WHERE ready + solo > 0) AS lane USING (job_id, queue, batch_key)
+        WHERE (items.ready, items.solo) IS DISTINCT FROM (lane.ready, lane.solo)
+    """,
+    "an item is in the queue of another stage": """
+        SELECT id, stage, queue, batch_key FROM item
+        WHERE stage = 'generate' AND (queue, batch_key) <> (model, generate_batch_key)
+           OR (stage = 'text') <> (queue = 'text')
+    """,
+    "a lease holds nothing": """
+        SELECT * FROM lease WHERE NOT EXISTS (SELECT FROM item WHERE item.lease_token = lease.token)
+    """,
+    "a lease holds items of another job or queue": """
+        SELECT item.id, lease.token FROM item JOIN lease ON lease.token = item.lease_token
+        WHERE (item.job_id, item.queue) <> (lease.job_id, lease.queue)
+    """,
+    "a solo lease holds several items, or a solo item has company": """
+        SELECT lease.token, count(*) FROM lease JOIN item ON item.lease_token = lease.token GROUP BY lease.token
+        HAVING bool_or(item.solo) AND count(*) > 1 OR bool_or(item.solo) <> lease.solo
+    """,
+    "a succeeded item has not one motion": """
+        SELECT item.id, item.state, count(motion.id) FROM item LEFT JOIN motion ON motion.item_id = item.id
+        GROUP BY item.id HAVING count(motion.id) <> CASE WHEN item.state = 'succeeded' THEN 1 ELSE 0 END
+    """,
+    "a motion's file is not stored": """
+        SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
+        WHERE asset.state <> 'stored'
+    """,
+    "a generated item has no text features": """
+        SELECT item.id FROM item
+        WHERE stage = 'generate' AND NOT EXISTS (SELECT FROM text_features WHERE text_features.key = item.text_key)
+    """,
+    "events have gaps": """
+        SELECT job.id, job.event_seq, count(job_event.seq), max(job_event.seq)
+        FROM job LEFT JOIN job_event ON job_event.job_id = job.id GROUP BY job.id
+        HAVING job.event_seq <> count(job_event.seq) OR job.event_seq <> max(job_event.seq)
+    """,
+    "the last event tells another state than the job": """
+        SELECT job.id, job.state, job_event.data FROM job JOIN job_event ON job_event.job_id = job.id
+        WHERE seq = event_seq AND job_event.data ->> 'state' <> job.state
+    """,
+    "a job has ended without its time, or runs with one": """
+        SELECT id, state, finished_at FROM job WHERE (finished_at IS NULL) <> (ready + leased > 0)
+    """,
+}
+
+
+def audit(conn: sa.Connection) -> list[str]:
+    """What is wrong, a line each; nothing, if all is well."""
+    return [
+        f"{what}: {tuple(row)}" for what, query in CHECKS.items() for row in conn.execute(sa.text(query)).fetchmany(5)
+    ]
