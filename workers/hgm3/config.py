@@ -27,8 +27,9 @@ class TokenizerConfig:
     commitment: float = 0.02  # β of eq. 2
     feature_bias: float = 5.0  # divides the std of root and contacts (MoMask), which so weigh more
     rotation_weight: float = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
-    position_weight: float = 5.0  # ours: L1 on joints in the frame of the window's start, metres
-    velocity_weight: float = 1.0  # ours: L1 on their velocity, m/s; against jitter and skating
+    position_weight: float = 5.0  # ours: L1 on joints in the heading frame, metres
+    velocity_weight: float = 0.5  # ours: L1 on their velocity, m/s; against jitter and skating
+    world_weight: float = 5.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
 
     @property
     def frames_per_token(self) -> int:
@@ -172,9 +173,7 @@ PAPER = HGM3Config()
 
 STARTER = HGM3Config(
     name="starter",
-    tokenizer=TokenizerConfig(
-        width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1, position_weight=5.0, velocity_weight=1.0
-    ),
+    tokenizer=TokenizerConfig(width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
     compact=True,
     masked=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.1, norm_first=True),

@@ -1,12 +1,11 @@
-"""What training reads: a prepared folder as tensors, and batches drawn from it.
+"""What training reads, as tensors on one device: features, tokens, captions in slots; and batches drawn from them.
 
 Choices of data come from a numpy generator that the loop seeds from (seed, step, rank); nothing here has a state.
 """
 
 from __future__ import annotations
 
-import json
-from collections import Counter
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,65 +15,46 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.errors import InvalidFile, NotFound
+from shared.errors import InvalidFile
+from workers.hgm3.config import ConditionConfig
+from workers.hgm3.model import LEVELS, GraphBatch
+from workers.hgm3.tokenizer import Tokenizer
+from workers.training.data.manifest import Clip
+from workers.training.data.prepared import PreparedData
+from workers.training.texts import CaptionTexts
 
-
-@dataclass(frozen=True)
-class Clip:
-    """One line of `clips.jsonl`, as far as training needs it."""
-
-    id: str
-    start: int  # first feature frame
-    length: int  # feature frames
-    split: str
-    dataset: str  # with the part of it, where content names one: bandai-namco/1
-    content: str
-    style: str
-    mirrored: bool
-    spliced: tuple[str, ...]
-    captions: int  # how many
+PHASES = 4
+"""Training clips are tokenized from their frames 0, 1, 2 and 3 on: the same motion on four token grids."""
 
 
 @dataclass(frozen=True)
 class MotionData:
     """All clips of a prepared folder, end to end on one device."""
 
+    prepared: PreparedData
     features: Tensor  # (F, D) float32, in their own units
     mean: Tensor  # (D,)
     std: Tensor  # (D,), grouped
-    clips: tuple[Clip, ...]
-    manifest_sha256: str
 
     @classmethod
     def load(cls, folder: Path, device: torch.device) -> MotionData:
-        """Read a prepared folder.
-
-        Raises:
-            NotFound: no such folder, or it is no prepared folder.
-            InvalidFile: a file in it is broken.
-        """
-        import hashlib
-
-        for name in ("manifest.json", "features.npy", "clips.jsonl", "statistics.npz"):
-            if not (folder / name).is_file():
-                raise NotFound(f"there is no {name}", where=str(folder), hint="Run `marey data prepare` first.")
-        features = np.load(folder / "features.npy", mmap_mode="r", allow_pickle=False)
-        statistics = np.load(folder / "statistics.npz", allow_pickle=False)
-        lines = (folder / "clips.jsonl").read_text(encoding="utf-8").splitlines()
-        clips = tuple(_clip(line, folder / "clips.jsonl", i + 1) for i, line in enumerate(lines))
-        if clips and max(c.start + c.length for c in clips) > len(features):
-            raise InvalidFile("clips reach beyond the features", where=str(folder / "clips.jsonl"))
+        """Read a prepared folder; raises as `PreparedData.open`."""
+        prepared = PreparedData.open(folder)
         return cls(
-            torch.from_numpy(np.array(features, dtype=np.float32)).to(device),
-            torch.from_numpy(statistics["mean"].astype(np.float32)).to(device),
-            torch.from_numpy(statistics["std"].astype(np.float32)).to(device),
-            clips,
-            hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest(),
+            prepared,
+            torch.from_numpy(np.array(prepared.all_features)).to(device),
+            torch.from_numpy(prepared.mean).to(device),
+            torch.from_numpy(prepared.std).to(device),
         )
 
-    def split(self, name: str) -> list[int]:
-        """Indices of the clips of a split."""
-        return [i for i, clip in enumerate(self.clips) if clip.split == name]
+    @property
+    def sha256(self) -> str:
+        """Hash of the manifest, which names every file's."""
+        return hashlib.sha256(self.prepared.manifest.model_dump_json().encode()).hexdigest()
+
+    def originals(self, split: str) -> list[Clip]:
+        """Captured clips of a split: no mirror images, no loops or splices."""
+        return [c for c in self.prepared.split(split) if not c.mirrored and not c.spliced]
 
     def windows(self, starts: Tensor, size: int) -> Tensor:
         """(B,) first frames to features (B, size, D); frames beyond the last one of all repeat it."""
@@ -82,48 +62,124 @@ class MotionData:
         return self.features[index.clamp(max=len(self.features) - 1)]
 
 
-def content_style_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
-    """Sampling weights: count^-0.5 per content, then per style within it; they sum to 1.
+def dataset_of(clip: Clip) -> str:
+    """Data set, with the part of it where the content names one: `bandai-namco/1`."""
+    number, slash, _ = clip.content.partition("/")
+    return f"{clip.dataset}/{number}" if slash and number.isdigit() else clip.dataset
 
-    A class with n clips gets mass proportional to n^0.5 altogether: rare ones are seen more often than their count
-    says, yet not as often as common ones.
-    """
-    contents = Counter(c.content for c in clips)
-    styles = Counter((c.content, c.style) for c in clips)
-    content_mass = {name: count**0.5 for name, count in contents.items()}
-    style_total: Counter[str] = Counter()
-    for (content, _), count in styles.items():
-        style_total[content] += count**0.5  # pyright: ignore[reportArgumentType]
-    weights = np.array(
-        [
-            content_mass[c.content]
-            * (styles[c.content, c.style] ** 0.5 / style_total[c.content])
-            / styles[c.content, c.style]
-            for c in clips
+
+@dataclass(frozen=True)
+class TokenData:
+    """Tokens of all clips, each at up to PHASES phases."""
+
+    tokens: Tensor  # (N, V) int64, sequences end to end
+    starts: Tensor  # (C, PHASES) int64, first token of clip c at phase p; phase 0 where a clip has fewer
+    lengths: Tensor  # (C, PHASES) int64 tokens
+
+    @classmethod
+    @torch.no_grad()
+    def encode(cls, tokenizer: Tokenizer, data: MotionData, *, batch: int = 64) -> TokenData:
+        """Tokenize every clip whole; training clips at all phases, others at phase 0."""
+        tokenizer.eval()
+        rate = tokenizer.config.frames_per_token
+        device = data.features.device
+        clips = data.prepared.clips
+        jobs = [
+            (c, p, clip.start + p, (clip.length - p) // rate)
+            for c, clip in enumerate(clips)
+            for p in range(PHASES if clip.split == "train" else 1)
+            if clip.length - p >= rate
         ]
-    )
-    return weights / weights.sum()
+        jobs.sort(key=lambda job: job[3])  # alike lengths together
+        starts = torch.zeros(len(clips), PHASES, dtype=torch.long)
+        lengths = torch.zeros(len(clips), PHASES, dtype=torch.long)
+        found: list[Tensor] = []
+        total = 0
+        for at in range(0, len(jobs), batch):
+            part = jobs[at : at + batch]
+            counts = torch.tensor([job[3] for job in part], device=device)
+            features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
+            tokens = tokenizer.encode(features, counts * rate)  # (B, n, V)
+            for row, (clip, phase, _, count) in enumerate(part):
+                starts[clip, phase], lengths[clip, phase] = total, count
+                found.append(tokens[row, :count])
+                total += count
+        missing = lengths == 0
+        starts = torch.where(missing, starts[:, :1], starts).to(device)
+        lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
+        return cls(torch.cat(found), starts, lengths)
+
+    def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:
+        """Tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
+        lengths = self.lengths[clips, phases].clamp(max=max_tokens)
+        size = int(lengths.max())
+        position = torch.arange(size, device=clips.device)
+        index = (self.starts[clips, phases][:, None] + position).clamp(max=len(self.tokens) - 1)
+        valid = position[None] < lengths[:, None]
+        return self.tokens[index].masked_fill(~valid[..., None], -1), lengths
 
 
-def _part(dataset: str, content: str) -> str:
-    number, slash, _ = content.partition("/")
-    return f"{dataset}/{number}" if slash and number.isdigit() else dataset
+@dataclass(frozen=True)
+class CaptionData:
+    """Captions of all clips in fixed slots, on one device."""
 
+    strings: Tensor  # (U, W) float16
+    slots: Tensor  # (K, S) int32 string of each slot, -1 = absent
+    adjacency: Tensor  # (K, S, S) int8
+    first: NDArray[np.int64]  # (C + 1,): clip c has captions first[c] … first[c + 1] - 1
 
-def _clip(line: str, file: Path, number: int) -> Clip:
-    try:
-        v = json.loads(line)
-        return Clip(
-            id=str(v["id"]),
-            start=int(v["start"]),
-            length=int(v["length"]),
-            split=str(v["split"]),
-            dataset=_part(str(v["dataset"]), str(v["content"])),
-            content=str(v["content"]),
-            style=str(v["style"]),
-            mirrored=bool(v["mirrored"]),
-            spliced=tuple(v.get("spliced", ())),
-            captions=len(v.get("captions", ())),
+    @classmethod
+    def load(cls, texts: CaptionTexts, config: ConditionConfig, device: torch.device) -> CaptionData:
+        """Put the captions' graphs into slots.
+
+        Raises:
+            InvalidFile: texts of another encoder's width.
+        """
+        if texts.strings.shape[1] != config.text_width:
+            raise InvalidFile(
+                f"texts are {texts.strings.shape[1]} wide, this configuration reads {config.text_width}",
+                hint="Run `marey data text` with the encoder of the configuration.",
+            )
+        slots, adjacency = texts.slots(config.max_actions, config.max_specifics)
+        return cls(
+            torch.from_numpy(np.asarray(texts.strings)).to(device),
+            torch.from_numpy(slots.astype(np.int32)).to(device),
+            torch.from_numpy(adjacency.astype(np.int8)).to(device),
+            np.asarray(texts.first, np.int64),
         )
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        raise InvalidFile(f"is not a clip: {error!r}", where=f"{file}:{number}") from error
+
+    def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
+        """One caption of each clip (B,) at random."""
+        low, high = self.first[clips], self.first[clips + 1]
+        chosen = low + np.floor(rng.random(len(clips)) * (high - low)).astype(np.int64)
+        return torch.from_numpy(chosen).to(self.slots.device)
+
+    def graphs(self, captions: Tensor) -> GraphBatch:
+        """The graphs of captions (B,)."""
+        slots = self.slots[captions].long()
+        present = slots >= 0
+        nodes = self.strings[slots.clamp(min=0)].float() * present[..., None]
+        return GraphBatch(nodes, self.adjacency[captions].long(), present)
+
+    def sentences(self, captions: Tensor) -> Tensor:
+        """Sentence features (B, W)."""
+        return self.strings[self.slots[captions, 0].long()].float()
+
+    def statistics(self, clips: Sequence[int], config: ConditionConfig) -> tuple[Tensor, Tensor]:
+        """Mean and std (3, W) of the texts of motion, action and specific nodes over captions of `clips`."""
+        rows = np.concatenate([np.arange(self.first[c], self.first[c + 1]) for c in clips])
+        slots = self.slots[torch.from_numpy(rows).to(self.slots.device)].long()  # (R, S)
+        ends = [0, 1, 1 + config.max_actions, config.slots]
+        means, stds = [], []
+        for level in range(LEVELS):
+            index = slots[:, ends[level] : ends[level + 1]]
+            index = index[index >= 0]
+            counts = torch.bincount(
+                index, minlength=len(self.strings)
+            ).double()  # a string counts as often as it occurs
+            share = (counts / counts.sum().clamp(min=1))[:, None]
+            values = self.strings.double()
+            mean = (values * share).sum(0)
+            means.append(mean)
+            stds.append(((values - mean).square() * share).sum(0).sqrt().clamp(min=1e-4))
+        return torch.stack(means).float(), torch.stack(stds).float()

@@ -6,6 +6,16 @@ import torch
 from torch import Tensor
 
 
+def heading_joints(features: Tensor, joints: int) -> Tensor:
+    """Joints over the root's ground point in the heading frame: (B, T, D) to (B, T, J, 3) metres, nothing integrated."""
+    features = features.float()
+    batch, frames = features.shape[:2]
+    root = torch.zeros_like(features[..., :3])
+    root[..., 1] = features[..., 3]
+    others = features[..., 4 : 4 + 3 * (joints - 1)].view(batch, frames, joints - 1, 3)
+    return torch.cat([root[:, :, None], others], 2)
+
+
 def world_joints(features: Tensor, joints: int) -> Tensor:
     """Decode positions: (B, T, D) features in their own units to (B, T, J, 3) metres, Y up, facing +Z in frame 0.
 

@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import Clip, MotionData, content_style_weights
+from workers.hgm3.data import MotionData, dataset_of
 from workers.hgm3.joints import world_joints
 from workers.hgm3.tokenizer import Tokenizer, biased_std, frame_mask, tokenizer_loss
+from workers.training.data.manifest import Clip
+from workers.training.data.sampling import sampling_weights
 from workers.training.loop import StepContext
 
 SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
@@ -32,7 +35,7 @@ class TokenizerStage:
         self.module = Tokenizer(config).to(device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
         rate = config.tokenizer.frames_per_token
-        self.train_clips = [c for c in data.clips if c.split == "train" and c.length >= rate]
+        self.train_clips = [c for c in data.prepared.split("train") if not c.spliced and c.length >= rate]
         self.weights = tokenizer_weights(self.train_clips)
         self.first = np.array([c.start for c in self.train_clips])
         self.lengths = np.array([c.length - c.length % rate for c in self.train_clips])
@@ -52,16 +55,15 @@ class TokenizerStage:
         lengths = np.minimum(self.lengths[chosen], window)
         device = self.data.features.device
         features = self.data.windows(torch.from_numpy(self.first[chosen] + offsets).to(device), window)
-        full = bool((lengths == window).all())
-        loss, quantized = tokenizer_loss(
-            self.module, config, features, None if full else torch.from_numpy(lengths).to(device)
-        )
+        own = None if bool((lengths == window).all()) else torch.from_numpy(lengths).to(device)
+        loss, quantized = tokenizer_loss(self.module, config, features, own, context.fraction)
         logs = {
             "loss": loss.total.detach(),
             "features": loss.features,
             "commitment": loss.commitment,
             "position_m": loss.position,
             "velocity_m_s": loss.velocity,
+            "world_m": loss.world,
             "perplexity_0": quantized.perplexity[0],
             "perplexity_last": quantized.perplexity[-1],
         }
@@ -72,20 +74,18 @@ class TokenizerStage:
 
     def validate(self) -> Mapping[str, float]:
         """Errors on the validation clips, whole."""
-        clips = [c for c in self.data.clips if c.split == "val" and not c.mirrored and not c.spliced]
-        return reconstruction_errors(self.module, self.config, self.data, clips)
+        return reconstruction_errors(self.module, self.config, self.data, self.data.originals("val"))
 
 
-def tokenizer_weights(clips: Sequence[Clip]) -> np.ndarray:
+def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     """Sampling weights (sum 1): longer clips more often, rare contents raised, data sets by their `SHARES`."""
-    weights = content_style_weights(clips) * np.array([c.length for c in clips], dtype=np.float64) ** 0.5
-    names = [c.dataset for c in clips]
+    weights = sampling_weights(clips) * np.sqrt([c.length for c in clips])
+    names = [dataset_of(c) for c in clips]
+    named = sum(SHARES.get(n, 0.0) for n in set(names))
+    others = sum(n not in SHARES for n in set(names))
     for name in sorted(set(names)):
         rows = np.array([n == name for n in names])
-        named = sum(SHARES.get(n, 0.0) for n in set(names))
-        others = sum(n not in SHARES for n in set(names))
-        share = SHARES.get(name, (1 - named) / max(others, 1))
-        weights[rows] *= share / weights[rows].sum()
+        weights[rows] *= SHARES.get(name, (1 - named) / max(others, 1)) / weights[rows].sum()
     return weights / weights.sum()
 
 
@@ -96,11 +96,11 @@ def reconstruction_errors(
     """Mean joint error of whole clips, encoded and decoded, in millimetres.
 
     `error_mm` is in space (drift of the root included), averaged over clips; `local_mm` with the root laid over the
-    true one; `error_mm/{dataset}` per data set; `levels_used` the mean perplexity of the code usage.
+    true one; `error_mm/{dataset}` per data set; `perplexity/{level}` of the code usage.
     """
     model.eval()
     rate = config.tokenizer.frames_per_token
-    order = sorted(clips, key=lambda c: c.length)
+    order = sorted((c for c in clips if c.length >= rate), key=lambda c: c.length)
     rows: list[tuple[str, float, float]] = []
     counts = torch.zeros(config.tokenizer.levels, config.tokenizer.codes, device=data.features.device)
     for at in range(0, len(order), batch):
@@ -114,7 +114,7 @@ def reconstruction_errors(
         mask = frame_mask(lengths, features.shape[1])
         error = _per_clip((joints - truth).norm(dim=-1).mean(-1), mask)
         local = _per_clip(((joints - joints[:, :, :1]) - (truth - truth[:, :, :1])).norm(dim=-1).mean(-1), mask)
-        rows += [(c.dataset, float(e), float(r)) for c, e, r in zip(part, error, local, strict=True)]
+        rows += [(dataset_of(c), float(e), float(r)) for c, e, r in zip(part, error, local, strict=True)]
         for level in range(counts.shape[0]):
             index = tokens[..., level]
             counts[level] += torch.bincount(index[index >= 0], minlength=counts.shape[1])
@@ -124,8 +124,7 @@ def reconstruction_errors(
         result[f"error_mm/{name}"] = 1000 * float(np.mean([r[1] for r in rows if r[0] == name]))
     share = counts / counts.sum(-1, keepdim=True).clamp(min=1)
     perplexity = torch.exp(-(share * torch.log(share + 1e-10)).sum(-1))
-    result |= {f"perplexity/{level}": float(p) for level, p in enumerate(perplexity)}
-    return result
+    return result | {f"perplexity/{level}": float(p) for level, p in enumerate(perplexity)}
 
 
 def _per_clip(values: Tensor, mask: Tensor) -> Tensor:

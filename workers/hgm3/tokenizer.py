@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from shared.nn.quantizer import Quantized, ResidualQuantizer
 from workers.hgm3.config import HGM3Config, TokenizerConfig
-from workers.hgm3.joints import world_joints
+from workers.hgm3.joints import heading_joints, world_joints
 
 ROOT = slice(0, 4)
 """Yaw rate, X and Z displacement, height: the columns every HumanML3D-like layout begins with."""
@@ -165,20 +165,25 @@ class TokenizerLoss:
     total: Tensor
     features: Tensor  # L1 of normalised features (eq. 2, first term)
     commitment: Tensor  # eq. 2, second term, without β
-    position: Tensor  # metres
-    velocity: Tensor  # m/s
+    position: Tensor  # metres, in the heading frame
+    velocity: Tensor  # m/s, in the heading frame
+    world: Tensor  # metres, in space: with the drift of the root since the window's start
 
 
 def tokenizer_loss(
-    model: Tokenizer, config: HGM3Config, features: Tensor, lengths: Tensor | None = None
+    model: Tokenizer, config: HGM3Config, features: Tensor, lengths: Tensor | None = None, fraction: float = 1.0
 ) -> tuple[TokenizerLoss, Quantized]:
-    """Eq. 2 of HGM³ plus terms on the joints in space (ours), which are what the error is measured on.
+    """Eq. 2 of HGM³ plus terms on the joints (ours), which are what the error is measured on.
+
+    The term in space rises with the budget's `fraction`: drift adds up over a window, and at first its gradient drowns
+    all others.
 
     Args:
         model: the tokenizer.
         config: weights of the terms.
         features: (B, T, D) in their own units.
         lengths: (B,) frames, or None where every window is full.
+        fraction: of the budget used.
     """
     t = config.tokenizer
     output, quantized = model(features, lengths)
@@ -187,15 +192,21 @@ def tokenizer_loss(
     weights = feature_weights(config).to(features.device)  # (D,)
     l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
 
-    joints = world_joints(output * model.std + model.mean, config.joints)  # (B, T, J, 3)
-    truth = world_joints(features, config.joints)
-    position = _average((joints - truth).abs().sum(-1).mean(-1), valid)
-    step = (joints - truth).diff(dim=1).abs().sum(-1).mean(-1) * config.fps  # (B, T - 1)
-    velocity = _average(step, valid[:, 1:])
-    total = l1 + t.commitment * quantized.commitment + t.position_weight * position + t.velocity_weight * velocity
-    return TokenizerLoss(total, l1.detach(), quantized.commitment.detach(), position.detach(), velocity.detach()), (
-        quantized
+    restored = output * model.std + model.mean
+    local = heading_joints(restored, config.joints) - heading_joints(features, config.joints)  # (B, T, J, 3)
+    position = _average(local.abs().sum(-1).mean(-1), valid)
+    velocity = _average(local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps, valid[:, 1:])
+    drift = world_joints(restored, config.joints) - world_joints(features, config.joints)
+    world = _average(drift.abs().sum(-1).mean(-1), valid)
+    total = (
+        l1
+        + t.commitment * quantized.commitment
+        + t.position_weight * position
+        + t.velocity_weight * velocity
+        + t.world_weight * min(1.0, 2 * fraction) ** 2 * world
     )
+    terms = (l1, quantized.commitment, position, velocity, world)
+    return TokenizerLoss(total, *(term.detach() for term in terms)), quantized
 
 
 def feature_weights(config: HGM3Config) -> Tensor:

@@ -1,0 +1,160 @@
+"""Captions of a prepared folder as text features: `texts.npz`, written once, read by every training run.
+
+Arrays (K captions of C clips, N nodes and E edges of all their graphs, U different node texts):
+`strings` float16 (U, W) · `caption_start` int64 (C + 1,) · `node_start` int64 (K + 1,) · `node_string` int32 (N,) ·
+`node_level` int8 (N,) · `edge_start` int64 (K + 1,) · `edges` int16 (E, 3): source, target, type, nodes numbered within
+their caption · `spec`, `clips_sha256`: strings.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.bundles import TextSpec
+from shared.errors import InvalidFile, NotFound
+from shared.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
+from shared.text.pipeline import TextPipeline
+from workers.training.data.manifest import CLIPS, TEXTS
+from workers.training.data.prepared import PreparedData, sha256_of
+
+CHUNK = 256
+
+
+@dataclass(frozen=True)
+class CaptionTexts:
+    """Text features of all captions, clip by clip."""
+
+    spec: TextSpec
+    strings: NDArray[np.float16]  # (U, W)
+    first: NDArray[np.int64]  # (C + 1,): clip c has captions first[c] … first[c + 1] - 1
+    node_start: NDArray[np.int64]
+    node_string: NDArray[np.int32]
+    node_level: NDArray[np.int8]
+    edge_start: NDArray[np.int64]
+    edges: NDArray[np.int16]
+
+    @classmethod
+    def build(
+        cls,
+        captions: Sequence[Sequence[str]],
+        pipeline: TextPipeline,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> CaptionTexts:
+        """Parse and encode the captions of each clip; equal texts are encoded once."""
+        flat = [caption for clip in captions for caption in clip]
+        graphs: dict[str, SemanticGraph] = {}
+        unique = list(dict.fromkeys(flat))
+        for at in range(0, len(unique), CHUNK):
+            chunk = unique[at : at + CHUNK]
+            graphs.update(zip(chunk, pipeline.parse(chunk), strict=True))
+            if progress:
+                progress(min(at + CHUNK, len(unique)), 2 * len(unique))
+        table: dict[str, int] = {}
+        node_string = [table.setdefault(n.text, len(table)) for text in flat for n in graphs[text].nodes]
+        strings = np.empty((len(table), pipeline.spec.width), np.float16)
+        for text, row in table.items():
+            strings[row] = pipeline.pooled(text)
+            if progress and row % CHUNK == 0:
+                progress(len(unique) + row * len(unique) // len(table), 2 * len(unique))
+        nodes = [graphs[text].nodes for text in flat]
+        edges = [(e.source, e.target, EDGE_TYPES.index(e.type)) for text in flat for e in graphs[text].edges]
+        return cls(
+            pipeline.spec,
+            strings,
+            _starts([len(clip) for clip in captions]),
+            _starts([len(each) for each in nodes]),
+            np.array(node_string, np.int32),
+            np.array([LEVELS.index(n.level) for each in nodes for n in each], np.int8),
+            _starts([len(graphs[text].edges) for text in flat]),
+            np.array(edges, np.int16).reshape(-1, 3),
+        )
+
+    def save(self, folder: Path) -> None:
+        """Write `texts.npz` into a prepared folder."""
+        temporary = folder / f".{TEXTS}.part"
+        with temporary.open("wb") as file:
+            np.savez_compressed(
+                file,
+                strings=self.strings,
+                caption_start=self.first,
+                node_start=self.node_start,
+                node_string=self.node_string,
+                node_level=self.node_level,
+                edge_start=self.edge_start,
+                edges=self.edges,
+                spec=np.array(self.spec.model_dump_json()),
+                clips_sha256=np.array(sha256_of(folder / CLIPS)),
+            )
+        temporary.replace(folder / TEXTS)
+
+    @classmethod
+    def load(cls, data: PreparedData) -> CaptionTexts:
+        """Read the `texts.npz` of a prepared folder.
+
+        Raises:
+            NotFound: there is none yet.
+            InvalidFile: broken, or made for other captions.
+        """
+        file = data.path / TEXTS
+        if not file.is_file():
+            raise NotFound("captions have no text features yet", where=str(file), hint="Run `marey data text`.")
+        try:
+            with np.load(file, allow_pickle=False) as arrays:
+                spec = TextSpec.model_validate(json.loads(str(arrays["spec"])))
+                clips = str(arrays["clips_sha256"])
+                names = ("strings", "caption_start", "node_start", "node_string", "node_level", "edge_start", "edges")
+                texts = cls(spec, *(arrays[name] for name in names))
+        except (ValueError, KeyError, OSError, EOFError) as error:
+            raise InvalidFile(f"these are no text features: {error}", where=str(file)) from error
+        if clips != data.manifest.files[CLIPS].sha256 or len(texts.first) != len(data.clips) + 1:
+            raise InvalidFile("made for other captions", where=str(file), hint="Run `marey data text` again.")
+        return texts
+
+    def slots(self, max_actions: int, max_specifics: int) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
+        """Strings and edge types in fixed slots, as `SemanticGraph.slots` and `.adjacency` put them.
+
+        Returns:
+            (K, S) index of the string in each slot, -1 = absent, and (K, S, S) edge type, -1 = none, self-loops in.
+        """
+        count, size = len(self.node_start) - 1, 1 + max_actions + max_specifics
+        caption = np.repeat(np.arange(count), np.diff(self.node_start))  # (N,)
+        level = self.node_level.astype(np.int64)
+        rank = _rank_within(caption * len(LEVELS) + level)
+        first_slot = np.array([0, 1, 1 + max_actions])[level]
+        room = np.array([1, max_actions, max_specifics])[level]
+        slot = np.where(rank < room, first_slot + rank, -1)  # (N,)
+        kept = slot >= 0
+        strings = np.full((count, size), -1, np.int32)
+        strings[caption[kept], slot[kept]] = self.node_string[kept]
+        adjacency = np.full((count, size, size), -1, np.int8)
+        adjacency[caption[kept], slot[kept], slot[kept]] = np.where(level[kept] == 0, MA, OTHERS)
+        owner = np.repeat(np.arange(count), np.diff(self.edge_start))  # (E,)
+        source = slot[self.node_start[owner] + self.edges[:, 0]]
+        target = slot[self.node_start[owner] + self.edges[:, 1]]
+        both = (source >= 0) & (target >= 0)
+        owner, source, target, kind = owner[both], source[both], target[both], self.edges[both, 2]
+        adjacency[owner, source, target] = kind
+        adjacency[owner, target, source] = kind
+        return strings, adjacency
+
+
+def _starts(counts: Sequence[int]) -> NDArray[np.int64]:
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
+
+
+def _rank_within(group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Position of each element among those of its group, in order."""
+    order = np.argsort(group, kind="stable")
+    ordered = group[order]
+    begins = np.r_[0, np.flatnonzero(np.diff(ordered)) + 1]
+    lengths = np.diff(np.r_[begins, len(group)])
+    rank = np.empty(len(group), np.int64)
+    rank[order] = np.arange(len(group)) - np.repeat(begins, lengths)
+    return rank
