@@ -1,0 +1,317 @@
+"""Real processes, killed in the middle of their work; then the audit in SQL and on the store."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from uuid import UUID
+
+import pytest
+import sqlalchemy as sa
+
+from shared.jobs import collect_garbage, transaction
+from shared.jobs.schema import item, lease
+from shared.storage import FolderStore
+from shared.storage.port import AssetStore
+from tests.chaos.driver import Cluster
+from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
+from tests.support.toy_jobs import audit, ended, job_row, states, submit_toys
+
+PRODUCT_TIMES: dict[str, str] = {}
+SHORT_TIMES = {"MAREY_LEASE_SECONDS": "3", "MAREY_HEARTBEAT_SECONDS": "0.5", "MAREY_SWEEP_SECONDS": "0.5"}
+"""A third of the product's: a prompt that kills its worker takes four leases to end."""
+
+
+@dataclass
+class Folder:
+    """A folder store that can be taken away: its root becomes a file."""
+
+    root: Path
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return {"MAREY_STORE": str(self.root)}
+
+    @property
+    def store(self) -> AssetStore:
+        return FolderStore(self.root)
+
+    @contextmanager
+    def away(self) -> Iterator[None]:
+        aside = self.root.with_name("aside")
+        self.root.mkdir(exist_ok=True)
+        self.root.rename(aside)
+        self.root.touch()
+        try:
+            yield
+        finally:
+            self.root.unlink()
+            aside.rename(self.root)
+
+
+@dataclass
+class S3:
+    """A bucket of a server that can be taken away."""
+
+    server: Swift
+
+    def __post_init__(self) -> None:
+        self.store = self.server.new_store()
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return {
+            "MAREY_STORE": f"s3://{self.store.options.bucket}",
+            "MAREY_S3_ENDPOINT": self.server.endpoint,
+            "MAREY_S3_ACCESS_KEY": ACCESS_KEY,
+            "MAREY_S3_SECRET_KEY": SECRET_KEY,
+        }
+
+    @contextmanager
+    def away(self) -> Iterator[None]:
+        self.server.stop()
+        try:
+            yield
+        finally:
+            self.server.start()
+
+
+Stage = Callable[..., Cluster]
+
+
+@pytest.fixture
+def stage(short_home: Path) -> Iterator[Stage]:
+    """Starts a cluster with a scheduler and `workers` ready workers; all of it ends with the test."""
+    clusters: list[Cluster] = []
+
+    def start(environment: dict[str, str], workers: int = 2) -> Cluster:
+        cluster = Cluster(short_home, environment)
+        clusters.append(cluster)
+        cluster.start_scheduler()
+        for number in range(workers):
+            cluster.start_worker(f"worker-{number}")
+        for number in range(workers):
+            cluster.wait_ready(f"worker-{number}")
+        return cluster
+
+    yield start
+    for cluster in clusters:
+        cluster.__exit__()
+
+
+def prompts(count: int, *deeds: str) -> list[str]:
+    """`count` harmless prompts with these in their midst."""
+    walks = [f"walk {n}" for n in range(count - len(deeds))]
+    middle = len(walks) // 2
+    return [*walks[:middle], *deeds, *walks[middle:]]
+
+
+def finish(cluster: Cluster, job: UUID, store: AssetStore, seconds: float) -> None:
+    """Wait for the end, collect garbage once, and audit."""
+    cluster.wait(lambda: ended(cluster.engine, job), "the job ends", seconds=seconds)
+    wait_no_leases(cluster)
+    collect_garbage(cluster.engine, store)
+    assert audit(cluster.engine, store) == []
+
+
+def wait_no_leases(cluster: Cluster) -> None:
+    """Wait until no lease is held."""
+
+    def none_held() -> bool:
+        with transaction(cluster.engine) as conn:
+            return conn.execute(sa.select(sa.func.count()).select_from(lease)).scalar_one() == 0
+
+    cluster.wait(none_held, "no lease is held")
+
+
+def working(cluster: Cluster, name: str) -> Callable[[], bool]:
+    """Whether the worker `name` holds a lease."""
+
+    def holds() -> bool:
+        with transaction(cluster.engine) as conn:
+            return bool(conn.execute(sa.select(lease).where(lease.c.worker == f"{name}/toy")).first())
+
+    return holds
+
+
+def test_every_item_ends_once_whatever_is_killed(stage: Stage, tmp_path: Path) -> None:
+    """The short seed: two workers, 40 items; a toxic prompt and each fault once."""
+    disk = Folder(tmp_path / "assets")
+    cluster = stage({**SHORT_TIMES, **disk.environment})
+    job = submit_toys(cluster.engine, prompts(40, "kill the worker"), steps=8, step_seconds=0.1)
+    cluster.wait(working(cluster, "worker-0"), "worker-0 works")
+    cluster.kill_child("worker-0")
+    cluster.kill("scheduler")
+    cluster.flush_queue()
+    cluster.start_scheduler()
+    cluster.restart_postgres(seconds_away=1.0)
+    with disk.away():
+        time.sleep(3.0)
+    finish(cluster, job, disk.store, 120.0)
+    found = states(cluster.engine, job)
+    assert found.pop("dead") == ["kill the worker"]
+    assert len(found.pop("succeeded")) == 39
+    assert not found
+
+
+@pytest.mark.slow
+def test_the_faults_of_the_contract_at_the_products_own_times(stage: Stage, tmp_path: Path, swift: Swift) -> None:
+    """kill -9 of a child and of the scheduler, FLUSHALL, Postgres restart, 10 s without S3, in one 40-item job."""
+    bucket = S3(swift)
+    cluster = stage({**PRODUCT_TIMES, **bucket.environment})
+    job = submit_toys(cluster.engine, prompts(40, "kill the worker"), steps=40, step_seconds=0.1)
+    cluster.wait(working(cluster, "worker-1"), "worker-1 works")
+    cluster.kill_child("worker-1")
+    cluster.kill("scheduler")
+    time.sleep(2.0)
+    cluster.start_scheduler()
+    cluster.flush_queue()
+    with bucket.away():
+        time.sleep(10.0)
+    cluster.restart_postgres(seconds_away=3.0)
+    finish(cluster, job, bucket.store, 400.0)
+    found = states(cluster.engine, job)
+    assert found == {"dead": ["kill the worker"], "succeeded": prompts(39)}
+
+
+@pytest.mark.slow
+def test_a_killed_workers_items_start_again_within_15_seconds(stage: Stage, tmp_path: Path) -> None:
+    disk = Folder(tmp_path / "assets")
+    cluster = stage({**PRODUCT_TIMES, **disk.environment}, workers=2)
+    job = submit_toys(cluster.engine, prompts(64), steps=300, step_seconds=0.1)
+    cluster.wait(working(cluster, "worker-0"), "worker-0 works")
+    cluster.wait(working(cluster, "worker-1"), "worker-1 works")
+    with transaction(cluster.engine) as conn:
+        held = set(
+            conn.execute(
+                sa.select(item.c.id)
+                .join(lease, lease.c.token == item.c.lease_token)
+                .where(lease.c.worker == "worker-0/toy")
+            ).scalars()
+        )
+        token = conn.execute(sa.select(lease.c.token).where(lease.c.worker == "worker-0/toy")).scalar_one()
+    cluster.kill_child("worker-0")
+
+    def started_again() -> bool:
+        with transaction(cluster.engine) as conn:
+            again = conn.execute(
+                sa.select(item.c.id).where(item.c.lease_token.is_not(None), item.c.lease_token != token)
+            ).scalars()
+            return bool(held & set(again))
+
+    assert cluster.wait(started_again, "an item starts again") < 15.0
+    assert not ended(cluster.engine, job)
+
+
+@pytest.mark.slow
+def test_sigterm_gives_items_back_at_no_cost(stage: Stage, tmp_path: Path) -> None:
+    disk = Folder(tmp_path / "assets")
+    cluster = stage(disk.environment)
+    job = submit_toys(cluster.engine, prompts(40), steps=100, step_seconds=0.1)
+    cluster.wait(working(cluster, "worker-0"), "worker-0 works")
+    assert cluster.terminate("worker-0", timeout=30.0) == 0
+    with transaction(cluster.engine) as conn:
+        held = conn.execute(sa.select(lease.c.worker)).scalars().all()
+        rows = conn.execute(sa.select(item.c.attempts, item.c.solo)).all()
+    assert "worker-0/toy" not in held
+    assert {tuple(row) for row in rows} == {(0, False)}
+    finish(cluster, job, disk.store, 120.0)
+    assert job_row(cluster.engine, job).succeeded == 40
+
+
+@pytest.mark.slow
+def test_two_schedulers_and_a_restarted_queue_are_harmless(stage: Stage, tmp_path: Path) -> None:
+    disk = Folder(tmp_path / "assets")
+    cluster = stage(disk.environment)
+    cluster.start_scheduler("scheduler-2")
+    job = submit_toys(cluster.engine, prompts(200), steps=2, step_seconds=0.2)
+    cluster.wait(working(cluster, "worker-0"), "worker-0 works")
+    cluster.restart_valkey(seconds_away=3.0)
+    late = submit_toys(cluster.engine, prompts(100), steps=2, step_seconds=0.1)
+    finish(cluster, job, disk.store, 120.0)
+    finish(cluster, late, disk.store, 120.0)
+    assert job_row(cluster.engine, job).succeeded == 200
+    assert job_row(cluster.engine, late).succeeded == 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_random_faults_never_lose_or_double_an_item(stage: Stage, tmp_path: Path, swift: Swift, seed: int) -> None:
+    """Faults in random order and at random times, while jobs come in."""
+    draw = random.Random(seed)
+    place: Folder | S3 = Folder(tmp_path / "assets") if seed % 2 else S3(swift)
+    cluster = stage({**SHORT_TIMES, **place.environment}, workers=3)
+    jobs = [submit_toys(cluster.engine, prompts(60, "kill the worker"), steps=5, step_seconds=0.1, n=0)]
+
+    def store_away() -> None:
+        with place.away():
+            time.sleep(draw.uniform(1.0, 10.0))
+
+    def kill_worker() -> None:
+        name = f"worker-{draw.randrange(3)}"
+        cluster.kill(name)
+        time.sleep(draw.uniform(0.0, 2.0))
+        cluster.start_worker(name)
+
+    def kill_child() -> None:
+        name = f"worker-{draw.randrange(3)}"
+        if cluster.child(name):
+            cluster.kill_child(name)
+
+    def kill_scheduler() -> None:
+        cluster.kill("scheduler")
+        time.sleep(draw.uniform(0.0, 3.0))
+        cluster.start_scheduler()
+
+    faults = [
+        store_away,
+        kill_worker,
+        kill_child,
+        kill_scheduler,
+        cluster.flush_queue,
+        lambda: cluster.restart_postgres(draw.uniform(0.0, 3.0)),
+        lambda: cluster.restart_valkey(draw.uniform(0.0, 3.0)),
+    ]
+    draw.shuffle(faults)
+    for number, fault in enumerate(faults, start=1):
+        time.sleep(draw.uniform(0.5, 3.0))
+        fault()
+        jobs.append(submit_toys(cluster.engine, prompts(20), steps=2, step_seconds=0.2, n=number))
+    for job in jobs:
+        finish(cluster, job, place.store, 400.0)
+    found = states(cluster.engine, jobs[0])
+    assert found.pop("dead") == ["kill the worker"]
+    assert set(found) == {"succeeded"}
+    for job in jobs[1:]:
+        assert job_row(cluster.engine, job).succeeded == 20
+
+
+@pytest.mark.slow
+def test_eight_workers_claiming_a_thousand_items_claim_none_twice(stage: Stage, tmp_path: Path) -> None:
+    disk = Folder(tmp_path / "assets")
+    cluster = stage(disk.environment, workers=8)
+    watched: list[int] = []
+    stop = threading.Event()
+
+    def watch() -> None:
+        while not stop.wait(0.2):
+            with transaction(cluster.engine) as conn:
+                watched.append(conn.execute(sa.select(sa.func.count(sa.distinct(lease.c.worker)))).scalar_one())
+
+    thread = threading.Thread(target=watch)
+    thread.start()
+    try:
+        job = submit_toys(cluster.engine, prompts(1000), steps=1, step_seconds=0.2)
+        finish(cluster, job, disk.store, 120.0)
+    finally:
+        stop.set()
+        thread.join()
+    assert job_row(cluster.engine, job).succeeded == 1000
+    assert max(watched) > 4  # they did work side by side
+    shutil.rmtree(disk.root)
