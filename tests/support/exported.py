@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from shared.motion.clip import MotionClip
+from shared.motion.features import HUMANML3D_263
+from shared.motion.finish import finish_motion
 from shared.motion.rotations import from_rotvec
 from shared.motion.skeleton import KIT, SNAPMOGEN, Skeleton
 from tests.support.walker import walker
@@ -19,7 +21,14 @@ def tumbling(skeleton: Skeleton, fps: float) -> MotionClip:
     return MotionClip.of(skeleton, from_rotvec(vectors), root, np.zeros((40, 4), bool), fps)
 
 
+def finished(fps: float) -> MotionClip:
+    """The way of a generated motion: features, decoded, cleaned, solved and resampled."""
+    return finish_motion(HUMANML3D_263.encode(walker(turn=0.5).joints), HUMANML3D_263, fps=fps)
+
+
 CLIPS = {
+    "a finished motion at 20 fps": finished(20),
+    "a finished motion at 59.94 fps": finished(60000 / 1001),
     "a walk": walker(turn=0.7),
     "a walk at 23.976 fps": walker(fps=24000 / 1001),
     "a walk at 120 fps": walker(seconds=1, fps=120, turn=-1.5),
