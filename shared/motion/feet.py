@@ -3,7 +3,7 @@
 Generated feet slide a little while they stand, and sink into the floor or float. Here each stretch in which a toe
 stands gets one place (lock); what that moves the foot by is spread over the swings before and after it by Hermite
 curves, which meet value and speed at both ends (blend), so nothing pops. The legs follow by two-bone inverse
-kinematics in closed form: lengths stay, the knee keeps its plane, and where a leg is too short the hips come down.
+kinematics in closed form (`legs.py`).
 
 The idea of locking and blending is MoMask's (EricGuo5513/momask-codes, visualization/remove_fs.py, MIT, after Holden's
 write-up); thresholds here are in metres and seconds, so they hold for any frame rate.
@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
-from shared.motion.kinematics import facing
-from shared.motion.pose import smooth
-from shared.motion.rotations import Array, between, normalize, rotate
+from shared.motion.legs import follow_feet, foot_chain
+from shared.motion.rotations import Array, normalize
 from shared.motion.skeleton import Skeleton
 
 Bool = NDArray[np.bool_]
@@ -44,7 +43,6 @@ LONG_SWING = 0.8  # seconds; over a longer one the correction is taken back to z
 RELEASE = 0.35  # seconds that this takes
 FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint lies inside the foot, so it stands at up to 3 cm
 STILL = 0.015  # metres that an ankle, or a toe in height, may stray for noise; more is a heel or a foot that rolls
-MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot gives way
 
 
 def clean_feet(
@@ -74,7 +72,7 @@ def clean_feet(
         ankle, toe = skeleton.feet[2 * side : 2 * side + 2]
         stands[:, 2 * side + 1] &= ~_slides(joints[:, toe], stands[:, 2 * side + 1], rule)
         _plant(joints, skeleton, (ankle, toe), stands[:, 2 * side : 2 * side + 2], fps)
-    _follow(before, joints, skeleton, fps)
+    follow_feet(before, joints, stands[:, 1::2], skeleton, fps)
     return joints, stands
 
 
@@ -147,7 +145,7 @@ def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:
 def _plant(joints: Array, skeleton: Skeleton, foot: tuple[int, int], stands: Bool, fps: float) -> None:
     """Move one foot, in place: the toe to its locks, the ankle with it and to its own where both stand."""
     ankle, toe = foot
-    chain = _foot_chain(skeleton, toe)
+    chain = foot_chain(skeleton, toe)
     lengths = [np.linalg.norm(joints[:, a] - joints[:, b], axis=-1, keepdims=True) for a, b in _pairs(chain)]
     shift = np.zeros((len(joints), 3))
     for begin, end in runs(stands[:, 1]):
@@ -172,15 +170,6 @@ def _plant(joints: Array, skeleton: Skeleton, foot: tuple[int, int], stands: Boo
         joints[:, j] += turn
     for (child, parent), length in zip(_pairs(chain), lengths, strict=True):
         joints[:, parent] = joints[:, child] + length * normalize(joints[:, parent] - joints[:, child])
-
-
-def _foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
-    """Joints from the toe up to the end of the leg: toe, …, the knee's child."""
-    knees = {skeleton.children[hip][0] for hip in skeleton.facing[:2]}
-    chain = [toe]
-    while skeleton.parents[chain[-1]] not in knees:
-        chain.append(skeleton.parents[chain[-1]])
-    return chain
 
 
 def _pairs(chain: list[int]) -> list[tuple[int, int]]:
@@ -232,86 +221,3 @@ def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: 
 def _over_floor(height: Array) -> Array:
     """Heights bent up smoothly so that none is below zero; 2 cm up it is a third of a millimetre, 5 cm up nothing."""
     return 0.5 * (height + np.sqrt(height**2 + 0.005**2))
-
-
-def _follow(before: Array, joints: Array, skeleton: Skeleton, fps: float) -> None:
-    """Legs between the hips and the moved feet, in place; the hips come down where a leg would be too short."""
-    r_hip, l_hip = skeleton.facing[:2]
-    chains = [_foot_chain(skeleton, toe) for toe in skeleton.feet[1::2]]
-    legs = [(hip, skeleton.children[hip][0], chain[-1]) for hip, chain in zip((l_hip, r_hip), chains, strict=True)]
-    drop = smooth_above(np.max([_needed_drop(before, joints, leg) for leg in legs], axis=0), 0.1 * fps)
-    body = [j for j in range(len(skeleton)) if j not in chains[0] + chains[1]]
-    joints[:, body, 1] -= drop[:, None]
-    ahead = smooth(facing(before, skeleton), 0.2 * fps)
-    for (hip, knee, ankle), chain in zip(legs, chains, strict=True):
-        _give_way(before[:, [hip, knee, ankle]], joints, hip, chain)
-        joints[:, knee] = two_bone_knee(before[:, [hip, knee, ankle]], joints[:, hip], joints[:, ankle], ahead)
-
-
-def _give_way(leg: Array, joints: Array, hip: int, chain: list[int]) -> None:
-    """A foot beyond the straight leg's reach is drawn to where it reaches, in place."""
-    length = np.linalg.norm(np.diff(leg, axis=1), axis=2).sum(axis=1)
-    across = joints[:, chain[-1]] - joints[:, hip]
-    over = np.maximum(np.linalg.norm(across, axis=1) - length, 0.0)
-    joints[:, chain] -= (over[:, None] * normalize(across))[:, None]
-
-
-def _needed_drop(before: Array, joints: Array, leg: tuple[int, int, int]) -> Array:
-    """(T,) by how much the hip must come down for the leg to reach, no straighter than 0.9995 or than it was."""
-    hip, knee, ankle = leg
-    length = np.linalg.norm(before[:, hip] - before[:, knee], axis=1) + np.linalg.norm(
-        before[:, knee] - before[:, ankle], axis=1
-    )
-    was = np.linalg.norm(before[:, hip] - before[:, ankle], axis=1)
-    reach = np.maximum(0.9995 * length, was)
-    across = joints[:, ankle] - joints[:, hip]
-    flat = across[:, 0] ** 2 + across[:, 2] ** 2
-    room = np.sqrt(np.maximum(reach**2 - flat, 0.0))
-    needed = -across[:, 1] - room
-    return np.clip(np.where(across[:, 1] < 0, needed, 0.0), 0.0, MAX_DROP)
-
-
-def smooth_above(values: Array, sigma: float) -> Array:
-    """A smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
-    radius = min(int(3 * sigma + 0.5), len(values) - 1)
-    if radius < 1 or not values.any():
-        return values
-    padded = np.pad(values, radius, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1).max(axis=1)
-    return smooth(highest[:, None], sigma)[:, 0]
-
-
-def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
-    """Where the knee goes when hip and ankle move, both bones keeping their lengths.
-
-    The leg is turned as a whole to its new direction and then bent or stretched in its plane; a leg that moved nowhere
-    keeps its knee to the last digit. A straight leg that must bend does so ahead.
-
-    Args:
-        leg: (T, 3, 3) hip, knee and ankle as they were.
-        hip, ankle: (T, 3) where they are now; out of reach, the leg points there and is straight.
-        ahead: (T, 3) where knees bend to.
-
-    Returns:
-        (T, 3).
-    """
-    upper, whole = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 0]
-    l1, l2 = np.linalg.norm(upper, axis=1), np.linalg.norm(leg[:, 2] - leg[:, 1], axis=1)
-    turn = between(whole, ankle - hip)
-    axis = normalize(ankle - hip)
-    knee = rotate(turn, upper)
-
-    def bend(distance: Array) -> tuple[Array, Array]:
-        """Of the knee: along the line from hip to ankle, and off it."""
-        distance = np.clip(distance, np.abs(l1 - l2) + 1e-9, l1 + l2)
-        along = (distance**2 + l1**2 - l2**2) / (2 * distance)
-        return along, np.sqrt(np.maximum(l1**2 - along**2, 0.0))
-
-    along_was, off_was = bend(np.linalg.norm(whole, axis=1))
-    along, off = bend(np.linalg.norm(ankle - hip, axis=1))
-    pole = knee - along_was[:, None] * axis
-    prior = ahead - axis * np.einsum("ti,ti->t", ahead, axis)[:, None]
-    pole = normalize(pole + 0.03 * prior)  # 3 cm off the line is a bend of 9 degrees: enough to know the plane
-    knee = knee + (off - off_was)[:, None] * pole
-    plane = knee - axis * np.einsum("ti,ti->t", knee, axis)[:, None]
-    return hip + along[:, None] * axis + off[:, None] * normalize(plane + 1e-9 * prior)

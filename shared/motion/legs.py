@@ -1,0 +1,161 @@
+"""Legs that follow their feet: two-bone inverse kinematics in closed form, which keeps every bone's length.
+
+A leg close to straight answers a millimetre at the foot with centimetres at the knee, so a moved foot may hardly
+stretch it: first the heel comes up around the toe, as a walker's does, then the hips come down a little, and at last
+the foot gives way.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.motion.kinematics import facing
+from shared.motion.pose import smooth
+from shared.motion.rotations import Array, between, normalize, rotate
+from shared.motion.skeleton import Skeleton
+
+STRETCH = 0.99  # of its length: how far a moved foot may stretch a leg that was not straighter before (16 degrees)
+MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot gives way
+
+
+def foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
+    """Joints from the toe up to the end of the leg: toe, …, the knee's child."""
+    knees = {skeleton.children[hip][0] for hip in skeleton.facing[:2]}
+    chain = [toe]
+    while skeleton.parents[chain[-1]] not in knees:
+        chain.append(skeleton.parents[chain[-1]])
+    return chain
+
+
+def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleton: Skeleton, fps: float) -> None:
+    """Put hips and knees to moved feet, in place.
+
+    Args:
+        before: (T, J, 3) the motion before its feet were moved.
+        joints: (T, J, 3) the same with moved feet; all joints are changed where need be.
+        stands: (T, 2) left and right toe stand, so must stay where they are.
+        skeleton: knows its hips and feet.
+        fps: frames a second.
+    """
+    r_hip, l_hip = skeleton.facing[:2]
+    chains = [foot_chain(skeleton, toe) for toe in skeleton.feet[1::2]]
+    legs = [[hip, skeleton.children[hip][0], chain[-1]] for hip, chain in zip((l_hip, r_hip), chains, strict=True)]
+    held = [smooth_above(stands[:, side].astype(np.float64), 0.04 * fps) for side in range(2)]
+    needed = [
+        hold * _needed_drop(before[:, leg], joints[:, leg[0]], joints[:, chain])
+        for leg, chain, hold in zip(legs, chains, held, strict=True)
+    ]
+    drop = smooth_above(np.max(needed, axis=0), 0.1 * fps)
+    body = [j for j in range(len(skeleton)) if j not in chains[0] + chains[1]]
+    joints[:, body, 1] -= drop[:, None]
+    ahead = smooth(facing(before, skeleton), 0.2 * fps)
+    for leg, chain, hold in zip(legs, chains, held, strict=True):
+        hip, ankle = joints[:, leg[0]], joints[:, leg[2]]
+        wanted = _soft_distance(before[:, leg], np.linalg.norm(ankle - hip, axis=1), fps)
+        joints[:, chain] = _draw_foot(joints[:, chain], hip, wanted, hold)
+        joints[:, leg[1]] = two_bone_knee(before[:, leg], hip, joints[:, leg[2]], ahead)
+
+
+def _lengths(leg: Array) -> tuple[Array, Array]:
+    """(T,) thigh and shank of (T, 3, 3)."""
+    bones = np.linalg.norm(np.diff(leg, axis=1), axis=2)
+    return bones[:, 0], bones[:, 1]
+
+
+def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
+    """(T,) by how much the hip must come down until leg and foot together reach the toe."""
+    across, span = foot[:, 0] - hip, np.linalg.norm(foot[:, -1] - foot[:, 0], axis=1)
+    reach = 0.99 * (sum(_lengths(leg)) + span)
+    room = np.sqrt(np.maximum(reach**2 - across[:, 0] ** 2 - across[:, 2] ** 2, 0.0))
+    return np.clip(np.where(across[:, 1] < 0, -across[:, 1] - room, 0.0), 0.0, MAX_DROP)
+
+
+def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
+    """(T,) from hip to ankle, near to what is asked for, but such that the knee does not pop.
+
+    The nearer a leg is to `STRETCH`, the less it is stretched; and where it is nearly straight, what the knee moves off
+    its line is smoothed in time, which costs the ankle less than a millimetre.
+
+    Args:
+        leg: (T, 3, 3) as it was.
+        distance: (T,) asked for.
+    """
+    l1, l2 = _lengths(leg)
+    was = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=1)
+    stretch, room = distance - was, np.maximum(STRETCH * (l1 + l2) - was, 1e-4)
+    wanted = np.where(stretch > 0, was - room * np.expm1(-np.maximum(stretch, 0.0) / room), distance)
+    off_was = _bend(was, l1, l2)[1]
+    change = smooth((_bend(wanted, l1, l2)[1] - off_was)[:, None], 0.04 * fps)[:, 0]
+    off = np.clip(off_was + change, 0.0, np.minimum(l1, l2))
+    smoothed = np.sqrt(l1**2 - off**2) + np.sqrt(l2**2 - off**2)
+    straight = np.clip((was / (l1 + l2) - 0.85) / 0.1, 0.0, 1.0)
+    return wanted + straight**2 * (3 - 2 * straight) * (smoothed - wanted)
+
+
+def _draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
+    """A foot (T, n, 3), toe first, moved so that its ankle is at the wanted distance from the hip.
+
+    Where the toe is held (1) the foot turns around it, heel up or down; where it is not (0), the whole foot gives way.
+    """
+    toe, ankle = foot[:, 0], foot[:, -1]
+    distance = np.linalg.norm(ankle - hip, axis=1)
+    up, sole = hip - toe, ankle - toe
+    far, span = np.linalg.norm(up, axis=1), np.linalg.norm(sole, axis=1)
+    up = normalize(up)
+    turned = distance + hold * (wanted - distance)
+    cosine = np.clip((span**2 + far**2 - turned**2) / (2 * span * far), -1.0, 1.0)
+    beside = normalize(sole - up * np.einsum("ti,ti->t", up, sole)[:, None])
+    raised = span[:, None] * (cosine[:, None] * up + np.sqrt(1 - cosine**2)[:, None] * beside)
+    turn = between(sole, np.where((np.abs(turned - distance) > 1e-7)[:, None], raised, sole))
+    foot = toe[:, None] + rotate(turn[:, None], foot - toe[:, None])
+    across = foot[:, -1] - hip
+    over = np.linalg.norm(across, axis=1) - wanted
+    return foot - (over[:, None] * normalize(across))[:, None]
+
+
+def smooth_above(values: Array, sigma: float) -> Array:
+    """A smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
+    radius = min(int(3 * sigma + 0.5), len(values) - 1)
+    if radius < 1 or not values.any():
+        return values
+    padded = np.pad(values, radius, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1).max(axis=1)
+    return smooth(highest[:, None], sigma)[:, 0]
+
+
+def _bend(distance: Array, l1: Array, l2: Array) -> tuple[Array, Array]:
+    """Where the knee is for a distance (T,) from hip to ankle: along the line between them, and off it."""
+    distance = np.clip(distance, np.abs(l1 - l2) + 1e-9, l1 + l2)
+    along = (distance**2 + l1**2 - l2**2) / (2 * distance)
+    return along, np.sqrt(np.maximum(l1**2 - along**2, 0.0))
+
+
+def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
+    """Where the knee goes when hip and ankle move, both bones keeping their lengths.
+
+    The leg is turned as a whole to its new direction and then bent or stretched in its plane; a leg that moved nowhere
+    keeps its knee to the last digit. A straight leg that must bend does so ahead.
+
+    Args:
+        leg: (T, 3, 3) hip, knee and ankle as they were.
+        hip, ankle: (T, 3) where they are now; out of reach, the leg points there and is straight.
+        ahead: (T, 3) where knees bend to.
+
+    Returns:
+        (T, 3).
+    """
+    upper, whole = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 0]
+    l1, l2 = _lengths(leg)
+    turn = between(whole, ankle - hip)
+    axis = normalize(ankle - hip)
+    knee = rotate(turn, upper)
+
+    along_was, off_was = _bend(np.linalg.norm(whole, axis=1), l1, l2)
+    along, off = _bend(np.linalg.norm(ankle - hip, axis=1), l1, l2)
+    pole = knee - along_was[:, None] * axis
+    prior = ahead - axis * np.einsum("ti,ti->t", ahead, axis)[:, None]
+    pole = normalize(pole + 0.03 * prior)  # 3 cm off the line is a bend of 9 degrees: enough to know the plane
+    knee = knee + (off - off_was)[:, None] * pole
+    plane = knee - axis * np.einsum("ti,ti->t", knee, axis)[:, None]
+    return hip + along[:, None] * axis + off[:, None] * normalize(plane + 1e-9 * prior)
