@@ -64,6 +64,15 @@ def database_url(postgres: EmbeddedServer) -> Iterator[str]:
     _execute(postgres, f"DROP DATABASE {name} WITH (FORCE)")
 
 
+@pytest.fixture(scope="module")
+def module_database_url(postgres: EmbeddedServer) -> Iterator[str]:
+    """URL of a migrated, empty database that the tests of a module share."""
+    name = f"module_{next(_numbers)}"
+    _execute(postgres, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
+    yield _url(postgres, name)
+    _execute(postgres, f"DROP DATABASE {name} WITH (FORCE)")
+
+
 @pytest.fixture
 def engine(database_url: str) -> Iterator[sa.Engine]:
     """Engine of `database_url`."""

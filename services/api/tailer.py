@@ -15,7 +15,7 @@ import sqlalchemy as sa
 import structlog
 
 from shared.errors import NotFound, Unreachable
-from shared.jobs import EVENT_CHANNEL, EventRow, JobRow, Listener, events_after, get_job, transaction
+from shared.jobs import EVENT_CHANNEL, EventRow, Listener, events_after, transaction
 
 log = structlog.get_logger(__name__)
 
@@ -26,7 +26,7 @@ QUEUE_LIMIT = 1000
 """Batches a slow client may lag behind before its stream is closed; it comes back with Last-Event-ID."""
 PROGRESS = "progress"
 
-Batch = tuple[list[EventRow], JobRow]
+Batch = list[EventRow]
 CLOSED = None
 
 
@@ -144,7 +144,6 @@ class Tailer:
         seq = min(s.seq for s in followers)
         try:
             with transaction(self._engine) as conn:
-                row = get_job(conn, followers[0].tenant, job)
                 events: list[EventRow] = []
                 while page := events_after(conn, followers[0].tenant, job, events[-1].seq if events else seq):
                     events.extend(page)
@@ -156,7 +155,7 @@ class Tailer:
             new = [event for event in events if event.seq > follower.seq]
             if new:
                 follower.seq = new[-1].seq
-                follower.put((last_progress_only(new), row))
+                follower.put(last_progress_only(new))
 
 
 def last_progress_only(events: list[EventRow]) -> list[EventRow]:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from shared.bundles import Bundle
     from shared.motion.clip import MotionClip
     from shared.runtime.handler import Role
@@ -119,6 +121,13 @@ class OneShot:
                     assert generated is not None  # nothing was dropped
                     yield row, finish(self._generator, request, generated, settings), elapsed
             start += len(rows)
+
+
+def make_random_bundle(path: Path) -> None:
+    """A tiny HGM³ with random weights: it exercises everything and generates nonsense."""
+    from workers.hgm3.bundle import random_bundle
+
+    random_bundle(path)
 
 
 def needs_extra(extra: str, error: ImportError) -> InvalidInput:

@@ -32,7 +32,7 @@ def watch_job(client: Client, job: str, *, timeout: float | None = None, quiet: 
     with console.bar() as bar:
         bar.disable = quiet
         state = client.get(f"/v1/jobs/{job}")
-        task = bar.add_task(_caption(state), total=state["total"], completed=_ended(state))
+        task = bar.add_task(_caption(state, state), total=state["total"], completed=_ended(state))
         seen, reachable = 0, time.monotonic()
         while state["state"] not in ENDED:
             try:
@@ -42,15 +42,14 @@ def watch_job(client: Client, job: str, *, timeout: float | None = None, quiet: 
                         _tell(bar, event, quiet)
                     reachable = time.monotonic()
                     _patience(deadline, job)
-                    if event.get("job"):
-                        bar.update(task, completed=_ended(event["job"]), description=_caption(event["job"]))
+                    bar.update(task, completed=_ended(event["data"]), description=_caption(state, event["data"]))
                 state = client.get(f"/v1/jobs/{job}")
                 reachable = time.monotonic()
             except Unreachable:
                 if time.monotonic() - reachable > PATIENCE:
                     raise
                 time.sleep(0.5)
-            bar.update(task, completed=_ended(state), description=_caption(state))
+            bar.update(task, completed=_ended(state), description=_caption(state, state))
         return state
 
 
@@ -80,15 +79,15 @@ def _patience(deadline: float | None, job: str) -> float:
     return min(30.0, left)
 
 
-def _ended(job: dict[str, Any]) -> int:
-    return sum(job["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
+def _ended(now: dict[str, Any]) -> int:
+    return sum(now["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
 
 
-def _caption(job: dict[str, Any]) -> str:
-    bad = sum(job["counters"][name] for name in ("failed", "dead", "cancelled"))
-    return f"{job['name'] or job['id'][:8]} {job['state']}" + (f", {bad} without result" if bad else "")
+def _caption(job: dict[str, Any], now: dict[str, Any]) -> str:
+    bad = sum(now["counters"][name] for name in ("failed", "dead", "cancelled"))
+    return f"{job['name'] or job['id'][-8:]} {now['state']}" + (f", {bad} without result" if bad else "")
 
 
 def _tell(bar: Any, event: dict[str, Any], quiet: bool) -> None:
     if not quiet and event.get("item") and event.get("reason"):
-        bar.console.print(f"item {event['item'][:8]}: {event['reason']}", markup=False)
+        bar.console.print(f"item {event['item'][-8:]}: {event['reason']}", markup=False)

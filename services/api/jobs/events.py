@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import AsyncIterator
 from uuid import UUID
 
 from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
 
-from services.api.jobs.schemas import EventView, JobView
-from services.api.tailer import Batch, Tailer
+from services.api.jobs.schemas import EventView
+from services.api.tailer import Tailer
 from shared.errors import InvalidInput
+from shared.jobs import EventRow
 from shared.jobs.states import ENDED
 
 PING_SECONDS = 15.0
@@ -44,19 +44,12 @@ async def stream_events(tailer: Tailer, tenant: str, job: UUID, seq: int) -> Asy
                 continue
             if batch is None:
                 return
-            for message in messages(batch):
-                yield message
-            if batch[1].state in ENDED:
+            for event in batch:
+                yield message(event)
+            if batch[-1].data.get("state") in ENDED:
                 return
 
 
-def messages(batch: Batch) -> list[bytes]:
-    """The events of a batch; the last one carries the job as it stands now."""
-    events, row = batch
-    encoded: list[bytes] = []
-    for event in events:
-        body = EventView.of(event).model_dump(mode="json")
-        if event is events[-1]:
-            body["job"] = JobView.of(row).model_dump(mode="json")
-        encoded.append(format_sse_event(data_str=json.dumps(body), event=event.kind, id=str(event.seq)))
-    return encoded
+def message(event: EventRow) -> bytes:
+    """One event on the wire; its data holds the job's state and counters as of then."""
+    return format_sse_event(data_str=EventView.of(event).model_dump_json(), event=event.kind, id=str(event.seq))

@@ -44,22 +44,9 @@ def write_job(
     template: str = options.TEMPLATE,
     overwrite: bool = False,
     as_json: bool = False,
-) -> list[dict[str, Any]]:
-    """Fetch what a job has made so far and print a line for each of its items, in input order.
-
-    Returns:
-        The output lines.
-    """
-    from services.cli.fetching import check_folder, download_all, plan
-
-    wanted = [f.value for f in formats] if formats else None
-    planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), folder, wanted, template)
-    check_folder(folder)
-    downloads = [download for _, files in planned for download in files]
-    with console.bar() as bar:
-        task = bar.add_task("fetching", total=len(downloads))
-        download_all(client, downloads, overwrite=overwrite, done=lambda _: bar.advance(task))
-    lines = [output_line(item, files) for item, files in planned]
+) -> None:
+    """Fetch what a job has made so far and print a line for each of its items, in input order."""
+    lines = fetch_job(client, job, folder, formats, template=template, overwrite=overwrite)
     for line in lines:
         if as_json:
             console.result_json(line)
@@ -69,7 +56,28 @@ def write_job(
     waiting = sum(line["state"] in ("ready", "leased") for line in lines)
     if waiting:
         console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
-    return lines
+
+
+def fetch_job(
+    client: Client,
+    job: str,
+    folder: Path,
+    formats: Sequence[options.FileFormat] | None = None,
+    *,
+    template: str = options.TEMPLATE,
+    overwrite: bool = False,
+) -> list[dict[str, Any]]:
+    """Fetch what a job has made so far; the output line of each of its items, in input order."""
+    from services.cli.fetching import check_folder, download_all, plan
+
+    wanted = [f.value for f in formats] if formats else None
+    planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), folder, wanted, template)
+    check_folder(folder)
+    downloads = [download for _, files in planned for download in files]
+    with console.bar() as bar:
+        task = bar.add_task("fetching", total=len(downloads))
+        download_all(client, downloads, overwrite=overwrite, done=lambda _: bar.advance(task))
+    return [output_line(item, files) for item, files in planned]
 
 
 def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:

@@ -1,0 +1,169 @@
+"""`make demo`: eight prompts through the whole platform, into `out/demo`."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from services.cli import console
+from services.cli.client import Client
+from services.cli.place import Server, find_server
+from services.cli.watching import watch_job
+from shared.errors import MareyError, NotFound, TimedOut, Unreachable
+
+OUT = Path("out/demo")
+START_SECONDS = 120.0
+"""Making the database, importing torch and loading the model: 15 s here; a slow disk takes longer."""
+JOB_SECONDS = 240.0
+MODEL = "hgm3"
+PROMPTS = (
+    {"prompt": "a person walks forward", "name": "walk", "seconds": 4, "seed": 1},
+    {"prompt": "someone runs forward in a hurry", "name": "run", "seconds": 3, "seed": 2},
+    {"prompt": "a person walks forward and then turns left", "name": "turn-left", "seconds": 5, "seed": 3},
+    {"prompt": "a person walks backward", "name": "backward", "seconds": 4, "seed": 4},
+    {"prompt": "someone waves with the right hand", "name": "wave-right", "seconds": 4, "seed": 5},
+    {"prompt": "a man raises both hands", "name": "raise-both", "seconds": 4, "seed": 6},
+    {"prompt": "a person bows deeply", "name": "bow", "seconds": 4, "seed": 7},
+    {
+        "prompt": "a woman walks forward, then waves with the left hand",
+        "name": "walk-and-wave",
+        "seconds": 6,
+        "seed": 8,
+    },
+)
+
+
+def main() -> int:
+    """Run it; gives the exit code."""
+    began = time.monotonic()
+    home = OUT.absolute() / ".home"
+    try:
+        shutil.rmtree(OUT, ignore_errors=True)  # every run begins anew
+        OUT.mkdir(parents=True, exist_ok=True)
+        random = _ensure_bundle(home)
+        with _server(home):
+            lines = _run()
+        sheets = _draw(lines)
+        shutil.rmtree(home)  # after a failure it stays, with its logs
+        _show(lines, sheets, random=random)
+    except MareyError as error:
+        console.say(f"make demo: {error}")
+        return error.exit_code
+    failed = sum(line["state"] != "succeeded" for line in lines)
+    console.say(f"{len(lines) - failed} motions in {OUT}/ after {time.monotonic() - began:.0f} s.")
+    console.say("Open a .bvh in Blender (File, Import, Motion Capture), or a .png in any viewer.")
+    return 6 if failed else 0
+
+
+def _ensure_bundle(home: Path) -> bool:
+    """Whether the model that will be used has random weights; makes such a bundle where there is no model at all."""
+    os.environ["MAREY_HOME"] = str(home)
+    from services.cli.roles import make_random_bundle
+    from shared.bundles import choose_bundle
+
+    try:
+        return choose_bundle(MODEL, verify=False).manifest.random
+    except NotFound:
+        console.say("There is no trained bundle in models/: making a tiny one with random weights.")
+        make_random_bundle(home / "models" / f"{MODEL}-random")
+        return True
+
+
+@contextlib.contextmanager
+def _server(home: Path) -> Iterator[None]:
+    """`marey serve` on a free port, as a child, until the end of the block."""
+    for name in ("MAREY_SERVER", "MAREY_DATABASE_URL", "MAREY_QUEUE_URL", "MAREY_STORE"):
+        os.environ.pop(name, None)
+    home.mkdir(parents=True, exist_ok=True)
+    (home / "server.json").unlink(missing_ok=True)
+    log = home / "serve.log"
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "services.cli", "serve", "--port", "0"], stdout=output, stderr=output
+        )
+    try:
+        _wait_until_ready(process, log)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _wait_until_ready(process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + START_SECONDS
+    with console.stderr().status("starting the server"):
+        while time.monotonic() < deadline:
+            if process.poll() is not None:
+                raise Unreachable(f"the server ended: {log.read_text()[-2000:]}", where=str(log))
+            if _is_ready():
+                return
+            time.sleep(0.2)
+    raise TimedOut("the server is not ready", where=str(log), hint=f"Look into the logs beside {log}.")
+
+
+def _is_ready() -> bool:
+    import urllib.error
+    import urllib.request
+
+    try:
+        server: Server = find_server()
+        with urllib.request.urlopen(f"{server.url}/readyz", timeout=5) as response:  # noqa: S310
+            return response.status == 200
+    except (Unreachable, urllib.error.URLError, OSError):
+        return False
+
+
+def _run() -> list[dict[str, Any]]:
+    from services.cli.commands.fetch import fetch_job
+
+    with Client.here() as client:
+        job = client.submit([dict(item) for item in PROMPTS], name="demo")
+        watch_job(client, job["id"], timeout=JOB_SECONDS)
+        return fetch_job(client, job["id"], OUT, template="{name}", overwrite=True)
+
+
+def _draw(lines: list[dict[str, Any]]) -> dict[str, Path]:
+    """A contact sheet of each motion, by its npz."""
+    from shared.motion.clip import load_npz
+    from shared.motion.render import contact_sheet
+
+    with console.bar() as bar:
+        task = bar.add_task("drawing", total=len(lines))
+        sheets: dict[str, Path] = {}
+        for line in lines:
+            if "npz" in line["files"]:
+                npz = Path(line["files"]["npz"])
+                sheets[str(npz)] = contact_sheet(load_npz(npz), npz.with_suffix(".png"))
+            bar.advance(task)
+    return sheets
+
+
+def _show(lines: list[dict[str, Any]], sheets: dict[str, Path], *, random: bool) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    title = f"{lines[0]['bundle']}, {lines[0]['licence']}"
+    if random:
+        title = f"RANDOM WEIGHTS ({title}): these motions show the machinery, not the prompts"
+    table = Table(title=title, title_justify="left")
+    for column in ("prompt", "state", "length", "seed", "took", "files"):
+        table.add_column(column)
+    for line in lines:
+        length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
+        took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""
+        npz = line["files"].get("npz")
+        names = [Path(path).name for path in line["files"].values()] + ([sheets[npz].name] if npz else [])
+        prompt = f"{line['prompt']} (random weights)" if random else line["prompt"]
+        table.add_row(prompt, line["state"], length, str(line["seed"]), took, " ".join(names))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

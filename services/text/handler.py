@@ -1,0 +1,61 @@
+"""The work of the queue `text`: prompts to graphs and node vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from shared.bundles import TextSpec, find_bundle
+from shared.errors import InvalidBundle, MareyError
+from shared.jobs import TEXT_QUEUE, ClaimedItem
+from shared.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
+from shared.text.pipeline import TextPipeline
+
+BATCH = 64
+"""Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""
+
+
+class TextHandler:
+    """Parses and encodes with the text specification of the loaded bundle."""
+
+    queue = TEXT_QUEUE
+    batch_size = BATCH
+
+    def __init__(self) -> None:
+        self._pipelines: dict[TextSpec, TextPipeline] = {}
+        self._pipeline: TextPipeline | None = None
+
+    def load(self, bundle: str) -> None:
+        """Make ready what reads prompts for `bundle`; bundles of one specification share it.
+
+        Raises:
+            NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or not the one it names.
+        """
+        spec = find_bundle(bundle, verify=False).manifest.text
+        if spec is None:
+            raise InvalidBundle("this bundle does not read prompts", where=bundle)
+        if spec not in self._pipelines:
+            self._pipelines[spec] = TextPipeline.load(spec)
+        self._pipeline = self._pipelines[spec]
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        """All together: texts are encoded one by one anyway."""
+        return [batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        """The features of each prompt; equal prompts cost once."""
+        assert self._pipeline is not None  # the loop loads before it runs
+        for done, item in enumerate(batch.items, 1):
+            if item.id in control.dropped():
+                continue
+            try:
+                (features,) = self._pipeline.features([item.prompt])
+            except MareyError as error:
+                yield Failed(item.id, error)
+            else:
+                yield TextDone(item.id, item.text_key, features.to_blob())
+            control.progress(done, len(batch.items))
+
+
+def create_handler() -> TextHandler:
+    """What a worker's child makes."""
+    return TextHandler()

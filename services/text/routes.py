@@ -1,0 +1,98 @@
+"""`POST /v1/texts/parse`: the graph a prompt becomes."""
+
+from __future__ import annotations
+
+import threading
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.auth import requires
+from services.api.problems import RESPONSES
+from shared.bundles import TextSpec, choose_bundle
+from shared.errors import InvalidInput
+from shared.jobs import ApiKey
+
+if TYPE_CHECKING:
+    from shared.text.pipeline import TextPipeline
+
+router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
+
+MAX_PROMPTS = 64
+"""Of one request: a second of work; more belong into a job."""
+_loading = threading.Lock()
+
+
+class ParseBody(BaseModel):
+    """Prompts to parse."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    prompts: list[str] = Field(min_length=1, max_length=MAX_PROMPTS)
+    model: str = Field("hgm3", max_length=200, description="Model or bundle whose labeller and rewriter to use.")
+
+
+class NodeView(BaseModel):
+    """A node: the motion, an action, or a specific of one."""
+
+    id: int
+    level: str
+    text: str
+    words: list[int]
+
+
+class EdgeView(BaseModel):
+    """A labelled edge."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    source: int = Field(alias="from")
+    target: int = Field(alias="to")
+    type: str
+    role: str
+
+
+class GraphView(BaseModel):
+    """The semantic graph of a prompt."""
+
+    text: str
+    words: list[str]
+    nodes: list[NodeView]
+    edges: list[EdgeView]
+    cut: dict[str, Any]
+
+
+class GraphsView(BaseModel):
+    """A graph a prompt, in the order given."""
+
+    items: list[GraphView]
+
+
+@router.post("/parse")
+def parse_texts(body: ParseBody, key: Annotated[ApiKey, Depends(requires("read"))]) -> GraphsView:
+    """The semantic graph of each prompt."""
+    graphs = pipeline_of(body.model).parse(body.prompts)
+    return GraphsView(items=[GraphView.model_validate(graph.to_json()) for graph in graphs])
+
+
+def pipeline_of(model: str) -> TextPipeline:
+    """What reads prompts for a model or bundle.
+
+    Raises:
+        InvalidInput: it reads none.
+        NotFound, InvalidBundle: as `choose_bundle` and `TextPipeline.load`.
+    """
+    bundle = choose_bundle(model, verify=False)
+    if bundle.manifest.text is None:
+        raise InvalidInput(f"{model!r} does not read prompts", where="model", hint="Name a generator.")
+    with _loading:
+        return _loaded(bundle.manifest.text.model_dump_json())
+
+
+@lru_cache(maxsize=4)
+def _loaded(spec: str) -> TextPipeline:
+    from shared.text.pipeline import TextPipeline  # brings torch: not before somebody asks
+
+    return TextPipeline.load(TextSpec.model_validate_json(spec))

@@ -1,0 +1,159 @@
+"""A real uvicorn with the whole API on a database of its own, and hands to do a worker's part."""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import sqlalchemy as sa
+import uvicorn
+
+from services.api.app import create_app
+from services.cli.client import Client
+from services.cli.place import Server
+from shared.bundles import BundleWriter, TextSpec
+from shared.jobs import (
+    DEFAULT_TENANT,
+    AssetDigest,
+    ItemFailure,
+    NewMotion,
+    NewText,
+    Problem,
+    asset_key,
+    begin_assets,
+    claim,
+    commit_motions,
+    commit_texts,
+    create_key,
+    fail_items,
+    transaction,
+)
+from shared.settings import Settings
+from shared.storage import AssetStore
+
+BUNDLE = "hgm3-paperclip"
+
+
+@dataclass
+class LiveApi:
+    """A running API."""
+
+    url: str
+    key: str
+    engine: sa.Engine
+    store: AssetStore
+
+    def client(self) -> Client:
+        """The command line's client, with all scopes."""
+        return Client(Server(self.url, self.key))
+
+    def http(self, *scopes: str) -> httpx2.Client:
+        """A plain HTTP client; with `scopes`, a key that has only these."""
+        key = self.key
+        if scopes:
+            with transaction(self.engine) as conn:
+                key = create_key(conn, "+".join(scopes), scopes).secret
+        return httpx2.Client(base_url=self.url, headers={"Authorization": f"Bearer {key}"}, timeout=20)
+
+    def work(
+        self, content: bytes = b"motion", *, fail: frozenset[str] = frozenset(), batch: int = 64, pause: float = 0.0
+    ) -> None:
+        """Do what is in the queues, as workers would.
+
+        Args:
+            content: of every file.
+            fail: prompts whose items are refused.
+            batch: items of one claim.
+            pause: seconds before each commit.
+        """
+        while self._texts():
+            pass
+        digest = AssetDigest(hashlib.sha256(content).hexdigest(), len(content))
+        self.store.put(asset_key(DEFAULT_TENANT, digest.sha256), content)
+        while True:
+            with transaction(self.engine) as conn:
+                found = claim(conn, "hgm3", "hands", batch)
+                if found is None:
+                    return
+                begin_assets(conn, found.lease_token, [digest])
+            time.sleep(pause)
+            problem = Problem("invalid-input", "this cannot be danced", None, "Walk.")
+            failures = [ItemFailure(item.id, problem, False) for item in found.items if item.prompt in fail]
+            motions = [
+                NewMotion(item.id, {"npz": digest, "bvh": digest}, 40, 20.0, "MIT", 0.5, {"prompt": item.prompt})
+                for item in found.items
+                if item.prompt not in fail
+            ]
+            with transaction(self.engine) as conn:
+                fail_items(conn, found.lease_token, failures)
+                commit_motions(conn, found.lease_token, motions)
+
+    def _texts(self) -> bool:
+        with transaction(self.engine) as conn:
+            found = claim(conn, "text", "hands", 64)
+            if found is not None:
+                commit_texts(conn, found.lease_token, [NewText(i.id, i.text_key, b"text") for i in found.items])
+        return found is not None
+
+
+def write_bundle(models: Path) -> None:
+    """A generator's bundle that is only looked at."""
+    with BundleWriter(models / BUNDLE) as writer:
+        writer.add_part("masked", {"w": np.zeros(3, np.float32)})
+        writer.finish(
+            name=BUNDLE,
+            version="1",
+            kind="generator",
+            model="hgm3",
+            config="tiny",
+            parameters={"min_frames": 16, "max_frames": 196},
+            fps=20.0,
+            licence="MIT",
+            text=TextSpec(labeller="none", encoder_sha256="0" * 64),
+        )
+
+
+def settings_of(home: Path, database_url: str, queue_url: str) -> Settings:
+    """Settings of an API whose model is `BUNDLE`."""
+    models = home / "models"
+    if not models.exists():
+        write_bundle(models)
+    return Settings.model_validate(
+        {"home": home, "models": models, "database_url": database_url, "queue_url": queue_url, "port": _free_port()}
+    )
+
+
+class ApiThread:
+    """Serves an application until the end of the block."""
+
+    def __init__(self, config: Settings) -> None:
+        self.config = config
+        self._server = uvicorn.Server(
+            uvicorn.Config(create_app(config), port=config.port, log_level="warning", timeout_graceful_shutdown=1)
+        )
+        self._thread = threading.Thread(target=self._server.run, daemon=True)
+
+    def __enter__(self) -> str:
+        self._thread.start()
+        deadline = time.monotonic() + 20
+        while not self._server.started:
+            assert time.monotonic() < deadline, "uvicorn does not start"
+            assert self._thread.is_alive(), "uvicorn ended"
+            time.sleep(0.01)
+        return f"http://127.0.0.1:{self.config.port}"
+
+    def __exit__(self, *_: object) -> None:
+        self._server.should_exit = True
+        self._thread.join(20)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
