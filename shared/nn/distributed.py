@@ -27,7 +27,7 @@ def world_size() -> int:
 def all_reduce_sum(tensor: Tensor) -> Tensor:
     """Sum `tensor` over all processes, in place."""
     if is_distributed():
-        dist.all_reduce(tensor)
+        dist.all_reduce(tensor)  # pyright: ignore[reportUnknownMemberType]
     return tensor
 
 
@@ -48,7 +48,7 @@ def average_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
             parameter.grad = torch.zeros_like(parameter)
     gradients = [p.grad for p in owners if p.grad is not None]
     flat = torch.cat([g.reshape(-1) for g in gradients])
-    dist.all_reduce(flat)
+    dist.all_reduce(flat)  # pyright: ignore[reportUnknownMemberType]
     flat /= dist.get_world_size()
     offset = 0
     for gradient in gradients:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import torch
@@ -42,7 +42,7 @@ class WeightAverage:
             self.values[name].lerp_(parameter, weight)
 
     @contextmanager
-    def applied(self) -> Iterator[None]:
+    def applied(self) -> Generator[None]:
         """The module carries the averaged weights inside the block."""
         saved = {n: p.detach().clone() for n, p in self._parameters()}
         self._assign(self.values)

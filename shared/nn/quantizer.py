@@ -1,6 +1,6 @@
 """Residual vector quantizer with exponential-moving-average codebooks.
 
-HGM³ eq. 1-2; EMA and resets after van den Oord et al. (2017), Zhang et al. (2023, T2M-GPT) and Guo et al. (2024, MoMask).
+HGM³ eq. 1-2; averages and resets after van den Oord et al. (2017), T2M-GPT (Zhang 2023) and MoMask (Guo 2024).
 """
 
 from __future__ import annotations

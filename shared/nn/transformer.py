@@ -37,7 +37,7 @@ def linear(x: Tensor, layer: nn.Linear) -> Tensor:
 
 
 def lower_matrices(module: nn.Module, dtype: torch.dtype) -> None:
-    """Cast the matrices of the blocks in `module` to `dtype` for inference; norms, embeddings and heads stay float32."""
+    """Cast the matrices of the blocks in `module` to `dtype`, for inference; norms, embeddings and heads stay."""
     for part in module.modules():
         if isinstance(part, Block):
             for layer in (part.attention.qkv, part.attention.out, part.wide, part.narrow):

@@ -149,7 +149,8 @@ def decode_residual(
         sentence = model.sentence(items.sentence)
         both = torch.cat([sentence, model.null.expand_as(sentence)])  # (2 B, w)
         logits = model(total.repeat(2, 1, 1), valid.repeat(2, 1), levels, both, trim=options.trim_slots)
-        guided = guide(*logits.chunk(2), config.residual_guidance)
+        with_text, without = logits.chunk(2)
+        guided = guide(with_text, without, config.residual_guidance)
         noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
         drawn = sample_top_k(
             guided, noise, temperature=config.residual_temperature, share=config.residual_top_k

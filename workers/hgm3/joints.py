@@ -7,7 +7,7 @@ from torch import Tensor
 
 
 def heading_joints(features: Tensor, joints: int) -> Tensor:
-    """Joints over the root's ground point in the heading frame: (B, T, D) to (B, T, J, 3) metres, nothing integrated."""
+    """Joints over the root's ground point, heading frame: (B, T, D) to (B, T, J, 3) metres, nothing integrated."""
     features = features.float()
     batch, frames = features.shape[:2]
     root = torch.zeros_like(features[..., :3])

@@ -15,6 +15,7 @@ S = 1 + A + P condition slots: the motion node, A actions, P specifics; absent s
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import torch
@@ -326,7 +327,7 @@ class LengthEstimator(nn.Module):
         self.normalizer = TextNormalizer(config.condition)
         widths = (config.condition.text_width, *config.length_hidden)
         layers: list[nn.Module] = []
-        for before, after in zip(widths[:-1], widths[1:], strict=True):
+        for before, after in itertools.pairwise(widths):
             layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.LeakyReLU(0.2), nn.Dropout(0.2)]
         self.layers = nn.Sequential(*layers, nn.Linear(widths[-1], config.max_tokens))
 

@@ -69,10 +69,20 @@ class OptimisationConfig(Protocol):
 class Stage(Protocol):
     """One thing to train."""
 
-    name: str
-    module: nn.Module
-    """Everything trained and everything a checkpoint must hold."""
-    optimisation: OptimisationConfig
+    @property
+    def name(self) -> str:
+        """Of the stage, `tokenizer` for instance."""
+        ...
+
+    @property
+    def module(self) -> nn.Module:
+        """Everything trained and everything a checkpoint must hold."""
+        ...
+
+    @property
+    def optimisation(self) -> OptimisationConfig:
+        """Batch size, learning rate and the like."""
+        ...
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """Parameters whose gradient norms are clipped apart from each other."""
@@ -183,7 +193,7 @@ class _Run:
         saved = time.monotonic()
         # without a process group every process has its own clock: rank 0's decides (see _tick)
         with _progress(self.main and not options.quiet) as progress:
-            bar = progress.add_task(self.stage.name, total=1.0, completed=self.fraction, note="")
+            bar = progress.add_task(self.stage.name, total=1.0, note="")
             while self.fraction < 1.0:
                 logs = self._one_step()
                 if writer and (self.step % options.log_every == 0 or self.step == 1):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,16 +22,16 @@ class Part:
     config: dict[str, Any]
     metrics: dict[str, float]
     data_sha256: str
+    budget: dict[str, Any]
 
 
-def save_part(
-    folder: Path, state: Mapping[str, Tensor], config: dict[str, Any], metrics: Mapping[str, float], data_sha256: str
-) -> None:
+def save_part(folder: Path, part: Part) -> None:
     """Write `weights.safetensors` and `part.json` (last: a part without it is unfinished)."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "part.json").unlink(missing_ok=True)
-    save_file({k: v.detach().cpu().contiguous().clone() for k, v in state.items()}, folder / "weights.safetensors")
-    values = {"config": config, "metrics": dict(metrics), "data_sha256": data_sha256}
+    weights = {k: v.detach().cpu().contiguous().clone() for k, v in part.state.items()}
+    save_file(weights, folder / "weights.safetensors")
+    values = {name: value for name, value in vars(part).items() if name != "state"}
     (folder / "part.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
 
 
@@ -48,6 +47,6 @@ def load_part(folder: Path) -> Part:
     try:
         values = json.loads((folder / "part.json").read_text(encoding="utf-8"))
         state = load_file(folder / "weights.safetensors")
-        return Part(state, values["config"], values["metrics"], values["data_sha256"])
+        return Part(state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}))
     except (json.JSONDecodeError, KeyError, SafetensorError, FileNotFoundError) as error:
         raise InvalidFile(f"is no trained part: {error}", where=str(folder)) from error
