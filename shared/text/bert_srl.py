@@ -44,7 +44,7 @@ class BertLabeller:
             config = BertConfig(**parameters["bert"])
         except (KeyError, TypeError) as error:
             raise InvalidBundle(f"lacks parameters of an imported parser: {error!r}", where=str(bundle.path)) from error
-        tensors = {name: torch.from_numpy(value) for name, value in bundle.tensors("srl").items()}
+        tensors = {name: torch.tensor(value) for name, value in bundle.tensors("srl").items()}
         self._model: Any = BertModel(config, add_pooling_layer=False).eval()
         bert = {name.removeprefix(PREFIX): value for name, value in tensors.items() if name.startswith(PREFIX)}
         try:

@@ -1,6 +1,6 @@
 """Importing public weights, once, offline: pickled checkpoints become safetensors. Nothing else here reads pickle.
 
-    python -m shared.text.convert bert-srl structured-prediction-srl-bert.2020.12.15.tar.gz --bert FOLDER -o models/srl-bert
+    python -m shared.text.convert bert-srl ARCHIVE.tar.gz --bert FOLDER -o models/srl-bert
     python -m shared.text.convert encoder FOLDER
 
 `--bert` names a folder with the `config.json` and `vocab.txt` of bert-base-uncased: the archive only names the model.
@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 import torch
-from safetensors.torch import save_file
+from safetensors.torch import save_file  # pyright: ignore[reportUnknownVariableType]
 
 from shared.bundles import Bundle, BundleWriter, DataSource
 from shared.errors import InvalidFile, MareyError
@@ -65,9 +65,7 @@ def import_bert_srl(archive: Path, bert: Path, output: Path) -> Bundle:
             model="bert-srl",
             config=named or "bert",
             parameters={
-                "labels": files["vocabulary/labels.txt"]
-                .decode("utf-8")
-                .split("\n")[: len(weights[f"{PROJECTION}bias"])],
+                "labels": files["vocabulary/labels.txt"].decode("utf-8").rstrip("\n").split("\n"),
                 "vocabulary": (bert / "vocab.txt").read_text(encoding="utf-8").rstrip("\n").split("\n"),
                 "lowercase": "uncased" in named,
                 "bert": {key: config[key] for key in keep if key in config},
@@ -100,9 +98,10 @@ def _tensors(content: bytes, where: Path) -> Mapping[str, torch.Tensor]:
         raise InvalidFile(
             f"its weights cannot be read safely: {error}", where=str(where), hint="Download it again."
         ) from error
-    if not isinstance(loaded, Mapping) or not all(isinstance(v, torch.Tensor) for v in loaded.values()):
+    tensors: Mapping[str, object] = cast("Mapping[str, object]", loaded) if isinstance(loaded, Mapping) else {}
+    if not tensors or not all(isinstance(value, torch.Tensor) for value in tensors.values()):
         raise InvalidFile("does not hold a dictionary of tensors", where=str(where))
-    return cast("Mapping[str, torch.Tensor]", loaded)
+    return cast("Mapping[str, torch.Tensor]", tensors)
 
 
 def _read_folder(folder: Path) -> dict[str, bytes]:

@@ -49,7 +49,7 @@ class LightLabeller:
         try:
             config = light_config(parameters)
             self._network = LightNetwork(config).eval()
-            tensors = {name: torch.from_numpy(value) for name, value in bundle.tensors("labeller").items()}
+            tensors = {name: torch.tensor(value) for name, value in bundle.tensors("labeller").items()}
             self._network.load_state_dict(tensors)
         except (TypeError, RuntimeError, KeyError) as error:
             raise InvalidBundle(f"its weights do not fit: {error}", where=str(bundle.path)) from error

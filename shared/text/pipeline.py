@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +16,17 @@ from shared.errors import InvalidBundle
 from shared.text.encoders import Encoding, TextEncoder, load_encoder
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
+from shared.text.guard import changed_meaning
 from shared.text.keys import NO_LABELLER, feature_key
 from shared.text.labellers import load_labeller
 from shared.text.prompts import check_prompt
 from shared.text.rewriters import PromptRewriter, load_rewriter
 from shared.text.roles import RoleLabeller
+
+if TYPE_CHECKING:
+    from shared.text.spelling import Speller
+
+log = logging.getLogger(__name__)
 
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
 EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
@@ -48,6 +56,7 @@ class TextPipeline:
         self.rewriter = rewriter
         self.labeller = labeller
         self.encoder = encoder
+        self._speller: Speller | None = None
         self._pooled: OrderedDict[str, NDArray[np.float32]] = OrderedDict()
 
     @classmethod
@@ -62,10 +71,11 @@ class TextPipeline:
             NotFound: weights are not here; the hint says how to get them.
             InvalidBundle: they are here, but not those `spec` names.
         """
+        labeller = load_labeller(spec.labeller)
         return cls(
             spec,
-            rewriter=load_rewriter(spec.rewriter),
-            labeller=load_labeller(spec.labeller),
+            rewriter=load_rewriter(spec.rewriter, labeller),
+            labeller=labeller,
             encoder=load_encoder(spec.encoder, encoder_path),
         )
 
@@ -79,7 +89,23 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        return self._graphs([self.rewriter.rewrite(check_prompt(prompt)) for prompt in prompts])
+        return self._graphs([self.rewrite(check_prompt(prompt)) for prompt in prompts])
+
+    def rewrite(self, prompt: str) -> str:
+        """The prompt as the model reads it: rewritten, or as it is where the rewrite would say something else."""
+        rewritten = self.rewriter.rewrite(prompt)
+        if rewritten == prompt:
+            return prompt
+        from shared.text.spelling import Speller
+
+        if self._speller is None:
+            self._speller = Speller.load()
+        before, after = self._graphs([self._speller.correct(prompt), rewritten])
+        reason = changed_meaning(before, after)
+        if reason is None:
+            return rewritten
+        log.info("a rewrite was refused: %s", reason)
+        return prompt
 
     def features(self, prompts: Sequence[str]) -> list[TextFeatures]:
         """Graph and node vectors of each prompt.
@@ -88,7 +114,7 @@ class TextPipeline:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
         checked = [check_prompt(prompt) for prompt in prompts]
-        rewritten = [self.rewriter.rewrite(prompt) for prompt in checked]
+        rewritten = [self.rewrite(prompt) for prompt in checked]
         return [
             TextFeatures(prompt, text, graph, self.encode(graph))
             for prompt, text, graph in zip(checked, rewritten, self._graphs(rewritten), strict=True)

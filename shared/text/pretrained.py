@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from shared.errors import InvalidFile
 
@@ -18,7 +18,7 @@ def read_config(folder: Path) -> dict[str, Any]:
         raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Fetch the encoder again.") from error
     if not isinstance(config, dict):
         raise InvalidFile("is not a model configuration", where=str(file), hint="Fetch the encoder again.")
-    return config
+    return cast("dict[str, Any]", config)
 
 
 def load_pretrained(kind: Any, folder: Path, *, weights: bool = False) -> Any:

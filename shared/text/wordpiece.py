@@ -18,7 +18,8 @@ class WordPieces:
 
     def encode(self, words: Sequence[str]) -> tuple[list[int], list[int], list[int]]:
         """Ids with [CLS] and [SEP]; position of each word's first piece; for each piece its word (-1: special)."""
-        ids, starts, owners = [self._cls], [], [-1]
+        ids, owners = [self._cls], [-1]
+        starts: list[int] = []
         for index, word in enumerate(words):
             pieces = self._split(word.lower() if self._lowercase else word)
             starts.append(len(ids))

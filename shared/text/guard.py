@@ -1,0 +1,50 @@
+"""What a rewrite may not change, read off the graphs: verbs, sides, directions, counts."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+
+from shared.text.graph import SemanticGraph
+from shared.text.words import DIRECTIONS, NUMBERS, SIDES, bare, lemma
+
+LIGHT_VERBS = frozenset({"be"})
+_DIGITS = re.compile(r"^(\d+(?:[.,]\d+)?)\D{0,3}$")
+
+
+def changed_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
+    """What differs between the graphs of a prompt and of its rewrite, in words; None where nothing that matters does.
+
+    Args:
+        before: of the prompt with its spelling corrected, so that a typo is no other verb.
+        after: of the rewrite.
+    """
+    checks = (
+        ("the verbs", _verbs(before), _verbs(after)),
+        ("a side", _bag(before, SIDES), _bag(after, SIDES)),
+        ("a direction", _bag(before, DIRECTIONS), _bag(after, DIRECTIONS)),
+        ("a count", _counts(before), _counts(after)),
+    )
+    for what, was, now in checks:
+        if was != now:
+            return f"it changes {what}: {_list(was)} became {_list(now)}"
+    return None
+
+
+def _verbs(graph: SemanticGraph) -> Counter[str]:
+    verbs = [lemma(node.text) for node in graph.level("action")] + [lemma(text) for text in graph.cut.actions]
+    return Counter(verb for verb in verbs if verb not in LIGHT_VERBS)
+
+
+def _bag(graph: SemanticGraph, table: Mapping[str, str]) -> Counter[str]:
+    return Counter(table[core] for word in graph.words if (core := bare(word)) in table)
+
+
+def _counts(graph: SemanticGraph) -> Counter[str]:
+    numbers = [NUMBERS[core] for word in graph.words if (core := bare(word)) in NUMBERS]
+    return Counter(numbers + [m[1] for word in graph.words if (m := _DIGITS.match(bare(word)))])
+
+
+def _list(bag: Counter[str]) -> str:
+    return ", ".join(sorted(bag.elements())) or "none"
