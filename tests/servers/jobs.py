@@ -38,7 +38,7 @@ def new_item(index: int, prompt: str | None = None, **changes: object) -> NewIte
         "model": MODEL,
         "bundle": bundle,
         "batch_key": f"batch of {bundle}",
-        "text_key": hashlib.sha256(text.encode()).hexdigest(),
+        "text_key": hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest(),
         "text_batch_key": "light",
         "seed": index,
         "settings": {"steps": 10},
@@ -86,3 +86,18 @@ def commit_all(engine: sa.Engine, found: Claim, items: Sequence[UUID] | None = N
         begin_assets(conn, found.lease_token, [file for motion in motions for file in motion.files.values()])
     with transaction(engine) as conn:
         return list(commit_motions(conn, found.lease_token, motions).items)
+
+
+def let_expire(engine: sa.Engine, lease_token: UUID) -> None:
+    """Time passes for a lease: as if its worker had been silent for longer than it lasts."""
+    with transaction(engine) as conn:
+        conn.execute(
+            sa.text("UPDATE lease SET expires_at = now() - interval '1 second' WHERE token = :token"),
+            {"token": lease_token},
+        )
+
+
+def make_due(engine: sa.Engine) -> None:
+    """Time passes for items that wait for another try."""
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE item SET run_after = now() WHERE run_after IS NOT NULL"))
