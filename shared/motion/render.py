@@ -108,11 +108,13 @@ def caption_of(clip: MotionClip) -> str:
 
 
 def facts_of(clip: MotionClip) -> str:
-    """One line about a clip: length, rate, seed, model, terms."""
+    """One line about a clip: length, rate, seed, model, terms, and whether a model without training made it."""
     facts = [f"{clip.seconds:.1f} s", f"{clip.frames} frames at {clip.fps:g} fps"]
     if clip.manifest.get("seed") is not None:
         facts.append(f"seed {clip.manifest['seed']}")
     facts += [str(clip.manifest[key]) for key in ("bundle", "licence") if clip.manifest.get(key)]
+    if clip.manifest.get("random_weights"):
+        facts.append("RANDOM WEIGHTS")
     return "  ·  ".join(facts)
 
 

@@ -16,7 +16,7 @@ from shared.motion.body import dress, part_of
 from shared.motion.kinematics import global_rotations
 from shared.motion.paper import THEMES, Paper, one_line
 from shared.motion.raster import Camera, shade
-from shared.motion.render import CELL, GAP, MARGIN, PLAN, contact_sheet
+from shared.motion.render import CELL, GAP, MARGIN, PLAN, contact_sheet, facts_of
 from shared.motion.rotations import to_matrix
 from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS, SNAPMOGEN, Skeleton
 from tests.support.walker import walker
@@ -125,6 +125,14 @@ def test_one_frame_is_drawn_once(tmp_path):
 @pytest.mark.parametrize("prompt", ["", "a\nb\x00c\x1b[31m", "🕺 踊る " * 40, "word" * 400, "w " * 4000])
 def test_any_prompt_can_stand_on_a_sheet(prompt, tmp_path):
     contact_sheet(walker(seconds=0.5, prompt=prompt), tmp_path / "a.png", columns=2, title=prompt)
+
+
+def test_a_sheet_says_where_a_motion_comes_from(clip):
+    trained = {"seed": 7, "bundle": "hgm3-starter", "licence": "CC BY-NC 4.0", "random_weights": False}
+    line = "2.0 s  ·  41 frames at 20 fps  ·  seed 7  ·  hgm3-starter  ·  CC BY-NC 4.0"
+    assert facts_of(replace(clip, manifest=trained)) == line
+    assert facts_of(replace(clip, manifest=trained | {"random_weights": True})) == line + "  ·  RANDOM WEIGHTS"
+    assert facts_of(replace(clip, manifest={})) == "2.0 s  ·  41 frames at 20 fps"
 
 
 def test_a_dark_sheet_is_dark(clip, tmp_path):
