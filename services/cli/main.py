@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from services.cli import console
-from services.cli.commands import admin, fetch, generate, jobs, models, serve, submit, text
+from services.cli.commands import admin, convert, data, fetch, generate, jobs, models, serve, submit, text, train
 from shared.errors import MareyError
 
 INTERRUPTED = 130
@@ -73,6 +73,10 @@ app.command("scheduler")(serve.scheduler)
 app.command("api")(serve.api)
 app.add_typer(text.app, name="text")
 app.add_typer(models.app, name="models")
+app.add_typer(data.app, name="data")
+app.add_typer(train.app, name="train")
+app.command("convert")(convert.convert)
+app.command("render")(convert.render)
 app.command("doctor")(admin.doctor)
 app.add_typer(admin.app, name="admin")
 

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-from shared.errors import InvalidInput
+from shared.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from shared.bundles import Bundle
     from shared.motion.clip import MotionClip
     from shared.runtime.handler import Role
@@ -128,6 +127,113 @@ def make_random_bundle(path: Path) -> None:
     from workers.hgm3.bundle import random_bundle
 
     random_bundle(path)
+
+
+def prepare_data(
+    sources: Sequence[tuple[str, Path]], output: Path, *, processes: int, progress: Callable[[str, int, int], None]
+) -> str:
+    """Prepare training data; a line that says what was made.
+
+    Raises:
+        InvalidInput: an unknown source.
+        NotFound, InvalidFile, TooLarge, Conflict: from reading and writing.
+    """
+    try:
+        from workers.training.data.build import build
+        from workers.training.data.prepare import pack_bandai_namco, pack_cmu
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    readers = {"bandai-namco": pack_bandai_namco, "cmu": pack_cmu}
+    for name, _ in sources:
+        if name not in readers:
+            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join(readers)}.")
+    packs = [
+        readers[name](path, processes=processes, progress=lambda done, total, name=name: progress(name, done, total))
+        for name, path in sources
+    ]
+    manifest = build(packs, output, progress=lambda done, total: progress("building", done, total))
+    return ", ".join(f"{split} {count} clips" for split, count in manifest.counts.items())
+
+
+def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
+    """What a prepared folder holds, its hashes checked; or one clip of it.
+
+    Raises:
+        NotFound, InvalidFile: no such folder or clip, or a changed file.
+    """
+    try:
+        from workers.training.data.prepared import PreparedData
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    data = PreparedData.open(folder)
+    if clip is None:
+        return data.manifest.model_dump(mode="json")
+    for found in data.clips:
+        if found.id == clip:
+            return found.model_dump(mode="json")
+    raise NotFound(f"there is no clip {clip!r}", where=str(folder), hint=f"The first is {data.clips[0].id}.")
+
+
+def encode_captions(folder: Path, model: str | None, progress: Callable[[int, int], None]) -> int:
+    """Write `texts.npz` of a prepared folder; how many captions it holds."""
+    try:
+        from shared.bundles import TextSpec, choose_bundle
+        from shared.text.pipeline import TextPipeline
+        from workers.training.data.prepared import PreparedData
+        from workers.training.texts import CaptionTexts
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    spec = TextSpec() if model is None else choose_bundle(model).manifest.text
+    if spec is None:
+        raise InvalidInput(f"{model!r} does not read prompts", where="--model")
+    data = PreparedData.open(folder)
+    captions = [clip.captions for clip in data.clips]
+    CaptionTexts.build(captions, TextPipeline.load(spec), progress=progress).save(folder)
+    return sum(map(len, captions))
+
+
+def train_stage(
+    name: str,
+    data: Path,
+    run: Path,
+    *,
+    config: str,
+    mask: Literal["hard", "random"] | None,
+    steps: int | None,
+    minutes: float | None,
+    **options: Any,
+) -> dict[str, float]:
+    """Train one stage of HGM³; its metrics. See `workers.hgm3.train.TrainOptions` for the options."""
+    try:
+        from workers.hgm3.config import named_config
+        from workers.hgm3.train import TrainOptions
+        from workers.hgm3.train import train_stage as train
+        from workers.training.budget import Budget
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    budget = Budget(steps, minutes)
+    return train(name, TrainOptions(data, run, named_config(config, mask=mask), budget, **options))
+
+
+def assemble_bundle(
+    data: Path,
+    run: Path,
+    output: Path,
+    *,
+    config: str,
+    mask: Literal["hard", "random"] | None,
+    card: Path | None,
+    overwrite: bool,
+) -> str:
+    """Write the bundle of a run; its exact reference."""
+    try:
+        from workers.hgm3.config import named_config
+        from workers.hgm3.train import assemble
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    text = None if card is None else card.read_text(encoding="utf-8")
+    made = assemble(data, run, output, named_config(config, mask=mask), card=text, overwrite=overwrite)
+    return made.reference
 
 
 def needs_extra(extra: str, error: ImportError) -> InvalidInput:

@@ -134,7 +134,8 @@ def test_the_same_key_and_body_give_the_same_job_and_another_body_is_refused(htt
 @pytest.mark.parametrize(
     "body",
     [b"", b"null", b"[]", b'{"items": []}', b'{"items": {}}', b'{"items": [1]}', b"{", b"\xff\xfe", b"{}",
-     b"[" * 100_000, b'{"items": [{"prompt": "\\ud800"}]}', b'{"items": [{"\\ud800": 1}]}', b'{"items": [{"prompt": NaN}]}',
+     b"[" * 100_000,
+     b'{"items": [{"prompt": "\\ud800"}]}', b'{"items": [{"\\ud800": 1}]}', b'{"items": [{"prompt": NaN}]}',
      b'{"items": [{"prompt": "walks", "seconds": 1e999}]}', b'{"items": [{"prompt": "walks"}], "priority": 5000}',
      b'{"items": [{"prompt": "walks"}], "name": "a\\u0000b"}', b'{"items": [{"prompt": "walks"}], "colour": 1}'],
 )  # fmt: skip

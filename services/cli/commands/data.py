@@ -1,0 +1,75 @@
+"""`marey data …`: training data from capture archives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from services.cli import console
+from shared.errors import InvalidInput
+
+app = typer.Typer(help="Training data from capture archives.", no_args_is_help=True)
+
+Prepared = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `marey data prepare` wrote.")]
+
+
+@app.command()
+def prepare(
+    pairs: Annotated[
+        list[str], typer.Argument(metavar="SOURCE PATH …", help="bandai-namco or cmu, and its archive or folder.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write; must be empty or new.")],
+    processes: Annotated[int, typer.Option("--processes", min=1, help="How many retarget at once.")] = 2,
+) -> None:
+    """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
+    from services.cli import roles
+
+    if len(pairs) % 2:
+        raise InvalidInput("a SOURCE without its PATH", hint="Write: marey data prepare bandai-namco ARCHIVE -o DIR")
+    sources = [(name, Path(path)) for name, path in zip(pairs[::2], pairs[1::2], strict=True)]
+    with console.bar() as bar:
+        task = bar.add_task("reading", total=None)
+        manifest = roles.prepare_data(
+            sources,
+            output,
+            processes=processes,
+            progress=lambda what, done, total: bar.update(task, description=what, completed=done, total=total or None),
+        )
+    console.say(f"{output}: {manifest}")
+    console.result(str(output))
+
+
+@app.command()
+def inspect(
+    folder: Prepared,
+    clip: Annotated[str | None, typer.Option("--clip", help="Show one clip with its captions.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Check a prepared folder's hashes and show what it holds."""
+    from services.cli import roles
+
+    found = roles.inspect_data(folder, clip)
+    if as_json:
+        console.result_json(found)
+        return
+    for name, value in found.items():
+        for line in value if isinstance(value, list) else [value]:
+            console.result(f"{name:<10} {line}")
+
+
+@app.command()
+def text(
+    folder: Prepared,
+    model: Annotated[
+        str | None, typer.Option("--model", help="Bundle whose text specification to use; none = the standard one.")
+    ] = None,
+) -> None:
+    """Parse and encode the captions, once for all training runs."""
+    from services.cli import roles
+
+    with console.bar() as bar:
+        task = bar.add_task("captions", total=None)
+        count = roles.encode_captions(folder, model, lambda done, total: bar.update(task, completed=done, total=total))
+    console.say(f"{count} captions encoded")

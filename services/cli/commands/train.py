@@ -1,0 +1,108 @@
+"""`marey train MODEL …`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from services.cli import console
+
+app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
+hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
+app.add_typer(hgm3, name="hgm3")
+
+
+class Mask(StrEnum):
+    """What the masked transformer masks in training."""
+
+    HARD = "hard"
+    RANDOM = "random"
+
+
+Data = Annotated[Path, typer.Argument(metavar="DATA", help="A prepared folder, with its texts.")]
+Run = Annotated[Path, typer.Option("--run", help="Folder of all stages of one bundle.")]
+Config = Annotated[str, typer.Option("--config", help="starter, paper or tiny.")]
+Steps = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
+Minutes = Annotated[float | None, typer.Option("--max-minutes", help="Minutes; schedules follow whichever ends first.")]
+Seed = Annotated[int, typer.Option("--seed", help="Of weights and batches.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint.")]
+Masking = Annotated[Mask | None, typer.Option("--mask", help="hard or random; none given = as the configuration says.")]
+Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
+Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
+Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
+
+
+def _stage(name: str, what: str) -> None:
+    """Add the command of one stage."""
+
+    def command(
+        data: Data,
+        run: Run,
+        config: Config = "starter",
+        steps: Steps = None,
+        max_minutes: Minutes = None,
+        seed: Seed = 0,
+        resume: Resume = False,
+        mask: Masking = None,
+        device: Device = "auto",
+        threads: Threads = 0,
+        bf16: Bf16 = True,
+        as_json: console.Json = False,
+    ) -> None:
+        from services.cli import roles
+
+        metrics = roles.train_stage(
+            name,
+            data,
+            run,
+            config=config,
+            mask=None if mask is None else mask.value,
+            steps=steps,
+            minutes=max_minutes,
+            seed=seed,
+            resume=resume,
+            device=device,
+            threads=threads,
+            bf16=bf16,
+        )
+        if as_json:
+            console.result_json(metrics)
+        else:
+            for metric, value in metrics.items():
+                console.result(f"{metric} = {value:g}")
+
+    hgm3.command(name, help=what)(command)
+
+
+_stage("tokenizer", "Train the residual VQ-VAE.")
+_stage("masked", "Train the masked transformer, with hard token mining.")
+_stage("residual", "Train the residual transformer.")
+_stage("length", "Train the length estimator.")
+
+
+@hgm3.command()
+def bundle(
+    data: Data,
+    run: Run,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")],
+    config: Config = "starter",
+    mask: Masking = None,
+    card: Annotated[Path | None, typer.Option("--card", help="The model card to put in.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a bundle that is there.")] = False,
+) -> None:
+    """Write the bundle from the parts of a run."""
+    from services.cli import roles
+
+    made = roles.assemble_bundle(
+        data,
+        run,
+        output,
+        config=config,
+        mask=None if mask is None else mask.value,
+        card=card,
+        overwrite=overwrite,
+    )
+    console.result(made)
