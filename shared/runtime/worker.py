@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import socket
 import threading
+import time
 import warnings
 from dataclasses import asdict
 from typing import Any
@@ -91,10 +93,28 @@ def _stop_children(**_: Any) -> None:
 
 
 def _kill_stragglers(children: list[psutil.Process]) -> None:
-    _, alive = psutil.wait_procs(children, timeout=STOP_SECONDS)
-    for child in alive:
+    if _end_within(children, STOP_SECONDS):
+        return
+    for child in children:
         log.error("child_killed", pid=child.pid, seconds=STOP_SECONDS)
-        child.kill()
-    if alive:
-        psutil.wait_procs(alive, timeout=KILL_SECONDS)
-        os._exit(1)
+        with contextlib.suppress(psutil.NoSuchProcess):
+            child.kill()
+    _end_within(children, KILL_SECONDS)
+    os._exit(1)
+
+
+def _end_within(children: list[psutil.Process], seconds: float) -> bool:
+    """Whether all of them end in time. Only looks: `wait` would reap them, and Celery's pool wait for ever for that."""
+    until = time.monotonic() + seconds
+    while any(_runs(child) for child in children):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def _runs(child: psutil.Process) -> bool:
+    try:
+        return child.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False

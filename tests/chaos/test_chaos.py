@@ -112,9 +112,9 @@ def prompts(count: int, *deeds: str) -> list[str]:
     return [*walks[:middle], *deeds, *walks[middle:]]
 
 
-def finish(cluster: Cluster, job: UUID, store: AssetStore, seconds: float) -> None:
-    """Wait for the end, collect garbage once, and audit."""
-    cluster.wait(lambda: ended(cluster.engine, job), "the job ends", seconds=seconds)
+def finish(cluster: Cluster, store: AssetStore, *jobs: UUID, seconds: float) -> None:
+    """Wait for the end of all jobs, collect garbage once, and audit."""
+    cluster.wait(lambda: all(ended(cluster.engine, job) for job in jobs), "the jobs end", seconds=seconds)
     wait_no_leases(cluster)
     collect_garbage(cluster.engine, store)
     assert audit(cluster.engine, store) == []
@@ -153,7 +153,7 @@ def test_every_item_ends_once_whatever_is_killed(stage: Stage, tmp_path: Path) -
     cluster.restart_postgres(seconds_away=1.0)
     with disk.away():
         time.sleep(3.0)
-    finish(cluster, job, disk.store, 120.0)
+    finish(cluster, disk.store, job, seconds=120.0)
     found = states(cluster.engine, job)
     assert found.pop("dead") == ["kill the worker"]
     assert len(found.pop("succeeded")) == 39
@@ -175,7 +175,7 @@ def test_the_faults_of_the_contract_at_the_products_own_times(stage: Stage, tmp_
     with bucket.away():
         time.sleep(10.0)
     cluster.restart_postgres(seconds_away=3.0)
-    finish(cluster, job, bucket.store, 400.0)
+    finish(cluster, bucket.store, job, seconds=400.0)
     found = states(cluster.engine, job)
     assert found == {"dead": ["kill the worker"], "succeeded": prompts(39)}
 
@@ -221,7 +221,7 @@ def test_sigterm_gives_items_back_at_no_cost(stage: Stage, tmp_path: Path) -> No
         rows = conn.execute(sa.select(item.c.attempts, item.c.solo)).all()
     assert "worker-0/toy" not in held
     assert {tuple(row) for row in rows} == {(0, False)}
-    finish(cluster, job, disk.store, 120.0)
+    finish(cluster, disk.store, job, seconds=120.0)
     assert job_row(cluster.engine, job).succeeded == 40
 
 
@@ -234,8 +234,7 @@ def test_two_schedulers_and_a_restarted_queue_are_harmless(stage: Stage, tmp_pat
     cluster.wait(working(cluster, "worker-0"), "worker-0 works")
     cluster.restart_valkey(seconds_away=3.0)
     late = submit_toys(cluster.engine, prompts(100), steps=2, step_seconds=0.1)
-    finish(cluster, job, disk.store, 120.0)
-    finish(cluster, late, disk.store, 120.0)
+    finish(cluster, disk.store, job, late, seconds=120.0)
     assert job_row(cluster.engine, job).succeeded == 200
     assert job_row(cluster.engine, late).succeeded == 100
 
@@ -283,8 +282,7 @@ def test_random_faults_never_lose_or_double_an_item(stage: Stage, tmp_path: Path
         time.sleep(draw.uniform(0.5, 3.0))
         fault()
         jobs.append(submit_toys(cluster.engine, prompts(20), steps=2, step_seconds=0.2, n=number))
-    for job in jobs:
-        finish(cluster, job, place.store, 400.0)
+    finish(cluster, place.store, *jobs, seconds=400.0)
     found = states(cluster.engine, jobs[0])
     assert found.pop("dead") == ["kill the worker"]
     assert set(found) == {"succeeded"}
@@ -308,7 +306,7 @@ def test_eight_workers_claiming_a_thousand_items_claim_none_twice(stage: Stage, 
     thread.start()
     try:
         job = submit_toys(cluster.engine, prompts(1000), steps=1, step_seconds=0.2)
-        finish(cluster, job, disk.store, 120.0)
+        finish(cluster, disk.store, job, seconds=120.0)
     finally:
         stop.set()
         thread.join()

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from typing import Any
 
 import torch
-from shared.motion.finish import finish_motion
 
 from shared.motion.bvh_write import format_bvh
 from shared.motion.clip import MotionClip
+from shared.motion.finish import finish_motion
 from shared.runtime.handler import Export, ExportedFile
 from workers.hgm3.generate import Generated, Generator, Request, Settings
 
@@ -63,7 +63,7 @@ def finish(
         fps: output rate; None = the model's.
         clean: lock feet where they stand.
     """
-    manifest = manifest_of(generator, request, settings)
+    manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean}
     return finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
 
 

@@ -1,0 +1,184 @@
+"""From claimed items to files, with a tiny bundle of random weights."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from uuid import UUID, uuid4
+
+import numpy as np
+import pytest
+
+from shared.errors import InvalidFile, InvalidInput
+from shared.jobs import Claim, ClaimedItem, Stage
+from shared.motion.bvh import parse_bvh
+from shared.motion.clip import MotionClip, parse_npz
+from shared.runtime.handler import Batch, Done, Export, Failed, Outcome
+from shared.settings import Settings
+from shared.text.features import TextFeatures
+from shared.text.graph import build_graph
+from workers.hgm3.bundle import random_bundle
+from workers.hgm3.handler import Hgm3Handler
+
+
+class Control:
+    """Counts steps and drops what it is told to."""
+
+    def __init__(self, *dropped: UUID) -> None:
+        self.steps: list[tuple[int, int]] = []
+        self._dropped = frozenset(dropped)
+
+    def progress(self, done: int, total: int) -> None:
+        self.steps.append((done, total))
+
+    def dropped(self) -> frozenset[UUID]:
+        return self._dropped
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    found = random_bundle(tmp_path_factory.mktemp("models") / "hgm3-random", "tiny")
+    return f"{found.path}@{found.weights_sha256[:12]}"
+
+
+@pytest.fixture(scope="module")
+def handler(bundle: str) -> Hgm3Handler:
+    made = Hgm3Handler(Settings(device="cpu", threads=1))
+    made.load(bundle)
+    return made
+
+
+def text_blob(prompt: str, width: int) -> bytes:
+    graph = build_graph(prompt, (), max_actions=8, max_specifics=16)
+    seed = int.from_bytes(hashlib.sha256(prompt.encode()).digest()[:4], "little")
+    nodes = np.random.default_rng(seed).standard_normal((len(graph.nodes), width)).astype(np.float16)
+    return TextFeatures(prompt, prompt, graph, nodes).to_blob()
+
+
+def make_item(
+    prompt: str, seed: int, seconds: float | None, settings: Mapping[str, object] | None = None
+) -> ClaimedItem:
+    return ClaimedItem(
+        id=uuid4(), position=seed, index=seed, variant=0, name=None, prompt=prompt, model="hgm3", bundle="b",
+        text_key=prompt, seed=seed, seconds=seconds, settings=settings or {}, tags=(), attempts=0,
+    )  # fmt: skip
+
+
+def make_batch(handler: Hgm3Handler, *items: ClaimedItem) -> Batch:
+    width = handler.generator.config.condition.text_width
+    claim = Claim(uuid4(), "default", uuid4(), "hgm3", Stage.GENERATE, "k", "b", solo=False, items=items)
+    return Batch(claim, items, {item.text_key: text_blob(item.prompt, width) for item in items})
+
+
+def run(handler: Hgm3Handler, batch: Batch, control: Control | None = None) -> dict[UUID, Outcome]:
+    outcomes: dict[UUID, Outcome] = {}
+    for bucket in handler.buckets(batch):
+        for outcome in handler.run(Batch(batch.claim, tuple(bucket), batch.features), control or Control()):
+            assert outcome.item not in outcomes
+            outcomes[outcome.item] = outcome
+    return outcomes
+
+
+def export_of(outcome: Outcome) -> Export:
+    assert isinstance(outcome, Done)
+    return outcome.export()
+
+
+def clip_of(outcome: Outcome) -> MotionClip:
+    return parse_npz(next(file.content for file in export_of(outcome).files if file.format == "npz"))
+
+
+def test_every_item_is_in_one_bucket_and_a_bucket_has_one_padded_length(handler: Hgm3Handler) -> None:
+    seconds = [2.0, 9.8, 2.1, 6.0, 9.7, 2.0]
+    batch = make_batch(handler, *(make_item("a person walks", n, s) for n, s in enumerate(seconds)))
+    buckets = handler.buckets(batch)
+    assert sorted(item.seed for bucket in buckets for item in bucket) == list(range(6))
+    assert sorted(sorted(item.seed for item in bucket) for bucket in buckets) == [[0, 2, 5], [1, 4], [3]]
+
+
+def test_the_files_hold_the_motion_and_where_it_comes_from(handler: Hgm3Handler, bundle: str) -> None:
+    item = make_item("a person waves", 7, 2.5, {"guidance": 3.0})
+    export = export_of(run(handler, make_batch(handler, item))[item.id])
+    files = {file.format: file.content for file in export.files}
+    clip = parse_npz(files["npz"])
+    assert clip.features.shape == (50, 263)
+    assert (export.frames, export.fps) == (clip.frames, clip.fps) == (50, 20.0)
+    bvh = parse_bvh(files["bvh"])
+    order = [bvh.skeleton.joint_names.index(name) for name in clip.skeleton.joint_names]  # a file is depth first
+    np.testing.assert_allclose(bvh.joints()[:, order], clip.joints, atol=1e-3)
+    manifest = json.loads(json.dumps(clip.manifest))
+    assert manifest["prompt"] == manifest["graph"]["text"] == "a person waves"
+    assert manifest["seed"] == 7
+    assert manifest["settings"]["guidance"] == 3.0
+    assert manifest["random_weights"]
+    assert manifest["licence"] == export.licence == "MIT"
+    assert bundle.endswith(manifest["weights_sha256"][:12])
+    assert manifest == export.manifest
+
+
+def test_an_items_motion_does_not_depend_on_its_batch(handler: Hgm3Handler) -> None:
+    items = [make_item(f"person number {n}", n, 2.0 + n % 3) for n in range(7)]
+    batches = [items, items[4:5], items[::-1]]
+    clips = [clip_of(run(handler, make_batch(handler, *batch))[items[4].id]) for batch in batches]
+    for clip in clips[1:]:  # the tokens are equal; the decoder may round differently beside other items
+        np.testing.assert_allclose(clip.features, clips[0].features, atol=1e-4)
+        assert clip.manifest == clips[0].manifest
+
+
+def test_without_seconds_the_seed_decides_the_length_and_other_items_do_not(handler: Hgm3Handler) -> None:
+    items = [make_item("a person runs", n, None) for n in range(4)]
+    together = run(handler, make_batch(handler, *items))
+    alone = run(handler, make_batch(handler, items[2]))
+    assert export_of(together[items[2].id]).frames == export_of(alone[items[2].id]).frames
+
+
+def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: Hgm3Handler) -> None:
+    items = [make_item("a person bows", n, 2.0) for n in range(3)]
+    control = Control(items[1].id)
+    outcomes = run(handler, make_batch(handler, *items), control)
+    assert set(outcomes) == {items[0].id, items[2].id}
+    assert control.steps
+    assert control.steps[-1][0] == control.steps[-1][1]
+
+
+def test_when_everything_is_cancelled_nothing_is_made(handler: Hgm3Handler) -> None:
+    items = [make_item("a person bows", n, 2.0) for n in range(2)]
+    assert run(handler, make_batch(handler, *items), Control(*(item.id for item in items))) == {}
+
+
+def test_broken_text_features_fail_their_item_alone(handler: Hgm3Handler) -> None:
+    good, bad, narrow = (make_item(f"a person walks {n}", n, 2.0) for n in range(3))
+    batch = make_batch(handler, good, bad, narrow)
+    features = {**batch.features, bad.text_key: b"no tensors", narrow.text_key: text_blob(narrow.prompt, 3)}
+    outcomes = run(handler, Batch(batch.claim, batch.items, features))
+    assert isinstance(outcomes[good.id], Done)
+    for item in (bad, narrow):
+        outcome = outcomes[item.id]
+        assert isinstance(outcome, Failed)
+        assert isinstance(outcome.problem, InvalidFile)
+        assert not outcome.retryable
+
+
+def test_a_length_the_model_cannot_make_fails_its_item_alone(handler: Hgm3Handler) -> None:
+    good, long = make_item("a person walks", 0, 2.0), make_item("a person walks", 1, 59.0)
+    outcomes = run(handler, make_batch(handler, good, long))
+    assert isinstance(outcomes[good.id], Done)
+    outcome = outcomes[long.id]
+    assert isinstance(outcome, Failed)
+    assert isinstance(outcome.problem, InvalidInput)
+    assert "seconds" in str(outcome.problem)
+
+
+def test_a_setting_out_of_range_is_told_by_its_name(handler: Hgm3Handler) -> None:
+    item = make_item("a person walks", 0, 2.0, {"steps": 1000})
+    with pytest.raises(InvalidInput, match="steps"):
+        run(handler, make_batch(handler, item))
+
+
+def test_a_replaced_bundle_is_refused(bundle: str, tmp_path: Path) -> None:
+    other = random_bundle(tmp_path / "hgm3-random", "tiny", seed=1)
+    exact = bundle.rpartition("@")[2]
+    with pytest.raises(Exception, match="replaced since"):
+        Hgm3Handler(Settings(device="cpu", threads=1)).load(f"{other.path}@{exact}")
