@@ -234,15 +234,16 @@ class Generator:
         items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
         if not watcher.rows:
             return
-        features = self.networks.tokenizer.decode(items.tokens, items.lengths).cpu().numpy()
-        watcher.step()
         for position, row in enumerate(watcher.rows):
-            length = int(items.lengths[position])
+            # one by one, at its own length: a convolution rounds differently in another batch, files would differ
+            tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
+            features = self.networks.tokenizer.decode(tokens[None])[0, : frames[row]]
             results[row] = Generated(
-                items.tokens[position, :length].T.cpu().numpy().astype(np.int16),
-                features[position, : frames[row]].copy(),
+                tokens.T.cpu().numpy().astype(np.int16),
+                features.cpu().numpy(),
                 tuple(items.decided[position].tolist()),
             )
+        watcher.step()
 
     def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
         lengths = [-(-f // self.frames_per_token) for f in frames]

@@ -1,0 +1,209 @@
+"""Training: every stage runs on tiny data, resumes bit for bit, and ends in a bundle that generates."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from shared.bundles import Bundle
+from shared.errors import InvalidInput, NotFound
+from workers.hgm3.config import TINY, HGM3Config, named_config
+from workers.hgm3.data import CaptionData, MotionData, TokenData
+from workers.hgm3.generate import Generator, Request
+from workers.hgm3.stage_masked import MaskedStage
+from workers.hgm3.stage_tokenizer import TokenizerStage
+from workers.hgm3.tokenizer import Tokenizer
+from workers.hgm3.train import TrainOptions, assemble, train_stage
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+from workers.training.loop import RunOptions, StepContext, train
+from workers.training.texts import CaptionTexts
+
+from .conftest import text_features
+
+CPU = torch.device("cpu")
+
+
+def options(prepared: PreparedData, run: Path, steps: int, config: HGM3Config = TINY) -> TrainOptions:
+    return TrainOptions(prepared.path, run, config, Budget(steps=steps), device="cpu", bf16=False, quiet=True)
+
+
+def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedStage:
+    data = MotionData.load(prepared.path, CPU)
+    torch.manual_seed(0)
+    tokenizer = Tokenizer(config)
+    tokenizer.quantizer.codebooks.normal_()
+    tokens = TokenData.encode(tokenizer, data)
+    captions = CaptionData.load(CaptionTexts.load(prepared), config.condition, CPU)
+    return MaskedStage(config, prepared.clips, tokens, captions)
+
+
+def context(step: int = 0, fraction: float = 1.0) -> StepContext:
+    torch.manual_seed(step)
+    return StepContext(step, fraction, np.random.default_rng(step))
+
+
+@pytest.fixture(scope="module")
+def run(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    for stage in ("tokenizer", "masked", "residual", "length"):
+        train_stage(stage, options(prepared, folder, 4))
+    return folder
+
+
+def test_all_stages_end_in_a_bundle_that_generates(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
+    bundle = assemble(prepared.path, run, tmp_path / "trained", TINY, card="# card")
+    assert not bundle.manifest.random
+    assert bundle.manifest.data[0].name == "synthetic"
+    assert "tokenizer/test/error_mm" in bundle.manifest.metrics
+    generator = Generator.load(Bundle.open(tmp_path / "trained"), device="cpu")
+    (made,) = generator.generate([Request(text_features(0), 1, 40)])
+    assert made is not None
+    assert made.features.shape == (40, 263)
+
+
+def test_a_bundle_of_another_configuration_is_refused(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
+    other = replace(TINY, masked=replace(TINY.masked, layers=1))
+    with pytest.raises(InvalidInput, match="another masked"):
+        assemble(prepared.path, run, tmp_path / "x", other)
+
+
+def test_a_stage_says_which_one_it_needs_first(prepared: PreparedData, tmp_path: Path) -> None:
+    with pytest.raises(NotFound, match="has not finished"):
+        train_stage("masked", options(prepared, tmp_path, 1))
+
+
+@pytest.mark.parametrize("name", ["tokenizer", "masked"])
+def test_a_run_killed_and_resumed_ends_with_the_same_weights_bit_for_bit(
+    name: str, prepared: PreparedData, tmp_path: Path
+) -> None:
+    def stage() -> TokenizerStage | MaskedStage:
+        torch.manual_seed(0)
+        if name == "tokenizer":
+            return TokenizerStage(TINY, MotionData.load(prepared.path, CPU))
+        return masked_stage(prepared)
+
+    def go(folder: Path, stage: TokenizerStage | MaskedStage, *, resume: bool = False) -> dict[str, torch.Tensor]:
+        budget = Budget(steps=6)
+        train(stage, RunOptions(folder, budget, resume=resume, bf16=False, quiet=True, checkpoint_minutes=0), {})
+        return stage.module.state_dict()
+
+    whole = go(tmp_path / "whole", stage())
+    broken = stage()
+    steps = 0
+    after = broken.after_step
+
+    def die(context: StepContext) -> None:
+        nonlocal steps
+        after(context)
+        steps += 1
+        if steps == 4:
+            raise KeyboardInterrupt
+
+    broken.after_step = die  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path / "broken", broken)
+    resumed = go(tmp_path / "broken", stage(), resume=True)
+    for key, value in whole.items():
+        assert torch.equal(value, resumed[key]), key
+
+
+def test_resuming_with_another_seed_is_refused(prepared: PreparedData, tmp_path: Path) -> None:
+    run_options = RunOptions(tmp_path, Budget(steps=1), bf16=False, quiet=True)
+    train(TokenizerStage(TINY, MotionData.load(prepared.path, CPU)), run_options, {})
+    with pytest.raises(InvalidInput, match="another stage, seed or configuration"):
+        train(
+            TokenizerStage(TINY, MotionData.load(prepared.path, CPU)),
+            replace(run_options, resume=True, seed=1, budget=Budget(steps=2)),
+            {},
+        )
+
+
+def test_the_tokenizer_learns(prepared: PreparedData, tmp_path: Path) -> None:
+    stage = TokenizerStage(TINY, MotionData.load(prepared.path, CPU))
+    before = stage.validate()["local_mm"]
+    train(stage, RunOptions(tmp_path, Budget(steps=120), bf16=False, quiet=True, validate_times=1), {})
+    assert stage.validate()["local_mm"] < 0.8 * before
+
+
+def test_the_masked_transformer_and_the_predictor_learn(prepared: PreparedData, tmp_path: Path) -> None:
+    stage = masked_stage(prepared)
+    before = stage.validate()
+    train(stage, RunOptions(tmp_path, Budget(steps=80), bf16=False, quiet=True), {})
+    assert stage.validate()["reconstruction/specific"] < before["reconstruction/specific"] - 0.1
+
+
+def test_gradient_of_the_predictor_never_reaches_the_graph(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    sample = next(iter([stage.sample(stage.pairs.draw(np.random.default_rng(0), 4), np.random.default_rng(0))]))
+    stage.module.zero_grad()
+    losses, masked, _, ranking = stage._piece(sample, 0.0)
+    ranking.sum().backward()
+    assert all(p.grad is None for p in stage.module.masked.parameters())
+    assert any(p.grad is not None for p in stage.module.predictor.parameters())
+
+
+def test_reconstruction_trains_the_graph_and_not_the_predictor(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    sample = stage.sample(stage.pairs.draw(np.random.default_rng(0), 8), np.random.default_rng(0))
+    losses, masked, _, _ = stage._piece(sample.at_level(2), 0.0)
+    (losses * masked).sum().backward()
+    assert stage.module.masked.text.graph.project.weight.grad is not None
+    assert all(p.grad is None for p in stage.module.predictor.parameters())
+
+
+def test_the_teacher_follows_the_student_slowly(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    for p in stage.module.predictor.parameters():
+        p.data.add_(1.0)
+    before = [p.clone() for p in stage.module.teacher.parameters()]
+    stage.after_step(context(step=10**6))
+    for old, new, student in zip(
+        before, stage.module.teacher.parameters(), stage.module.predictor.parameters(), strict=True
+    ):
+        torch.testing.assert_close(new, old + (student - old) * 0.001)
+
+
+def test_random_masks_do_not_ask_the_teacher(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, mask="random")))
+
+    def refuse(*_: object) -> torch.Tensor:
+        raise AssertionError
+
+    stage.module.teacher.forward = refuse  # type: ignore[method-assign]
+    stage.loss(context(fraction=1.0))
+
+
+def test_hard_masks_take_the_tokens_the_teacher_finds_hardest(prepared: PreparedData) -> None:
+    stage = masked_stage(prepared)
+    sample = stage.sample(stage.pairs.draw(np.random.default_rng(0), 4), np.random.default_rng(0))
+    size = sample.tokens.shape[1] // 2 * 2
+    sample = replace(sample, tokens=sample.tokens[:, :size], noise=sample.noise[:, :size])
+    stage._predict = lambda *_: torch.arange(size).float().expand(4, -1)  # type: ignore[method-assign]
+    sample = replace(sample, progress=torch.full((4,), 2 / 3), lengths=torch.full((4,), size))
+    masked = stage.masks(sample, torch.zeros(4, 25, 384), alpha=1.0)
+    half = size // 2
+    assert masked[:, size - half :].all()
+    assert not masked[:, : size - half].any()
+
+
+def test_three_levels_a_step_average_the_same_loss_as_one_drawn(prepared: PreparedData) -> None:
+    three = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, levels_per_step=3)))
+    loss, logs = three.loss(context(fraction=0.0))
+    assert torch.isfinite(loss)
+    assert 0 < float(logs["reconstruction"]) < 10
+
+
+def test_configurations_survive_json() -> None:
+    for name in ("paper", "starter", "tiny"):
+        config = named_config(name)
+        assert HGM3Config.from_dict(config.to_dict()) == config
+    with pytest.raises(InvalidInput, match="unknown fields: depht"):
+        HGM3Config.from_dict({"tokenizer": {"depht": 1}})
+    with pytest.raises(InvalidInput, match="no configuration"):
+        named_config("large")
+    assert named_config("tiny", mask="random").mining.mask == "random"
