@@ -1,8 +1,8 @@
 """The drawn body: a skeleton dressed in round cones, for the contact sheet and for the player alike.
 
-Everything is measured from the skeleton's rest pose (T-pose, facing +Z, metres), so any skeleton gets a body: legs end
-in feet, arms in hands, the highest bone of the middle carries a head with a nose, so that a picture shows which
-way a person faces. Left is the side of +X in the rest pose.
+Any skeleton gets a body: legs end in feet, arms in hands, the highest bone of the middle carries a head with a nose, so
+that a picture shows which way a person faces. Sizes and directions are measured in a pose in which the body stands: the
+T-pose of our skeletons; of a foreign one, whose rest pose may be anything, the frame in which it is tallest.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.kinematics import facing
+from shared.motion.clip import MotionClip
+from shared.motion.kinematics import global_rotations
+from shared.motion.rotations import to_matrix
 from shared.motion.skeleton import Skeleton
 
 Part = Literal["left", "right", "middle", "face"]
@@ -24,6 +26,8 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 # Radii in metres on a body whose joints span 1.5 m from the lowest to the highest; they scale with the span.
 SPAN = 1.5
 PELVIS, WAIST, CHEST, NECK, GIRDLE = 0.098, 0.094, 0.108, 0.048, 0.062
+DETAIL = 0.015  # eyes, fingers' helpers and the like: side branches of the trunk shorter than an arm
+SHORTEST_LIMB = 0.3
 SOLE = 0.028
 # Radius over the share of the way from where the limb leaves the trunk to its end.
 LEG = ((0.0, 0.45, 0.85, 1.0), (0.084, 0.058, 0.041, SOLE))
@@ -72,11 +76,17 @@ class Body:
 
 
 def dress(skeleton: Skeleton) -> Body:
-    """Put a body on a skeleton."""
-    tailor = _Tailor(skeleton)
-    limbs = [tailor.bone(j) for j in range(1, len(skeleton)) if tailor.length(j) > 1e-4]
-    limbs += [*tailor.head(), *tailor.hands(), *tailor.feet()]
-    return Body(tuple(limbs), height=float(np.ptp(tailor.rest[:, 1])) + 0.2 * tailor.unit, sole=SOLE * tailor.unit)
+    """Put a body on a skeleton that stands in its rest pose, facing +Z."""
+    return _Tailor(skeleton, skeleton.rest, np.broadcast_to(np.eye(3), (len(skeleton), 3, 3))).body()
+
+
+def dress_clip(clip: MotionClip) -> Body:
+    """Put a body on the skeleton of a clip, whatever its rest pose is."""
+    if clip.skeleton.facing:
+        return dress(clip.skeleton)
+    tallest = int(np.argmax(_stature(clip.skeleton, clip.joints)))
+    axes = to_matrix(global_rotations(clip.skeleton, clip.rotations[tallest : tallest + 1]))[0]
+    return _Tailor(clip.skeleton, clip.joints[tallest], axes).body()
 
 
 def part_of(skeleton: Skeleton, joint: int) -> Part:
@@ -88,15 +98,41 @@ def part_of(skeleton: Skeleton, joint: int) -> Part:
     return "left" if difference[0] == "l" else "right"
 
 
-class _Tailor:
-    """Measures one skeleton."""
+def forward_of(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Where a body faces: on the floor, square to the way from its right hips and collars to its left ones.
 
-    def __init__(self, skeleton: Skeleton) -> None:
-        self.skeleton, self.rest = skeleton, skeleton.rest.astype(np.float64)
+    Args:
+        skeleton: its sides are read from its joints' names.
+        places: (..., J, 3) world positions.
+
+    Returns:
+        (..., 3) unit vectors; +Z for a body without sides.
+    """
+    part = [part_of(skeleton, j) for j in range(len(skeleton))]
+    left = [j for j, p in enumerate(skeleton.parents) if part[j] == "left" and p >= 0 and part[p] == "middle"]
+    right = [skeleton.mirror[j] for j in left]
+    across = places[..., left, :].sum(axis=-2) - places[..., right, :].sum(axis=-2)
+    forward = np.stack([-across[..., 2], 0 * across[..., 0], across[..., 0]], axis=-1).astype(np.float64)
+    length = np.linalg.norm(forward, axis=-1, keepdims=True)
+    return np.where(length > 1e-6, forward / np.maximum(length, 1e-6), [0.0, 0.0, 1.0])
+
+
+def _stature(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.floating]:
+    """(...) from the lowest joint of (..., J, 3) to the highest of the middle: raised hands do not count."""
+    middle = [j for j in range(len(skeleton)) if skeleton.mirror[j] == j]
+    return places[..., middle, 1].max(axis=-1) - places[..., 1].min(axis=-1)
+
+
+class _Tailor:
+    """Measures one skeleton in a pose in which it stands: places (J, 3) and axes (J, 3, 3) of its joints."""
+
+    def __init__(self, skeleton: Skeleton, places: NDArray[np.floating], axes: NDArray[np.floating]) -> None:
+        self.skeleton, self.places, self.axes = skeleton, places.astype(np.float64), axes
         count = len(skeleton)
-        self.unit = max(float(np.ptp(self.rest[:, 1])), 1e-3) / SPAN
-        self.forward = facing(self.rest, skeleton) if skeleton.facing else np.array([0.0, 0.0, 1.0])
+        self.height = max(float(_stature(skeleton, self.places)), 1e-3)
+        self.unit = self.height / SPAN
         self.part: list[Part] = [part_of(skeleton, j) for j in range(count)]
+        self.forward = forward_of(skeleton, self.places)
         # How far down its limb a joint lies, and how long the longest branch of the limb is, metres.
         self.top, self.reach, self.longest = list(range(count)), [0.0] * count, [0.0] * count
         for j in range(1, count):
@@ -107,8 +143,18 @@ class _Tailor:
         self.legs = {self.top[j] for j in range(count) if self._is_leg(j)}
         self.trunk: set[int] = set()
         for j in range(1, count):
-            if self.part[j] != "middle" and self.part[skeleton.parents[j]] == "middle":
+            if self.top[j] == j and self.part[j] != "middle" and not self._is_detail(j):
                 self.trunk.update(self._ancestors(j))
+
+    def body(self) -> Body:
+        limbs = [self.bone(j) for j in range(1, len(self.skeleton)) if self.length(j) > 1e-4]
+        limbs += [*self.head(), *self.hands(), *self.feet()]
+        return Body(tuple(limbs), height=self.height + 0.2 * self.unit, sole=SOLE * self.unit)
+
+    def _fixed_to(self, joint: int, vector: NDArray[np.floating]) -> Vector:
+        """A world vector of the standing pose in the joint's own axes."""
+        x, y, z = (float(v) for v in self.axes[joint].T @ vector)
+        return x, y, z
 
     def length(self, joint: int) -> float:
         return float(np.linalg.norm(self.skeleton.offsets[joint]))
@@ -122,26 +168,33 @@ class _Tailor:
     def _is_leg(self, joint: int) -> bool:
         if self.skeleton.feet:
             return joint in self.skeleton.feet
-        low = self.rest[:, 1].min() + 0.15 * SPAN * self.unit
-        return self.part[joint] != "middle" and bool(self.rest[joint, 1] < low)
+        low = self.places[:, 1].min() + 0.15 * SPAN * self.unit
+        return self.part[joint] != "middle" and bool(self.places[joint, 1] < low)
+
+    def _is_detail(self, joint: int) -> bool:
+        limb = self.top[joint]
+        return limb not in self.legs and self.longest[limb] < SHORTEST_LIMB * self.unit
 
     def radius(self, joint: int) -> float:
         if self.part[joint] != "middle":
             limb = self.top[joint]
+            if self._is_detail(joint):
+                return self.unit * DETAIL
             share = self.reach[joint] / self.longest[limb] if self.longest[limb] else 0.0
             return self.unit * float(np.interp(share, *(LEG if limb in self.legs else ARM)))
         if joint == 0:
             return self.unit * PELVIS
         if joint not in self.trunk:
             return self.unit * NECK
-        return self.unit * (CHEST if any(self.part[c] != "middle" for c in self.skeleton.children[joint]) else WAIST)
+        shoulders = [c for c in self.skeleton.children[joint] if self.part[c] != "middle" and not self._is_detail(c)]
+        return self.unit * (CHEST if shoulders else WAIST)
 
     def bone(self, joint: int) -> Limb:
         parent = self.skeleton.parents[joint]
         end = self.radius(joint)
         start = self.radius(parent)
         if self.part[parent] == "middle" and self.part[joint] != "middle":  # where a limb leaves the trunk
-            start = self.unit * (0.9 * PELVIS if joint in self.legs else GIRDLE)
+            start = end if self._is_detail(joint) else self.unit * (0.9 * PELVIS if joint in self.legs else GIRDLE)
             # A little thinner than the limb that begins there, so that two surfaces never coincide and flicker.
             return Limb("middle", parent, joint, start, 0.95 * end)
         if parent in self.trunk and joint not in self.trunk:  # the chest narrows towards the neck
@@ -150,15 +203,16 @@ class _Tailor:
 
     def head(self) -> list[Limb]:
         """A skull and a nose on the highest bone of the middle."""
-        leaves = [j for j, c in enumerate(self.skeleton.children) if not c and self.part[j] == "middle" and j]
+        inner = {self.skeleton.parents[j] for j, part in enumerate(self.part) if part == "middle"}
+        leaves = [j for j, part in enumerate(self.part) if part == "middle" and j and j not in inner]
         if not leaves:
             return []
-        joint = max(leaves, key=lambda j: self.rest[j, 1])
+        joint = max(leaves, key=lambda j: self.places[j, 1])
         if END_SITE.search(self.skeleton.joint_names[joint]):
             joint = self.skeleton.parents[joint]
 
         def at(up: float, forward: float) -> Vector:
-            return _vector(self.unit * (np.array([0.0, up, 0.0]) + forward * self.forward))
+            return self._fixed_to(joint, self.unit * (np.array([0.0, up, 0.0]) + forward * self.forward))
 
         skull = Limb("middle", joint, joint, 0.070 * self.unit, 0.088 * self.unit, at(0.030, 0.020), at(0.105, 0.012))
         nose = Limb("face", joint, joint, 0.012 * self.unit, 0.019 * self.unit, at(0.085, 0.098), at(0.048, 0.102))
@@ -170,10 +224,10 @@ class _Tailor:
         for joint, children in enumerate(self.skeleton.children):
             top = self.top[joint]
             alone = sum(self.top[j] == top and not c for j, c in enumerate(self.skeleton.children)) == 1
-            if children or self.part[joint] == "middle" or top in self.legs or not alone or joint == top:
+            if children or self.part[joint] == "middle" or top in self.legs or not alone or self._is_detail(joint):
                 continue
-            offset = self.skeleton.offsets[joint].astype(np.float64)
-            tip = _vector(offset / max(self.length(joint), 1e-6) * 0.135 * self.unit)
+            bone = self.places[joint] - self.places[self.skeleton.parents[joint]]
+            tip = self._fixed_to(joint, bone / max(self.length(joint), 1e-6) * 0.135 * self.unit)
             hands.append(Limb(self.part[joint], joint, joint, 0.036 * self.unit, 0.021 * self.unit, end_offset=tip))
         return hands
 
@@ -181,15 +235,10 @@ class _Tailor:
         """Heel and toes, so that a foot shows where it stands and points."""
         feet: list[Limb] = []
         for ankle, toe in zip(self.skeleton.feet[::2], self.skeleton.feet[1::2], strict=True):
-            drop = self.rest[toe, 1] - self.rest[ankle, 1]
-            heel = _vector(np.array([0.0, drop, 0.0]) - 0.040 * self.unit * self.forward)
-            tip = _vector(0.055 * self.unit * self.forward)
+            drop = self.places[toe, 1] - self.places[ankle, 1]
+            heel = self._fixed_to(ankle, np.array([0.0, drop, 0.0]) - 0.040 * self.unit * self.forward)
+            tip = self._fixed_to(toe, 0.055 * self.unit * self.forward)
             wide, thin = 0.033 * self.unit, SOLE * self.unit
             feet.append(Limb(self.part[toe], ankle, toe, thin, wide, start_offset=heel))
             feet.append(Limb(self.part[toe], toe, toe, wide, 0.75 * thin, end_offset=tip))
         return feet
-
-
-def _vector(values: NDArray[np.floating]) -> Vector:
-    x, y, z = (float(v) for v in values)
-    return x, y, z

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
-from shared.motion.body import dress
+from shared.motion.body import dress_clip
 from shared.motion.clip import MotionClip
 from shared.motion.files import write_atomically
 from shared.motion.paper import one_line
@@ -119,7 +119,7 @@ def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str,
 
 
 def _body(clip: MotionClip) -> dict[str, object]:
-    skeleton, body = clip.skeleton, dress(clip.skeleton)
+    skeleton, body = clip.skeleton, dress_clip(clip)
     return {
         "parents": list(skeleton.parents),
         "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],

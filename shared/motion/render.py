@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageChops, ImageDraw, ImageFilter
 
 from shared.errors import InvalidInput
-from shared.motion.body import Body, Part, dress
+from shared.motion.body import Body, Part, dress_clip, forward_of
 from shared.motion.clip import MotionClip
 from shared.motion.files import write_atomically
 from shared.motion.kinematics import facing, global_rotations
@@ -129,7 +129,7 @@ def _chosen(clip: MotionClip, columns: int, frames: Sequence[int] | None) -> NDA
 
 
 def _strip(clip: MotionClip, frames: NDArray[np.intp], caption: str) -> _Strip:
-    body, camera = dress(clip.skeleton), Camera()
+    body, camera = dress_clip(clip), Camera()
     joints = np.asarray(clip.joints[frames], np.float64)
     axes = to_matrix(global_rotations(clip.skeleton, np.asarray(clip.rotations[frames], np.float64)))
     limbs = body.points(joints, axes)
@@ -334,8 +334,7 @@ def _headings(strip: _Strip) -> NDArray[np.floating]:
     clip = strip.clip
     if clip.skeleton.facing:
         return facing(np.asarray(clip.joints[strip.frames], np.float64), clip.skeleton)[:, [0, 2]]
-    ahead = to_matrix(np.asarray(clip.rotations[strip.frames, 0], np.float64))[:, :, 2][:, [0, 2]]
-    return ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-6)
+    return forward_of(clip.skeleton, clip.joints[strip.frames])[:, [0, 2]]
 
 
 def _legend(paper: Paper, width: int, height: int) -> None:

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from shared.errors import InvalidInput
-from shared.motion.body import dress, part_of
+from shared.motion.body import dress, dress_clip, forward_of, part_of
+from shared.motion.clip import MotionClip
 from shared.motion.kinematics import global_rotations
 from shared.motion.paper import THEMES, Paper, one_line
 from shared.motion.raster import Camera, shade
 from shared.motion.render import CELL, GAP, MARGIN, PLAN, contact_sheet, facts_of
-from shared.motion.rotations import to_matrix
+from shared.motion.rotations import conjugate, multiply, normalize, rotate, to_matrix
 from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS, SNAPMOGEN, Skeleton
 from tests.support.walker import walker
 
@@ -206,6 +207,54 @@ def test_limbs_end_at_the_joints_of_the_pose(clip):
     for k, limb in enumerate(body.limbs[:21]):  # the bones proper: one a joint but the root
         np.testing.assert_allclose(ends[:, k, 1], clip.joints[:, limb.end], atol=1e-6)
         assert clip.skeleton.parents[limb.end] == limb.start
+
+
+def test_a_foreign_body_is_measured_where_it_stands(clip):
+    """Rest poses of foreign files may be anything: here every joint has other axes, and nothing is known by name."""
+    random = np.random.default_rng(2)
+    axes = normalize(random.normal(0, 1, (22, 4)))  # new world rotation = old one, then these
+    world = multiply(global_rotations(clip.skeleton, clip.rotations), axes)
+    parents = [max(p, 0) for p in clip.skeleton.parents]
+    local = multiply(conjugate(world[:, parents]), world)
+    local[:, 0] = world[:, 0]
+    offsets = rotate(conjugate(axes[parents]), clip.skeleton.offsets)
+    foreign = replace(clip.skeleton, name="foreign", offsets=offsets.astype(np.float32), feet=(), facing=())
+    moved = MotionClip.of(foreign, local, clip.root, clip.contacts, clip.fps)
+    np.testing.assert_allclose(moved.joints, clip.joints, atol=1e-5)
+
+    bodies = dress(clip.skeleton), dress_clip(moved)
+    ends = [
+        body.points(c.joints, to_matrix(global_rotations(c.skeleton, c.rotations)))
+        for body, c in zip(bodies, (clip, moved), strict=True)
+    ]
+    assert bodies[1].height == pytest.approx(bodies[0].height, abs=0.05)
+    for part in ("face", "left", "right"):
+        first, second = (
+            [e[:, k] for k, limb in enumerate(body.limbs) if limb.part == part]
+            for body, e in zip(bodies, ends, strict=True)
+        )
+        for limb, other in zip(first[:7], second, strict=True):  # all but the soles, which want known feet
+            assert np.linalg.norm(limb - other, axis=-1).max() < 0.03
+    np.testing.assert_allclose(forward_of(foreign, clip.joints[0]), [0, 0, 1], atol=1e-3)
+
+
+def test_small_branches_of_the_trunk_are_no_arms():
+    """Eyes, for one: pairs beside the head, which must not grow hands nor make a chest of the head."""
+    tree = HUMANML3D
+    head = tree.index("head")
+    eyed = Skeleton(
+        "eyed",
+        (*tree.joint_names, "L_eye", "R_eye"),
+        (*tree.parents, head, head),
+        np.concatenate([tree.offsets, [[0.03, 0, 0.08], [-0.03, 0, 0.08]]]).astype(np.float32),
+        (*tree.mirror, 23, 22),
+        tree.feet,
+        tree.facing,
+    )
+    plain, body = dress(tree), dress(eyed)
+    assert [limb for limb in body.limbs if limb.end not in (22, 23)] == list(plain.limbs)
+    assert len(body.limbs) == len(plain.limbs) + 2
+    assert all(limb.end_radius < 0.02 for limb in body.limbs if limb.end in (22, 23))
 
 
 def test_a_ball_is_a_disc_with_the_light_from_above():
