@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -61,7 +62,7 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
     def joint(j: int, depth: int) -> None:
         order.append(j)
         pad = "\t" * depth
-        lines.append(f"{pad}{'JOINT' if j else 'ROOT'} {skeleton.joint_names[j].replace(' ', '_')}")
+        lines.append(f"{pad}{'JOINT' if j else 'ROOT'} {_word(skeleton.joint_names[j])}")
         lines.append(f"{pad}{{")
         lines.append(f"{pad}\tOFFSET {vector(offsets[j] if j else np.zeros(3))}")
         channels = (
@@ -84,6 +85,11 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
     row = " ".join(["%.6f"] * values.shape[1])
     lines += [row % tuple(numbers) for numbers in values.tolist()]
     return "\n".join(lines) + "\n"
+
+
+def _word(name: str) -> str:
+    """A joint name as one word of the file: whitespace and braces would end it."""
+    return re.sub(r"[\s{}]+", "_", name) or "_"
 
 
 def _tips(clip: Posed) -> Array:

@@ -227,7 +227,7 @@ def fit_rotation(rest: Array, seen: Array) -> Array:
     """The rotation that best turns one set of vectors into another, in the sense of least squares.
 
     Davenport's q-method: the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix. Where the vectors leave
-    a rotation open (all on one line) the smaller one is taken, by a prior of a millionth.
+    a rotation open (all on one line) the smaller one is taken, by a prior of a billionth.
 
     Args:
         rest: (K, 3). seen: (T, K, 3).
@@ -236,7 +236,7 @@ def fit_rotation(rest: Array, seen: Array) -> Array:
         (T, 4).
     """
     b = np.einsum("tki,kj->tij", seen, rest)
-    b = b + 1e-6 * np.maximum(np.einsum("ki,ki->", rest, rest), 1e-12) * np.eye(3)
+    b = b + 1e-9 * np.maximum(np.einsum("ki,ki->", rest, rest), 1e-12) * np.eye(3)
     k = np.empty((len(b), 4, 4))
     trace = np.einsum("tii->t", b)
     k[:, 1:, 1:] = b + b.transpose(0, 2, 1) - trace[:, None, None] * np.eye(3)

@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shared.errors import InvalidInput
+from shared.motion.features import mirror_joints
+from shared.motion.kinematics import bone_lengths, forward_kinematics
+from shared.motion.pose import fit_rotation, measure_offsets, solve_pose
+from shared.motion.rotations import about, angle_between, from_rotvec, multiply, rotate, to_rotvec
+from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from tests.support.exported import tumbling
+from tests.support.motions import dancer, drift
+from tests.support.walker import walker
+
+
+def joints_of(rotations, root, skeleton=HUMANML3D):
+    return forward_kinematics(skeleton, rotations, root)
+
+
+def steps(rotations) -> float:
+    """Degrees of the largest turn of any joint between two frames."""
+    return float(np.degrees(angle_between(rotations[1:], rotations[:-1])).max())
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), st.integers(1, 90))
+def test_joints_of_a_body_come_back_exactly(seed, frames):
+    joints = joints_of(*dancer(seed, frames))
+    pose = solve_pose(joints, HUMANML3D)
+    np.testing.assert_allclose(pose.joints, joints, atol=2e-6)
+    np.testing.assert_allclose(forward_kinematics(pose.skeleton, pose.rotations, pose.root), pose.joints, atol=1e-9)
+    np.testing.assert_allclose(pose.offsets, HUMANML3D.offsets, atol=1e-6)
+
+
+@pytest.mark.parametrize("skeleton", [HUMANML3D, KIT])
+def test_any_joints_on_fixed_bones_come_back(skeleton):
+    clip = tumbling(skeleton, 20)
+    pose = solve_pose(clip.joints, skeleton, measure=False)
+    # a tumbling spine bends more than a fit of the chest can follow; all else is met
+    assert np.linalg.norm(pose.joints - clip.joints, axis=-1).max() < 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000))
+def test_rotations_of_pelvis_chest_and_bent_limbs_come_back(seed):
+    rotations, root = dancer(seed, 80)
+    pose = solve_pose(joints_of(rotations, root), HUMANML3D)
+    off = np.degrees(angle_between(pose.rotations, rotations))
+    for name in ("pelvis", "L_hip", "R_hip"):
+        assert off[:, HUMANML3D.index(name)].max() < 45, name
+        assert off[:, HUMANML3D.index(name)].mean() < 5, name
+
+
+def test_a_bent_knee_turns_about_its_hinge():
+    joints = joints_of(*dancer(1, 80))
+    knee = to_rotvec(solve_pose(joints, HUMANML3D).rotations[:, HUMANML3D.index("L_knee")])
+    assert knee[:, 0].min() > 0, "knees bend backwards only"
+    assert np.abs(knee[:, 1:]).max() < 0.25 * np.abs(knee[:, 0]).max()
+
+
+def test_quaternions_do_not_change_sign_between_frames():
+    pose = solve_pose(joints_of(*dancer(2, 120)), HUMANML3D)
+    assert np.einsum("tji,tji->tj", pose.rotations[1:], pose.rotations[:-1]).min() > 0.5
+
+
+@pytest.mark.parametrize("joint", ["L_elbow", "R_elbow", "L_knee"])
+def test_a_limb_that_is_straight_for_a_while_does_not_spin(joint):
+    rotations, root = dancer(4, 100)
+    j = HUMANML3D.index(joint)
+    bend = np.clip(np.abs(np.linspace(-1.5, 1.5, 100)) - 0.4, 0, None)  # bent, straight for a second, bent
+    rotations[:, j] = from_rotvec(bend[:, None] * np.array([1.0, 0, 0] if "knee" in joint else [0, -1.0, 0]))
+    if joint.startswith("R_elbow"):
+        rotations[:, j] = from_rotvec(bend[:, None] * np.array([0, 1.0, 0]))
+    noise = drift(9, 100, 66, 0.001).reshape(100, 22, 3)
+    pose = solve_pose(joints_of(rotations, root) + noise, HUMANML3D)
+    assert steps(pose.rotations) < steps(rotations) + 15
+
+
+def test_noise_of_millimetres_makes_no_flips():
+    rotations, root = dancer(5, 196)
+    joints = joints_of(rotations, root)
+    noisy = joints + drift(1, 196, 66, 0.004).reshape(196, 22, 3)
+    pose = solve_pose(noisy, HUMANML3D)
+    assert steps(pose.rotations) < steps(solve_pose(joints, HUMANML3D).rotations) + 20
+    assert np.linalg.norm(pose.joints - noisy, axis=-1).mean() < 0.005
+
+
+def test_bones_keep_their_length_and_both_sides_are_equal():
+    joints = joints_of(*dancer(6, 60)) * 1.1 + drift(3, 60, 66, 0.005).reshape(60, 22, 3)
+    pose = solve_pose(joints, HUMANML3D)
+    lengths = bone_lengths(pose.joints, HUMANML3D)
+    assert np.ptp(lengths, axis=0).max() < 1e-9
+    np.testing.assert_allclose(lengths[0], lengths[0, list(HUMANML3D.mirror)], atol=1e-6)
+    np.testing.assert_allclose(pose.offsets[:, 0], -pose.offsets[list(HUMANML3D.mirror), 0], atol=1e-6)
+    assert lengths[0, 4] == pytest.approx(1.1 * 0.39, rel=0.02)
+
+
+def test_another_body_is_measured_in_its_own_frame():
+    """Hips further back and apart than in our T-pose: what SMPL's pelvis looks like."""
+    other = HUMANML3D.offsets.copy()
+    other[[1, 2]] += [[0.02, 0, -0.02], [-0.02, 0, -0.02]]
+    other[[13, 14], 1] -= 0.03
+    skeleton = HUMANML3D.with_offsets(other)
+    rotations, root = dancer(7, 60)
+    joints = joints_of(rotations, root, skeleton)
+    assert np.linalg.norm(solve_pose(joints, HUMANML3D).joints - joints, axis=-1).max() < 1e-5
+    measured = measure_offsets(joints, HUMANML3D)
+    assert np.linalg.norm(measured[1] - measured[2]) == pytest.approx(0.2, abs=1e-5)
+
+
+def test_a_mirrored_motion_has_mirrored_rotations():
+    joints = joints_of(*dancer(8, 60))
+    pose, other = solve_pose(joints, HUMANML3D), solve_pose(mirror_joints(joints, HUMANML3D), HUMANML3D)
+    mirrored = pose.rotations[:, list(HUMANML3D.mirror)] * [1, 1, -1, -1]
+    assert np.degrees(angle_between(mirrored, other.rotations)).max() < 0.1
+
+
+def test_turning_and_moving_a_motion_turns_and_moves_its_root_alone():
+    joints = joints_of(*dancer(9, 60))
+    turn = about("Y", 2.0)
+    pose = solve_pose(joints, HUMANML3D)
+    moved = solve_pose(rotate(turn, joints) + np.array([1.0, 2.0, 3.0]), HUMANML3D)
+    assert np.degrees(angle_between(moved.rotations[:, 1:], pose.rotations[:, 1:])).max() < 1e-3
+    assert np.degrees(angle_between(moved.rotations[:, 0], multiply(turn, pose.rotations[:, 0]))).max() < 1e-3
+
+
+def test_a_spine_shares_its_twist():
+    rotations, root = dancer(0, 40)
+    rotations[:, :] = [1, 0, 0, 0]
+    rotations[:, HUMANML3D.index("spine3")] = about("Y", np.linspace(0, 0.9, 40))
+    turned = np.degrees(np.linalg.norm(to_rotvec(solve_pose(joints_of(rotations, root), HUMANML3D).rotations), axis=-1))
+    chain = [HUMANML3D.index(n) for n in ("spine1", "spine2", "spine3")]
+    np.testing.assert_allclose(turned[-1, chain], np.degrees(0.3), atol=0.1)
+
+
+def test_snapmogens_rig_with_a_bone_of_no_length_is_solved():
+    skeleton = SKELETONS["snapmogen"]
+    rotations = from_rotvec(drift(2, 50, 72, 0.25).reshape(50, 24, 3))
+    rotations[:, [0, 15]] = [1, 0, 0, 0]
+    joints = joints_of(rotations, np.zeros((50, 3)), skeleton)
+    pose = solve_pose(joints, skeleton)
+    assert np.linalg.norm(pose.joints - joints, axis=-1).max() < 1e-3
+    assert steps(pose.rotations) < 75  # elbows here bend any way, which real ones do not
+
+
+def test_one_frame_is_enough():
+    clip = walker()
+    pose = solve_pose(clip.joints[:1], HUMANML3D)
+    np.testing.assert_allclose(pose.joints, clip.joints[:1], atol=1e-4)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 1000))
+def test_a_fit_finds_the_rotation(seed):
+    random = np.random.default_rng(seed)
+    rest = random.normal(size=(3, 3))
+    turns = from_rotvec(random.normal(size=(5, 3)))
+    assert angle_between(fit_rotation(rest, rotate(turns[:, None], rest)), turns).max() < 1e-4
+
+
+def test_a_fit_of_one_line_turns_no_more_than_it_must():
+    rest = np.array([[0, 1.0, 0], [0, 2.0, 0]])
+    turn = about("X", np.array([0.4]))
+    assert angle_between(fit_rotation(rest, rotate(turn[:, None], rest)), turn).max() < 1e-3
+
+
+@pytest.mark.parametrize("bad", [np.zeros((5, 21, 3)), np.zeros((0, 22, 3)), np.full((5, 22, 3), np.nan)])
+def test_joints_that_are_none_are_refused(bad):
+    with pytest.raises(InvalidInput):
+        solve_pose(bad, HUMANML3D)
+
+
+def test_joints_all_in_one_place_are_solved_without_nan():
+    pose = solve_pose(np.zeros((5, 22, 3)), HUMANML3D)
+    assert np.isfinite(pose.rotations).all()
