@@ -35,7 +35,7 @@ def load_labeller(name: str) -> RoleLabeller:
     if bundle.manifest.kind == "labeller" and model == "light":
         from shared.text.light import LightLabeller
 
-        return LightLabeller(bundle)
+        return LightLabeller.load(bundle)
     if bundle.manifest.kind == "labeller" and model == "bert-srl":
         from shared.text.bert_srl import BertLabeller
 

@@ -30,14 +30,23 @@ class LightLabeller:
 
     name = "light"
 
-    def __init__(self, bundle: Bundle, *, minilm: Path | None = None) -> None:
-        """Load the head of `bundle` and MiniLM from `minilm` (None = wherever it is installed).
+    def __init__(self, network: LightNetwork, states: WordStates, sha256: str) -> None:
+        """Put a labeller together; most callers want `load`."""
+        self.sha256 = sha256
+        self._network = network.eval()
+        self._states = states
+        self._tags = network.config.tags
+        self._transitions = transition_scores(self._tags) + network.transitions.detach().double().numpy()
+        self._start = start_scores(self._tags)
+
+    @classmethod
+    def load(cls, bundle: Bundle, *, minilm: Path | None = None) -> LightLabeller:
+        """The head of `bundle` on MiniLM from `minilm` (None = wherever it is installed).
 
         Raises:
             InvalidBundle: the head is damaged, or was trained on another MiniLM.
         """
         folder = minilm or find_weights("minilm")
-        self.sha256 = bundle.weights_sha256
         parameters = dict(bundle.manifest.parameters)
         expected = parameters.pop("minilm_sha256", None)
         if expected != weights_sha256(folder):
@@ -48,21 +57,16 @@ class LightLabeller:
             )
         try:
             config = light_config(parameters)
-            self._network = LightNetwork(config).eval()
-            tensors = {name: torch.tensor(value) for name, value in bundle.tensors("labeller").items()}
-            self._network.load_state_dict(tensors)
+            network = LightNetwork(config)
+            network.load_state_dict({name: torch.tensor(value) for name, value in bundle.tensors("labeller").items()})
         except (TypeError, RuntimeError, KeyError) as error:
             raise InvalidBundle(f"its weights do not fit: {error}", where=str(bundle.path)) from error
-        self._tags = config.tags
-        learned = self._network.transitions.detach().double().numpy()
-        self._transitions = transition_scores(config.tags) + learned
-        self._start = start_scores(config.tags)
-        self._states = WordStates(folder, config.layers)
+        return cls(network, WordStates(folder, config.layers), bundle.weights_sha256)
 
     def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
         """The frames of each text, sentence by sentence: no argument crosses a full stop."""
         return [
-            tuple(_moved(frame, start) for start, stop in segments(words) for frame in self._frames(words[start:stop]))
+            tuple(_moved(frame, start) for start, stop in segments(words) for frame in self.frames(words[start:stop]))
             for words in sentences
         ]
 
@@ -71,11 +75,20 @@ class LightLabeller:
         return [frame.predicate for frame in self.label([words])[0]]
 
     @torch.inference_mode()
-    def _frames(self, words: Sequence[str]) -> list[Frame]:
+    def frames(self, words: Sequence[str], predicates: Sequence[int] | None = None) -> list[Frame]:
+        """The frames of one sentence.
+
+        Args:
+            words: at most 60.
+            predicates: where they are known; None = find them.
+        """
         network = self._network
         mask = torch.ones(1, len(words), dtype=torch.bool)
         hidden = network.read(self._states(words)[None], surface_features(words)[None], mask)
-        found = (torch.sigmoid(network.predicate_logits(hidden)[0]) > THRESHOLD).nonzero()[:, 0]
+        if predicates is None:
+            found = (torch.sigmoid(network.predicate_logits(hidden)[0]) > THRESHOLD).nonzero()[:, 0]
+        else:
+            found = torch.tensor(predicates, dtype=torch.long)
         if not len(found):
             return []
         count = len(found)

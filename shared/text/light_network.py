@@ -27,7 +27,7 @@ class LightConfig:
     tags: tuple[str, ...]
     layers: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     """Hidden states of MiniLM it reads (0 = embeddings)."""
-    width: int = 192
+    width: int = 144
     heads: int = 6
     trunk: int = 1
     body: int = 2
@@ -70,8 +70,9 @@ class LightNetwork(nn.Module):
         """
         flat = F.layer_norm(states, (STATE_WIDTH,)).flatten(2)  # (B, T, L * 384)
         buckets = surface[..., :SUFFIXES] + SUFFIX_BUCKETS * torch.arange(SUFFIXES, device=surface.device)
-        suffixes = F.dropout(self.suffixes(buckets).flatten(2), self.config.dropout, self.training)
-        hidden = self.states(F.dropout(flat, self.config.dropout, self.training))
+        drop = self.config.dropout if self.training else 0.0
+        suffixes = sentence_dropout(self.suffixes(buckets).flatten(2), drop)
+        hidden = self.states(sentence_dropout(flat, drop))
         hidden = hidden + self.suffixes_out(suffixes) + self.endings(surface[..., SUFFIXES])
         for block in self.trunk:
             hidden = block(hidden, mask)
@@ -100,6 +101,14 @@ class LightNetwork(nn.Module):
         return self.tags(torch.cat([hidden, at_predicate], dim=-1))
 
 
+def sentence_dropout(values: torch.Tensor, probability: float) -> torch.Tensor:
+    """Drop the same features of all words of a sentence (Gal & Ghahramani 2016); `values` (B, T, D)."""
+    if probability == 0:
+        return values
+    keep = torch.rand(values.shape[0], 1, values.shape[2], device=values.device) > probability
+    return values * keep / (1 - probability)
+
+
 class Block(nn.Module):
     """Pre-norm self-attention with a learned bias for each distance, and a feed-forward of twice the width."""
 
@@ -123,7 +132,7 @@ class Block(nn.Module):
         words = torch.arange(length, device=hidden.device)
         distance = (words[None] - words[:, None]).clamp(-REACH, REACH) + REACH
         bias = self.bias[:, distance][None].masked_fill(~mask[:, None, None], -1e9)  # (B, H, T, T)
-        mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=bias, dropout_p=drop)
+        mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=bias)
         mixed = mixed.transpose(1, 2).reshape(batch, length, width)
-        hidden = hidden + F.dropout(self.attended(mixed), drop)
-        return hidden + F.dropout(self.outer(F.gelu(self.inner(self.feed_norm(hidden)))), drop)
+        hidden = hidden + sentence_dropout(self.attended(mixed), drop)
+        return hidden + sentence_dropout(self.outer(F.gelu(self.inner(self.feed_norm(hidden)))), drop)

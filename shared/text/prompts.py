@@ -26,7 +26,7 @@ def check_prompt(prompt: str, *, where: str | None = None) -> str:
     """
     if "\x00" in prompt:
         raise InvalidInput("the prompt holds a NUL byte", where=where, hint="Is the file plain UTF-8 text?")
-    if len(prompt) > MAX_CHARACTERS * 10:  # normalising megabytes first would be work for nothing
+    if len(prompt) > MAX_CHARACTERS * 100:  # normalising megabytes first would be work for nothing
         raise _too_long(f"{len(prompt):,} characters", where)
     if any("\ud800" <= c <= "\udfff" for c in prompt):
         raise InvalidInput("the prompt holds broken Unicode (a lone surrogate)", where=where, hint="Save it as UTF-8.")

@@ -1,0 +1,48 @@
+"""The blob a generator reads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shared.errors import InvalidFile
+from shared.text.features import TextFeatures
+from shared.text.graph import build_graph
+from shared.text.roles import Argument, Frame
+
+
+def features() -> TextFeatures:
+    text = "a pérson walks 👋"
+    graph = build_graph(text, [Frame(2, (Argument("ARG0", 0, 2),))], max_actions=4, max_specifics=8)
+    nodes = np.random.default_rng(0).normal(size=(3, 384)).astype(np.float16)
+    return TextFeatures("A pérson walks 👋", text, graph, nodes)
+
+
+def test_a_blob_gives_back_what_went_in() -> None:
+    made = features()
+    read = TextFeatures.from_blob(made.to_blob())
+    assert (read.prompt, read.rewritten, read.graph) == (made.prompt, made.rewritten, made.graph)
+    assert np.array_equal(read.nodes, made.nodes)
+    assert np.array_equal(read.sentence, made.nodes[0])
+
+
+@given(st.integers(0, 2000))
+def test_a_truncated_blob_is_refused(length: int) -> None:
+    blob = features().to_blob()
+    with pytest.raises(InvalidFile):
+        TextFeatures.from_blob(blob[: min(length, len(blob) - 1)])
+
+
+@given(st.binary(max_size=200))
+def test_foreign_bytes_are_refused(blob: bytes) -> None:
+    with pytest.raises(InvalidFile):
+        TextFeatures.from_blob(blob)
+
+
+def test_vectors_of_another_graph_are_refused() -> None:
+    made = features()
+    broken = TextFeatures(made.prompt, made.rewritten, made.graph, made.nodes[:2])
+    with pytest.raises(InvalidFile, match="3 nodes"):
+        TextFeatures.from_blob(broken.to_blob())
