@@ -34,16 +34,16 @@ class Periodic(threading.Thread):
         self._probe = probe
         self._grace = grace
         self._stopping = stopping
-        self._away = False
+        self.away = False
 
     def run(self) -> None:
         while not self._stopping.wait(self._seconds):
             try:
                 self.once()
             except Unreachable as error:
-                if not self._away:
+                if not self.away:
                     log.warning(f"{self.name}_waits", error=error.message)
-                self._away = True
+                self.away = True
             except Exception:
                 log.exception(f"{self.name}_failed")
 
@@ -53,9 +53,9 @@ class Periodic(threading.Thread):
         Raises:
             Unreachable: what the action needs is away.
         """
-        if self._away:
+        if self.away:
             self._probe()
             self._stopping.wait(self._grace)
-            self._away = False
+            self.away = False
         if not self._stopping.is_set():
             self._action()

@@ -140,6 +140,7 @@ class Child:
         """
         configure_logging(f"worker-{self._role.name}", level=self._settings.log_level, json=self._settings.log_json)
         signal.signal(signal.SIGTERM, self._on_sigterm)
+        self._tell_status()  # the parent finds us by it
         self._heartbeat.start()
         self._committer.start()
         for queue, bundle in self._role.preload.items():
@@ -183,10 +184,13 @@ class Child:
         with transaction(self._beats) as conn:
             return heartbeat(conn, token, items, progressed=progressed)
 
-    def _present(self) -> None:
-        """Tell probes (by file) and the relay (by row) that this worker lives."""
+    def _tell_status(self) -> None:
         age = time.monotonic() - self._ticked
         write_status(self._settings.home, self._name, WorkerStatus(os.getpid(), self._ready, age, time.time()))
+
+    def _present(self) -> None:
+        """Tell probes (by file) and the relay (by row) that this worker lives."""
+        self._tell_status()
         if not self._ready or self._stopping.is_set():
             return
         with transaction(self._beats) as conn:

@@ -13,6 +13,7 @@ import threading
 import time
 import warnings
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import psutil
@@ -62,7 +63,12 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
     warnings.filterwarnings("ignore", category=SecurityWarning)
     app = create_app(chosen.queue_url.get_secret_value())
     signals.setup_logging.connect(_keep_logging, weak=False)
-    signals.worker_shutting_down.connect(_stop_children, weak=False)
+    home, own_name = chosen.home, name
+
+    def stop_child(**_: Any) -> None:
+        _stop_child(home, own_name)
+
+    signals.worker_shutting_down.connect(stop_child, weak=False)
     worker = app.Worker(
         hostname=f"{role.name}@{name}",
         queues=list(role.handlers),
@@ -84,29 +90,33 @@ def _keep_logging(**_: Any) -> None:
     """Being connected is enough: Celery then leaves logging alone."""
 
 
-def _stop_children(**_: Any) -> None:
+def _stop_child(home: Path, name: str) -> None:
     """Tell the child to release its leases; Celery's warm shutdown alone would wait for the drain to end."""
-    children = psutil.Process().children()
-    for child in children:
+    status = read_status(home, name)
+    try:
+        child = psutil.Process(status.pid) if status is not None else None
+        if child is None or child.ppid() != os.getpid():
+            return  # between two children: the pool ends the next one before it works
         child.send_signal(signal.SIGTERM)
-    threading.Thread(target=_kill_stragglers, args=(children,), name="stop", daemon=True).start()
-
-
-def _kill_stragglers(children: list[psutil.Process]) -> None:
-    if _end_within(children, STOP_SECONDS):
+    except psutil.NoSuchProcess:
         return
-    for child in children:
-        log.error("child_killed", pid=child.pid, seconds=STOP_SECONDS)
-        with contextlib.suppress(psutil.NoSuchProcess):
-            child.kill()
-    _end_within(children, KILL_SECONDS)
+    threading.Thread(target=_kill_straggler, args=(child,), name="stop", daemon=True).start()
+
+
+def _kill_straggler(child: psutil.Process) -> None:
+    if _ends_within(child, STOP_SECONDS):
+        return
+    log.error("child_killed", pid=child.pid, seconds=STOP_SECONDS)
+    with contextlib.suppress(psutil.NoSuchProcess):
+        child.kill()
+    _ends_within(child, KILL_SECONDS)
     os._exit(1)
 
 
-def _end_within(children: list[psutil.Process], seconds: float) -> bool:
-    """Whether all of them end in time. Only looks: `wait` would reap them, and Celery's pool wait for ever for that."""
+def _ends_within(child: psutil.Process, seconds: float) -> bool:
+    """Whether it ends in time. Only looks: `wait` would reap it, and Celery's pool would wait for ever to do so."""
     until = time.monotonic() + seconds
-    while any(_runs(child) for child in children):
+    while _runs(child):
         if time.monotonic() > until:
             return False
         time.sleep(0.1)

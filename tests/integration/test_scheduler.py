@@ -1,0 +1,252 @@
+"""Relay, sweeper and their threads on a real Postgres and a real Valkey."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import redis
+import sqlalchemy as sa
+from pydantic import SecretStr
+
+from services.scheduler.main import scheduler_main
+from services.scheduler.periodic import Periodic
+from services.scheduler.relay import Relay, publisher
+from shared.errors import InvalidInput, Unreachable
+from shared.jobs import WorkerBeat, beat, claim, pause, retire, transaction
+from shared.jobs.types import DEFAULT_TENANT
+from shared.runtime.app import DRAIN, create_app
+from shared.runtime.queue import redis_client
+from shared.settings import Settings
+from tests.support.toy import QUEUE
+from tests.support.toy_jobs import job_row, submit_toys
+
+
+@pytest.fixture
+def lists(queue_url: str) -> Iterator[redis.Redis]:
+    with redis_client(queue_url) as client:
+        yield client
+
+
+@pytest.fixture
+def relay(engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis) -> Iterator[Relay]:
+    """A relay whose first hint to idle workers is past."""
+    stopping = threading.Event()
+    app = create_app(queue_url)
+    made = Relay(engine, database_url, lists, publisher(app), interval=0.5, stopping=stopping)
+    assert made.round() == {}
+    yield made
+    stopping.set()
+    if made.is_alive():
+        made.join(10.0)
+    app.close()
+
+
+def live(engine: sa.Engine, *names: str, queue: str = QUEUE) -> None:
+    with transaction(engine) as conn:
+        for name in names:
+            beat(conn, WorkerBeat(id=f"{name}/{queue}", queue=queue, host="here", pid=1, device="cpu"))
+
+
+def wait(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    until = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < until, "not in time"
+        time.sleep(0.02)
+
+
+def test_there_are_no_more_hints_than_workers(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    live(engine, "a", "b")
+    submit_toys(engine, ["walk"] * 100)
+    assert relay.round() == {QUEUE: 2}
+    assert lists.llen(QUEUE) == 2
+
+
+def test_there_are_no_more_hints_than_batches(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    live(engine, "a", "b", "c")
+    submit_toys(engine, ["walk"] * 33)
+    relay.round()
+    assert lists.llen(QUEUE) == 2
+
+
+def test_a_round_adds_only_what_is_missing(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    live(engine, "a", "b")
+    submit_toys(engine, ["walk"] * 100)
+    relay.round()
+    assert relay.round() == {}
+    lists.lpop(QUEUE)
+    assert relay.round() == {QUEUE: 1}
+
+
+def test_a_flushed_queue_is_filled_again_from_the_rows(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    live(engine, "a", "b")
+    submit_toys(engine, ["walk"] * 100)
+    relay.round()
+    lists.flushall()
+    assert relay.round() == {QUEUE: 2}
+
+
+def test_without_living_workers_there_are_no_hints(engine: sa.Engine, relay: Relay) -> None:
+    submit_toys(engine, ["walk"] * 100)
+    assert relay.round() == {}
+    live(engine, "a")
+    with transaction(engine) as conn:
+        retire(conn, f"a/{QUEUE}")
+    assert relay.round() == {}
+
+
+def test_paused_and_claimed_items_call_nobody(engine: sa.Engine, relay: Relay) -> None:
+    live(engine, "a")
+    paused = submit_toys(engine, ["walk"])
+    with transaction(engine) as conn:
+        pause(conn, DEFAULT_TENANT, paused)
+    assert relay.round() == {}
+    submit_toys(engine, ["walk"])
+    with transaction(engine) as conn:
+        assert claim(conn, QUEUE, "a", 32)
+    assert relay.round() == {}
+
+
+def test_an_idle_worker_gets_a_hint_now_and_then(
+    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
+) -> None:
+    live(engine, "a", "b")
+    fresh = Relay(
+        engine, database_url, lists, publisher(create_app(queue_url)), interval=0.5, stopping=threading.Event()
+    )
+    assert fresh.round() == {QUEUE: 2}
+    lists.flushall()
+    assert fresh.round() == {}
+
+
+def test_a_hint_names_the_task_and_the_queue(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    live(engine, "a")
+    submit_toys(engine, ["walk"])
+    relay.round()
+    message = json.loads(lists.lindex(QUEUE, 0))  # pyright: ignore[reportArgumentType]
+    assert message["headers"]["task"] == DRAIN
+    assert message["headers"]["argsrepr"] == f"['{QUEUE}']"
+    assert message["content-type"] == "application/json"
+
+
+def test_a_submit_wakes_the_relay_at_once(
+    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
+) -> None:
+    stopping = threading.Event()
+    slow = Relay(engine, database_url, lists, publisher(create_app(queue_url)), interval=600.0, stopping=stopping)
+    slow.start()
+    try:
+        with engine.connect() as conn:
+            listening = sa.text(
+                "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND query LIKE 'LISTEN%'"
+            )
+            wait(lambda: conn.execute(listening).scalar_one() > 0 and not conn.rollback())
+        time.sleep(0.3)  # the round after LISTEN
+        live(engine, "a")
+        submit_toys(engine, ["walk"])
+        wait(lambda: lists.llen(QUEUE) == 1)
+    finally:
+        stopping.set()
+        submit_toys(engine, ["walk"])  # wakes it up to see that
+        slow.join(10.0)
+
+
+def test_a_relay_goes_on_after_its_connection_was_killed(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
+    relay.start()
+    live(engine, "a")
+    for _ in range(2):
+        with transaction(engine) as conn:
+            conn.execute(
+                sa.text(
+                    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+                    "WHERE datname = current_database() AND pid <> pg_backend_pid()"
+                )
+            )
+        lists.flushall()
+        submit_toys(engine, ["walk"])
+        wait(lambda: lists.llen(QUEUE) == 1)
+
+
+def test_publishing_to_a_queue_that_is_away_ends_and_says_so(tmp_path: Path) -> None:
+    publish = publisher(create_app(f"redis+socket://{tmp_path}/nobody.sock"))
+    with pytest.raises(Unreachable, match="queue"):
+        publish(QUEUE)
+
+
+def test_a_periodic_action_outlives_its_errors() -> None:
+    stopping = threading.Event()
+    calls: list[int] = []
+
+    def act() -> None:
+        calls.append(1)
+        if len(calls) == 1:
+            raise Unreachable("away")
+        if len(calls) == 2:
+            raise RuntimeError("a bug")
+
+    thread = Periodic("test", act, seconds=0.01, stopping=stopping)
+    thread.start()
+    wait(lambda: len(calls) > 3)
+    stopping.set()
+    thread.join(5.0)
+    assert not thread.is_alive()
+
+
+def test_after_an_outage_heartbeats_come_before_the_sweeper() -> None:
+    """Leases run out while the database is away; taking them at its return would blame the workers."""
+    stopping = threading.Event()
+    order: list[str] = []
+    away = [True, True, False]
+
+    def act() -> None:
+        order.append("act")
+        if away[0]:
+            raise Unreachable("away")
+
+    def probe() -> None:
+        away.pop(0)
+        order.append("probe")
+        if away[0]:
+            raise Unreachable("away")
+
+    thread = Periodic("test", act, seconds=0.0, stopping=stopping, probe=probe, grace=0.0)
+    for _ in range(3):
+        try:
+            thread.once()
+        except Unreachable:
+            thread.away = True
+    assert order == ["act", "probe", "probe", "act"]
+
+
+def test_scheduler_returns_lost_leases_and_stops_when_told(
+    engine: sa.Engine, database_url: str, queue_url: str, tmp_path: Path
+) -> None:
+    job = submit_toys(engine, ["walk"] * 3)
+    with transaction(engine) as conn:
+        assert claim(conn, QUEUE, "dead", 32)
+        conn.execute(sa.text("UPDATE lease SET expires_at = now() - interval '1 second'"))
+    chosen = Settings(
+        home=tmp_path,
+        database_url=SecretStr(database_url),
+        queue_url=SecretStr(queue_url),
+        store=str(tmp_path / "assets"),
+        sweep_seconds=0.05,
+    )
+    stopping = threading.Event()
+    thread = threading.Thread(target=scheduler_main, args=(chosen,), kwargs={"stopping": stopping})
+    thread.start()
+    try:
+        wait(lambda: job_row(engine, job).ready == 3)
+    finally:
+        stopping.set()
+        thread.join(20.0)
+    assert not thread.is_alive()
+
+
+def test_a_scheduler_without_database_says_what_to_set() -> None:
+    with pytest.raises(InvalidInput, match="MAREY_DATABASE_URL"):
+        scheduler_main(Settings(database_url=None, queue_url=None), stopping=threading.Event())
