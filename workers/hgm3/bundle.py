@@ -20,8 +20,8 @@ from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer
 from workers.hgm3.tokenizer import Tokenizer, biased_std
 
 MODEL = "hgm3"
-CODEBOOK_STATISTICS = ("quantizer.sums",)
-"""State of the codebooks' training, as large as the codebooks, that generation does not need."""
+NOT_STORED = ("quantizer.sums", "mean", "std")
+"""Of the tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def write_bundle(
     features = layout(config.layout)
     with BundleWriter(path, overwrite=overwrite) as writer:
         for name, state in parts.items():
-            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in CODEBOOK_STATISTICS})
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in NOT_STORED})
         writer.add_statistics(*statistics)
         if card is not None:
             writer.add_card(card)
@@ -107,7 +107,7 @@ def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
     for name, network in networks.parts().items():
         state = {k: torch.from_numpy(v) for k, v in bundle.tensors(name).items()}
         missing, unexpected = _load(network, state, where=f"{bundle.path}: {name}")
-        missing = [k for k in missing if k not in CODEBOOK_STATISTICS]
+        missing = [k for k in missing if k not in NOT_STORED]
         if missing or unexpected:
             raise InvalidBundle(
                 f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unexpected[:3]}",

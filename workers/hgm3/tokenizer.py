@@ -107,8 +107,8 @@ class Tokenizer(nn.Module):
         self.decoder = Decoder(config.features, config.tokenizer)
         t = config.tokenizer
         self.quantizer = ResidualQuantizer(t.levels, t.codes, t.code_width, decay=t.decay, dropout=t.level_dropout)
-        self.register_buffer("mean", torch.zeros(config.features), persistent=False)
-        self.register_buffer("std", torch.ones(config.features), persistent=False)
+        self.register_buffer("mean", torch.zeros(config.features))
+        self.register_buffer("std", torch.ones(config.features))
 
     def set_statistics(self, mean: Tensor, std: Tensor) -> None:
         """Mean and std (D,) as the network uses them (`biased_std` makes the latter from the data's)."""

@@ -24,7 +24,7 @@ from workers.hgm3.data import CaptionData, MotionData, TokenData
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_residual import LengthStage, ResidualStage
 from workers.hgm3.stage_tokenizer import TokenizerStage, reconstruction_errors
-from workers.hgm3.tokenizer import Tokenizer, biased_std
+from workers.hgm3.tokenizer import Tokenizer
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, Stage, choose_device, start_process_group, train
@@ -109,7 +109,7 @@ def tokenizer_test(tokenizer: Tokenizer, config: HGM3Config, data: MotionData) -
 
 
 def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
-    """The run's trained tokenizer, with the statistics of the data.
+    """The run's trained tokenizer, with the statistics of the data it was trained on.
 
     Raises:
         NotFound: not trained yet.
@@ -119,7 +119,6 @@ def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
     _same_config(part, options.config, options.run / "tokenizer")
     tokenizer = Tokenizer(options.config).to(data.features.device)
     tokenizer.load_state_dict(part.state)
-    tokenizer.set_statistics(data.mean, biased_std(data.std, options.config.tokenizer.feature_bias))
     return tokenizer.eval().requires_grad_(False)
 
 
@@ -160,13 +159,13 @@ def assemble(
         _same_config(part, config, run / name)
     masked = parts["masked"].state
     states = {
-        "tokenizer": parts["tokenizer"].state,
+        "tokenizer": dict(parts["tokenizer"].state),
         "masked": _under(masked, "masked."),
         "predictor": _under(masked, "teacher."),
         "residual": parts["residual"].state,
         "length": parts["length"].state,
     }
-    std = biased_std(torch.from_numpy(data.std), config.tokenizer.feature_bias).numpy()
+    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
     metrics = {f"{stage}/{k}": v for stage, part in parts.items() for k, v in part.metrics.items()}
     sha256 = data.manifest.files  # the data's own hashes
     licences = sorted({source.licence for source in data.manifest.sources})
@@ -178,7 +177,7 @@ def assemble(
         bundle,
         config,
         states,
-        (data.mean, std),
+        statistics,
         text=CaptionTexts.load(data).spec,
         card=card,
         overwrite=overwrite,
