@@ -27,14 +27,8 @@ class Offer:
     max_seconds: float
 
     def check_seconds(self, seconds: float | None) -> None:
-        """Raises:
-        InvalidInput: the model cannot make a motion of that length.
-        """
-        if seconds is not None and not self.min_seconds <= seconds <= self.max_seconds:
-            raise InvalidInput(
-                f"{seconds:g} is outside {self.min_seconds:g} to {self.max_seconds:g} seconds, "
-                f"the range of {self.bundle.manifest.name}"
-            )
+        """See `check_seconds`."""
+        check_seconds(self.bundle, seconds)
 
 
 class Catalogue:
@@ -76,10 +70,24 @@ def offer_of(bundle: Bundle, config: Settings) -> Offer:
         raise InvalidBundle(
             f"{manifest.name!r} is a {manifest.kind}, not a text-to-motion generator", where=str(bundle.path)
         )
-    frames = manifest.parameters
-    return Offer(
-        bundle,
-        resolve(manifest.text, config=config),
-        float(frames["min_frames"]) / manifest.fps,
-        float(frames["max_frames"]) / manifest.fps,
-    )
+    low, high = seconds_of(bundle)
+    return Offer(bundle, resolve(manifest.text, config=config), low, high)
+
+
+def seconds_of(bundle: Bundle) -> tuple[float, float]:
+    """The shortest and longest motion a generator makes."""
+    manifest = bundle.manifest
+    fps = manifest.fps or 20.0
+    return float(manifest.parameters["min_frames"]) / fps, float(manifest.parameters["max_frames"]) / fps
+
+
+def check_seconds(bundle: Bundle, seconds: float | None) -> None:
+    """Nothing, if the model can make a motion of that length.
+
+    Raises:
+        InvalidInput: it cannot.
+    """
+    low, high = seconds_of(bundle)
+    if seconds is not None and not low <= seconds <= high:
+        name = bundle.manifest.name
+        raise InvalidInput(f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {name}")

@@ -152,7 +152,7 @@ def prepare_data(
         for name, path in sources
     ]
     manifest = build(packs, output, progress=lambda done, total: progress("building", done, total))
-    return ", ".join(f"{split} {count} clips" for split, count in manifest.counts.items())
+    return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
 
 
 def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:

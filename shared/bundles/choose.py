@@ -28,7 +28,7 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
         known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))
         raise NotFound(
             f"there is no model or bundle named {name!r}",
-            hint=f"Known here: {known or 'none'}. `marey models list` shows them.",
+            hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder.",
         )
     chosen = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name))
     return find_bundle(chosen.manifest.name, config=config, verify=verify)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from services.cli import console, options, rows
 from services.cli.commands.submit import read_prompts
 from services.cli.names import Naming, check_template, file_name, slug
-from shared.errors import Conflict, InvalidInput
-from shared.items import MAX_SEED, Item
+from shared.errors import Conflict, InvalidBundle, InvalidInput
+from shared.items import MAX_SEED, InvalidItems, Item, Problem
 
 if TYPE_CHECKING:
     from services.cli.roles import Wanted
@@ -60,6 +60,7 @@ def generate(
         raise needs_extra("worker", error) from error
     config = settings()
     chosen = choose_bundle(bundle or _one_model(items), config=config)
+    _check(items, chosen)
     planned = _plan(items, chosen)
     kinds = [f.value for f in formats or options.FileFormat]
     check_folder(output)
@@ -77,6 +78,32 @@ def generate(
             else:
                 for path in line["files"].values():
                     console.result(console.home_relative(path))
+
+
+def _check(items: Iterable[Item], bundle: Bundle) -> None:
+    """What can be told before seconds of loading.
+
+    Raises:
+        InvalidBundle: not a bundle of a model that runs here.
+        InvalidItems: a length it cannot make.
+    """
+    from services.api.catalogue import check_seconds
+    from services.cli.roles import GENERATORS
+
+    if bundle.manifest.model not in GENERATORS:
+        raise InvalidBundle(
+            f"is a bundle of {bundle.manifest.model!r}, which does not run here",
+            where=str(bundle.path),
+            hint=f"Models that do: {', '.join(sorted(GENERATORS))}.",
+        )
+    problems: list[Problem] = []
+    for line, item in enumerate(items, 1):
+        try:
+            check_seconds(bundle, item.seconds)
+        except InvalidInput as error:
+            problems.append(Problem(line, "seconds", error.message))
+    if problems:
+        raise InvalidItems(problems)
 
 
 def _one_model(items: Iterable[Item]) -> str:

@@ -1,0 +1,85 @@
+"""`marey serve` as a whole: what it starts, what it starts again, and that nothing of it is left."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import psutil
+import pytest
+
+from shared.runtime.embedded import socket_folder
+from tests.support.marey import Marey, serving
+
+COUNT = 40
+
+
+def wait_for(what: Callable[[], object], seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def alone(models: Path, short_home: Path) -> Marey:
+    """The command line of a server that a test may break."""
+    return Marey(short_home, models)
+
+
+def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Marey) -> None:
+    with serving(alone) as server:
+        job = alone.submit(*[f"a person walks {n} steps" for n in range(COUNT)], "--seconds", 9)
+        with alone.client() as client:
+
+            def succeeded() -> int:
+                return client.get(f"/v1/jobs/{job}")["counters"]["succeeded"]
+
+            for kind in ("worker child", "scheduler", "api", "postgres", "valkey-server", "worker"):
+                children = server.children()
+                victim = children["worker"].children()[0] if kind == "worker child" else children[kind]
+                victim.kill()
+                wait_for(lambda kind=kind, old=victim.pid: _is_back(server.children, kind, old))
+            alone("jobs", "wait", job, "--timeout", 90, timeout=120).ok()
+            assert succeeded() == COUNT
+            motions = list(client.pages(f"/v1/jobs/{job}/motions"))
+            assert len({motion["item"] for motion in motions}) == len(motions) == COUNT
+        server.stop()
+        assert not (alone.home / "server.json").exists()
+
+
+def test_a_server_that_is_killed_leaves_no_process_and_can_be_started_again(alone: Marey) -> None:
+    with serving(alone) as server:
+        job = alone.submit("a person waves", "--seconds", 2)
+        family = psutil.Process(server.process.pid).children(recursive=True)
+        assert len(family) >= 6
+        os.kill(server.process.pid, signal.SIGKILL)
+        server.process.wait()
+        _, alive = psutil.wait_procs(family, timeout=45)
+        assert alive == []
+    alone("jobs", "list").refused(4, "does not answer")
+    with serving(alone):
+        assert alone("jobs", "wait", job, "--timeout", 60).code == 0
+
+
+def test_a_home_with_a_very_long_path_works(alone: Marey) -> None:
+    deep = replace(alone, home=alone.home.joinpath(*["a-rather-long-name"] * 6))
+    deep.home.parent.mkdir(parents=True)
+    with serving(deep) as server:
+        assert deep("jobs", "list").ok().out == ""
+        server.stop()
+    for leftover in socket_folder(deep.home).glob("*.sock"):
+        leftover.unlink()
+
+
+def _is_back(children: Callable[[], dict[str, psutil.Process]], kind: str, old: int) -> bool:
+    """Whether another process does what the killed one did."""
+    now = children()
+    if kind != "worker child":
+        return kind in now and now[kind].pid != old
+    found = now["worker"].children() if "worker" in now else []
+    return any(child.pid != old for child in found)

@@ -1,0 +1,169 @@
+"""`marey` as a person runs it: a subprocess, its exit code, and what it says."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from services.cli.client import Client
+from services.cli.place import read_server
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+COMMAND = (sys.executable, "-m", "services.cli")
+START_SECONDS = 90.0
+TINY = "hgm3-tiny"
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a command did."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def lines(self) -> list[dict[str, Any]]:
+        """stdout as JSON lines."""
+        return [json.loads(line) for line in self.out.splitlines()]
+
+    def ok(self) -> Ran:
+        """Itself, if it succeeded."""
+        assert self.code == 0, f"exit {self.code}\n{self.out}\n{self.err}"
+        return self
+
+    def refused(self, code: int, *said: str) -> Ran:
+        """Itself, if it ended with `code`, a message that holds all of `said`, and no traceback."""
+        assert self.code == code, f"exit {self.code}, not {code}\n{self.out}\n{self.err}"
+        assert "Traceback" not in self.err, self.err
+        for part in said:
+            assert part in self.err, f"{part!r} is not in:\n{self.err}"
+        return self
+
+
+@dataclass(frozen=True)
+class Marey:
+    """The command line with a home and models of its own."""
+
+    home: Path
+    models: Path
+    environment: dict[str, str] = field(default_factory=dict[str, str])
+
+    def environ(self) -> dict[str, str]:
+        """The environment of a command: nothing of the caller's own Marey settings."""
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
+        own = {"MAREY_HOME": str(self.home), "MAREY_MODELS": str(self.models), "OMP_NUM_THREADS": "1"}
+        return {**kept, **own, **self.environment}
+
+    def __call__(
+        self, *arguments: object, stdin: str | bytes = b"", cwd: Path = REPOSITORY, timeout: float = 120
+    ) -> Ran:
+        """Run a command to its end."""
+        done = subprocess.run(
+            [*COMMAND, *map(str, arguments)],
+            input=stdin.encode() if isinstance(stdin, str) else stdin,
+            capture_output=True,
+            cwd=REPOSITORY,
+            env=self.environ(),
+            timeout=timeout,
+            check=False,
+        )
+        return Ran(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+    def start(self, *arguments: object) -> subprocess.Popen[bytes]:
+        """Start a command and do not wait for it; what it says is thrown away."""
+        return subprocess.Popen(
+            [*COMMAND, *map(str, arguments)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd=REPOSITORY,
+            env=self.environ(),
+        )
+
+    def submit(self, *arguments: object, stdin: str = "") -> str:
+        """Submit and give the job's id."""
+        return self("submit", *arguments, stdin=stdin).ok().out.strip()
+
+    def jobs(self) -> list[dict[str, Any]]:
+        """Jobs on the server."""
+        with self.client() as client:
+            return list(client.pages("/v1/jobs", limit=1000))
+
+    def client(self) -> Client:
+        """The HTTP client on this home's server: asking it costs no new process."""
+        server = read_server(self.home)
+        assert server is not None
+        return Client(server)
+
+
+@dataclass(frozen=True)
+class Serving:
+    """A running `marey serve`."""
+
+    process: subprocess.Popen[bytes]
+    log: Path
+
+    def children(self) -> dict[str, psutil.Process]:
+        """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`."""
+        return {_role(child): child for child in psutil.Process(self.process.pid).children()}
+
+    def stop(self) -> None:
+        """SIGTERM, and wait."""
+        self.process.send_signal(signal.SIGTERM)
+        assert self.process.wait(60) == 0, self.log.read_text()
+
+
+@contextlib.contextmanager
+def serving(marey: Marey) -> Iterator[Serving]:
+    """`marey serve` on any free port, ready, until the end of the block."""
+    log = marey.home.with_name(marey.home.name + ".log")
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            [*COMMAND, "serve", "--port", "0"], stdout=output, stderr=output, cwd=REPOSITORY, env=marey.environ()
+        )
+    try:
+        deadline = time.monotonic() + START_SECONDS
+        while "Ready." not in log.read_text():
+            assert process.poll() is None, log.read_text()
+            assert time.monotonic() < deadline, log.read_text()
+            time.sleep(0.1)
+        yield Serving(process, log)
+    finally:
+        process.terminate()
+        process.wait(60)
+
+
+def tiny_models(folder: Path) -> Path:
+    """A folder of models: HGM³ with random weights, and the labeller that comes with the product."""
+    from workers.hgm3.bundle import random_bundle
+
+    random_bundle(folder / TINY)
+    labeller = REPOSITORY / "models" / "srl-light"
+    if labeller.exists():
+        shutil.copytree(labeller, folder / "srl-light")
+    else:
+        path = folder / TINY / "manifest.json"
+        manifest = json.loads(path.read_text())
+        manifest["text"]["labeller"] = "none"
+        path.write_text(json.dumps(manifest))
+    return folder
+
+
+def _role(process: psutil.Process) -> str:
+    command = process.cmdline()
+    if "services.cli" in command:
+        return command[command.index("services.cli") + 1]
+    return Path(command[0]).name if command else process.name()
