@@ -141,6 +141,10 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
         networks = Networks.build(config)
         networks.tokenizer.quantizer.codebooks.normal_()
         networks.tokenizer.quantizer.initialized.fill_(True)
+        with torch.no_grad():  # transformers start near zero; louder, so that prompts make a difference
+            for name in ("masked", "predictor", "residual"):
+                for parameter in getattr(networks, name).parameters():
+                    parameter.mul_(4.0 if parameter.dim() > 1 else 1.0)
         parts = {name: network.state_dict() for name, network in networks.parts().items()}
     finally:
         torch.set_rng_state(generator_state)

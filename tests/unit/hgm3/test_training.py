@@ -141,7 +141,7 @@ def test_gradient_of_the_predictor_never_reaches_the_graph(prepared: PreparedDat
     stage = masked_stage(prepared)
     sample = next(iter([stage.sample(stage.pairs.draw(np.random.default_rng(0), 4), np.random.default_rng(0))]))
     stage.module.zero_grad()
-    losses, masked, _, ranking = stage._piece(sample, 0.0)
+    _losses, _masked, _, ranking = stage._piece(sample, 0.0)
     ranking.sum().backward()
     assert all(p.grad is None for p in stage.module.masked.parameters())
     assert any(p.grad is not None for p in stage.module.predictor.parameters())

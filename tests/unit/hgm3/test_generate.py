@@ -1,0 +1,185 @@
+"""Decoding: the same tokens in any batch, with every saving, and nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from shared.errors import InvalidBundle, InvalidInput
+from workers.hgm3.bundle import random_bundle
+from workers.hgm3.config import InferenceConfig
+from workers.hgm3.decoding import condition_level
+from workers.hgm3.generate import Generated, Generator, Request, Settings
+from workers.hgm3.model import ACTION, MOTION, SPECIFIC
+
+from .conftest import text_features
+
+COUNT = 32
+
+
+def requests() -> list[Request]:
+    """Mixed lengths, with and without actions, some with open lengths."""
+    return [
+        Request(text_features(i, i % 4, i % 6), 1000 + i, None if i % 5 == 4 else 20 + 17 * (i % 10))
+        for i in range(COUNT)
+    ]
+
+
+def equal(a: list[Generated | None], b: list[Generated | None]) -> bool:
+    return all(
+        x is not None
+        and y is not None
+        and np.array_equal(x.tokens, y.tokens)
+        and np.array_equal(x.features, y.features)
+        for x, y in zip(a, b, strict=True)
+    )
+
+
+@pytest.fixture(scope="module")
+def reference(generator: Generator) -> list[Generated | None]:
+    return generator.generate(requests())
+
+
+def test_motions_are_equal_in_batches_of_1_3_and_32(generator: Generator, reference: list[Generated | None]) -> None:
+    for size in (1, 3):
+        parts = [generator.generate(requests()[i : i + size]) for i in range(0, COUNT, size)]
+        assert equal(reference, [made for part in parts for made in part])
+
+
+def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: list[Generated | None]) -> None:
+    order = np.random.default_rng(0).permutation(COUNT)
+    shuffled = generator.generate([requests()[i] for i in order])
+    assert equal([reference[i] for i in order], shuffled)
+
+
+def test_tokens_are_equal_in_any_batch_with_bfloat16_matrices(generator: Generator) -> None:
+    lowered = Generator.load(generator.bundle, device="cpu", dtype=torch.bfloat16)
+    together = lowered.generate(requests())
+    alone = [lowered.generate([r])[0] for r in requests()]
+    assert equal(together, alone)
+
+
+@pytest.mark.parametrize("plain", [Settings(skip_idle=False), Settings(trim_slots=False)])
+def test_savings_change_nothing(generator: Generator, reference: list[Generated | None], plain: Settings) -> None:
+    assert equal(reference, generator.generate(requests(), plain))
+
+
+def test_min_progress_and_flat_conditions_are_other_ways_to_decode(
+    generator: Generator, reference: list[Generated | None]
+) -> None:
+    for settings in (Settings(min_progress=True), Settings(flat=True)):
+        assert not equal(reference, generator.generate(requests(), settings))
+
+
+def test_each_token_is_decided_once_and_counted_by_its_condition(generator: Generator) -> None:
+    (plain,) = generator.generate([Request(text_features(0), 1, 196)])
+    (flat,) = generator.generate([Request(text_features(0), 1, 196)], Settings(flat=True))
+    assert plain is not None
+    assert flat is not None
+    assert plain.decided == (2, 12, 35)  # 49 tokens: 49 → 47 by C^m, → 35 with actions, → 0 with specifics
+    assert flat.decided == (0, 0, 49)
+
+
+def test_seed_text_and_length_each_change_the_motion(generator: Generator) -> None:
+    base = Request(text_features(0), 1, 80)
+    others = [Request(text_features(0), 2, 80), Request(text_features(9), 1, 80), Request(text_features(0), 1, 84)]
+    made = generator.generate([base, *others])
+    assert made[0] is not None
+    for other in made[1:]:
+        assert other is not None
+        assert not np.array_equal(made[0].tokens, other.tokens)
+
+
+def test_features_have_the_frames_asked_for(generator: Generator) -> None:
+    for frames in (16, 30, 33, 196):
+        (made,) = generator.generate([Request(text_features(0), 1, frames)])
+        assert made is not None
+        assert made.features.shape == (frames, 263)
+        assert made.tokens.shape == (3, -(-frames // 4))
+        assert ((made.tokens >= 0) & (made.tokens < 32)).all()
+        assert np.isfinite(made.features).all()
+
+
+def test_an_open_length_is_drawn_with_the_seed_and_stays_in_range(generator: Generator) -> None:
+    asked = [Request(text_features(0), seed) for seed in range(40)]
+    frames = generator.frames(asked)
+    assert frames == generator.frames(asked)
+    assert len(set(frames)) > 5
+    assert all(16 <= f <= 196 for f in frames)
+
+
+@pytest.mark.parametrize("frames", [2, 15, 197, 20_000])
+def test_lengths_out_of_range_are_refused(generator: Generator, frames: int) -> None:
+    with pytest.raises(InvalidInput, match=r"0\.8 to 9\.8 seconds"):
+        generator.generate([Request(text_features(0), 1, frames)])
+
+
+@pytest.mark.parametrize("seed", [-1, 2**31])
+def test_seeds_out_of_range_are_refused(generator: Generator, seed: int) -> None:
+    with pytest.raises(InvalidInput, match="must lie between"):
+        generator.generate([Request(text_features(0), seed, 40)])
+
+
+@pytest.mark.parametrize(
+    "settings", [Settings(steps=0), Settings(top_k=0.0), Settings(guidance=-1.0), Settings(temperature=1000.0)]
+)
+def test_settings_out_of_range_are_refused(generator: Generator, settings: Settings) -> None:
+    with pytest.raises(InvalidInput, match="must lie"):
+        generator.generate([Request(text_features(0), 1, 40)], settings)
+
+
+def test_features_of_another_encoder_are_refused(generator: Generator) -> None:
+    with pytest.raises(InvalidInput, match="512 wide, this bundle reads 384"):
+        generator.generate([Request(text_features(0, width=512), 1, 40)])
+
+
+class Dropper:
+    """Drops request 1 after three steps."""
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[int, int]] = []
+
+    def progress(self, done: int, total: int) -> None:
+        self.steps.append((done, total))
+
+    def dropped(self) -> set[int]:
+        return {1} if len(self.steps) >= 3 else set()
+
+
+def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(generator: Generator) -> None:
+    asked = [Request(text_features(i), i, 60) for i in range(3)]
+    whole = generator.generate(asked)
+    control = Dropper()
+    made = generator.generate(asked, control=control)
+    assert made[1] is None
+    assert equal([whole[0], whole[2]], [made[0], made[2]])
+    assert control.steps[-1][0] == control.steps[-1][1]
+
+
+def test_conditions_follow_equation_14() -> None:
+    config = InferenceConfig()
+    levels = [condition_level(step, config) for step in range(1, 11)]
+    assert levels == [MOTION] * 2 + [ACTION] * 3 + [SPECIFIC] * 5
+    assert {condition_level(step, config, flat=True) for step in range(1, 11)} == {SPECIFIC}
+
+
+def test_other_numbers_of_steps_keep_the_shares_of_the_conditions() -> None:
+    config = Settings(steps=20).inference(InferenceConfig())
+    assert (config.steps, config.motion_steps, config.action_steps) == (20, 4, 10)
+
+
+def test_the_same_seed_gives_the_same_random_bundle(tmp_path: Path) -> None:
+    a, b, c = (random_bundle(tmp_path / name, seed=seed) for name, seed in (("a", 0), ("b", 0), ("c", 1)))
+    assert a.manifest.random
+    assert a.weights_sha256 == b.weights_sha256 != c.weights_sha256
+
+
+def test_a_bundle_whose_tensors_do_not_fit_is_refused(tmp_path: Path) -> None:
+    bundle = random_bundle(tmp_path / "a")
+    parameters = dict(bundle.manifest.parameters) | {"max_frames": 100}
+    bundle.manifest = bundle.manifest.model_copy(update={"parameters": parameters})
+    with pytest.raises(InvalidBundle, match="do not fit"):
+        Generator.load(bundle, device="cpu")

@@ -1,0 +1,293 @@
+"""The networks: graph attention by hand, conditions, slots, tokenizer masks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from shared.motion.features import HUMANML3D_263
+from workers.hgm3.conditions import graph_batch
+from workers.hgm3.config import PAPER, STARTER, TINY, named_config
+from workers.hgm3.data import CaptionData
+from workers.hgm3.joints import heading_joints, world_joints
+from workers.hgm3.model import (
+    ACTION,
+    MOTION,
+    SPECIFIC,
+    Condition,
+    GraphAttention,
+    LossPredictor,
+    MaskedTransformer,
+    ResidualTransformer,
+)
+from workers.hgm3.tokenizer import Tokenizer, biased_std, tokenizer_loss
+
+from .conftest import made_up_texts, swinging, text_features
+
+CPU = torch.device("cpu")
+
+
+def leaky(x: float) -> float:
+    return x if x > 0 else 0.2 * x
+
+
+def elu(x: float) -> float:
+    return x if x > 0 else math.exp(x) - 1
+
+
+def test_graph_attention_equals_equations_9_to_11_by_hand() -> None:
+    torch.manual_seed(0)
+    layer = GraphAttention(2, 0.0).eval().requires_grad_(False)
+    nodes = torch.randn(1, 3, 2)
+    # motion 0 – action 1 (type 11), action 1 – specific 2 (type 3), self-loops
+    adjacency = torch.tensor([[[11, 11, -1], [11, 10, 3], [-1, 3, 10]]])
+    found = layer(nodes, adjacency)
+    w = layer.project.weight
+    h = [(w @ nodes[0, i]).tolist() for i in range(3)]
+    source, target = layer.source.weight.tolist(), layer.target.weight.tolist()
+
+    def product(row: int, i: int, j: int) -> float:
+        return sum(source[row][d] * h[i][d] + target[row][d] * h[j][d] for d in range(2))
+
+    for i in range(3):
+        logits = {
+            j: leaky(product(0, i, j)) + leaky(product(1 + int(adjacency[0, i, j]), i, j))
+            for j in range(3)
+            if adjacency[0, i, j] >= 0
+        }
+        total = sum(math.exp(v) for v in logits.values())
+        for d in range(2):
+            mixed = sum(math.exp(v) / total * h[j][d] for j, v in logits.items())
+            assert float(found[0, i, d]) == pytest.approx(elu(mixed) + float(nodes[0, i, d]), abs=1e-5)
+
+
+def test_attention_sums_to_one_over_neighbours_and_ignores_others() -> None:
+    torch.manual_seed(0)
+    layer = GraphAttention(4, 0.0).eval()
+    adjacency = torch.tensor([[[11, 11, -1], [11, 10, -1], [-1, -1, -1]]])
+    attention = layer.attention(torch.randn(1, 3, 4), adjacency)
+    torch.testing.assert_close(attention[0].sum(-1), torch.tensor([1.0, 1.0, 0.0]))
+    assert attention[0, 0, 2] == 0
+
+
+def test_the_type_of_an_edge_matters() -> None:
+    torch.manual_seed(0)
+    layer = GraphAttention(4, 0.0).eval()
+    nodes = torch.randn(1, 2, 4)
+    a = layer(nodes, torch.tensor([[[11, 0], [0, 10]]]))
+    b = layer(nodes, torch.tensor([[[11, 4], [4, 10]]]))
+    assert not torch.allclose(a, b)
+
+
+def test_each_condition_reads_its_own_levels() -> None:
+    condition = Condition(replace(TINY.condition, max_actions=2, max_specifics=3), 8)
+    present = torch.tensor([[True, True, False, True, True, False]])
+    seen = [condition.visible(present, level)[0].tolist() for level in (MOTION, ACTION, SPECIFIC)]
+    assert seen[MOTION] == [True] + [False] * 5
+    assert seen[ACTION] == [True, True] + [False] * 4
+    assert seen[SPECIFIC] == [True, True, False, True, True, False]
+
+
+def test_the_null_condition_is_one_token_and_the_same_at_all_levels() -> None:
+    condition = Condition(TINY.condition, 8)
+    torch.nn.init.normal_(condition.null)
+    present = torch.ones(1, 25, dtype=torch.bool)
+    dropped = torch.tensor([True])
+    tokens = condition(torch.randn(1, 25, 384), dropped)
+    assert torch.equal(tokens[0, 0], condition.null)
+    for level in (MOTION, ACTION, SPECIFIC):
+        assert condition.visible(present, level, dropped)[0].tolist() == [True] + [False] * 24
+
+
+@pytest.mark.parametrize("name", ["masked", "predictor"])
+@torch.inference_mode()
+def test_a_prompt_without_actions_gives_no_nan_at_any_level(name: str) -> None:
+    torch.manual_seed(0)
+    graphs = graph_batch([text_features(0, 0), text_features(1, 3, 4)], TINY.condition, CPU)
+    masked = MaskedTransformer(TINY).eval()
+    model = masked if name == "masked" else LossPredictor(TINY).eval()
+    nodes = masked.text(graphs)
+    valid = torch.arange(8)[None] < torch.tensor([[8], [3]])
+    for level in (MOTION, ACTION, SPECIFIC):
+        visible = model.condition.visible(graphs.present, level)
+        output = model(torch.zeros(2, 8, dtype=torch.long), valid, model.condition(nodes), visible)
+        assert torch.isfinite(output[valid]).all()
+
+
+@torch.inference_mode()
+def test_absent_slots_and_tokens_beyond_the_clip_are_never_read() -> None:
+    torch.manual_seed(0)
+    model = MaskedTransformer(TINY).eval()
+    valid = torch.arange(8)[None] < torch.tensor([[5]])
+    visible = torch.zeros(1, 25, dtype=torch.bool)
+    visible[0, [0, 1, 9]] = True
+    tokens, condition = torch.randint(32, (1, 8)), torch.randn(1, 25, 32)
+    first = model(tokens, valid, condition, visible)[0, :5]
+    condition[~visible] = 1000.0
+    tokens[~valid] = 7
+    assert torch.equal(model(tokens, valid, condition, visible)[0, :5], first)
+    assert torch.equal(model(tokens, valid, condition, visible, trim=False)[0, :5], first)
+    condition[0, 9] += 1.0
+    assert not torch.equal(model(tokens, valid, condition, visible)[0, :5], first)
+
+
+@torch.inference_mode()
+def test_a_slot_keeps_its_position_whatever_else_is_absent() -> None:
+    torch.manual_seed(0)
+    model = MaskedTransformer(TINY).eval()
+    condition = torch.randn(1, 25, 32)
+    condition[0, 2] = condition[0, 1]
+    valid, tokens = torch.ones(1, 4, dtype=torch.bool), torch.zeros(1, 4, dtype=torch.long)
+    outputs = []
+    for slot in (1, 2):
+        visible = torch.zeros(1, 25, dtype=torch.bool)
+        visible[0, [0, slot]] = True
+        outputs.append(model(tokens, valid, condition, visible))
+    assert not torch.allclose(outputs[0], outputs[1])
+
+
+def test_residual_inputs_are_sums_of_lower_levels_and_nothing_above() -> None:
+    torch.manual_seed(0)
+    model = ResidualTransformer(TINY).eval()
+    model.set_codebooks(torch.randn(3, 32, 16))
+    tokens = torch.randint(32, (1, 4, 3))
+    expected = sum(model.codebooks[v][tokens[..., v]] * model.code_std[v] / model.code_std[0] for v in (0, 1))
+    torch.testing.assert_close(model.embed(tokens[..., 0], 0) + model.embed(tokens[..., 1], 1), expected)
+
+
+@pytest.mark.parametrize("compact", [True, False])
+@torch.inference_mode()
+def test_the_residual_transformer_predicts_each_samples_own_level(compact: bool) -> None:
+    torch.manual_seed(0)
+    model = ResidualTransformer(replace(TINY, compact=compact)).eval()
+    model.set_codebooks(torch.randn(3, 32, 16))
+    total = torch.randn(1, 8, 16 if compact else 32).repeat(2, 1, 1)
+    valid = torch.ones(2, 8, dtype=torch.bool)
+    sentence = model.sentence(torch.randn(1, 384)).repeat(2, 1)
+    both = model(total, valid, torch.tensor([1, 2]), sentence)
+    assert both.shape == (2, 8, 32)
+    torch.testing.assert_close(both[1:], model(total[:1], valid[:1], torch.tensor([2]), sentence[:1]))
+    assert not torch.allclose(both[0], both[1])
+
+
+def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
+    texts = made_up_texts(12)
+    data = CaptionData.load(texts, TINY.condition, CPU)
+    from .conftest import graph
+
+    for k in range(12):
+        g = graph(k % 4, (k % 4 > 0) * (k % 5))
+        slots = g.slots(8, 16)
+        strings = [-1 if s < 0 else int(texts.node_string[texts.node_start[k] + s]) for s in slots]
+        assert data.slots[k].tolist() == strings
+        found = data.graphs(torch.tensor([k])).adjacency[0]
+        assert found.tolist() == g.adjacency(8, 16).tolist()
+
+
+def test_text_statistics_weigh_a_string_by_how_often_it_occurs() -> None:
+    texts = made_up_texts(12)
+    data = CaptionData.load(texts, TINY.condition, CPU)
+    mean, std = data.statistics(range(6), TINY.condition)
+    rows = texts.strings[texts.node_string[texts.node_level == 1]].astype("f8")
+    torch.testing.assert_close(mean[ACTION], torch.from_numpy(rows.mean(0)).float(), atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(std[ACTION], torch.from_numpy(rows.std(0)).float().clamp(min=1e-4), atol=1e-5, rtol=1e-4)
+
+
+# ---- tokenizer
+
+
+def tokenizer() -> Tokenizer:
+    torch.manual_seed(0)
+    model = Tokenizer(TINY).eval()
+    model.quantizer.codebooks.normal_()
+    return model
+
+
+@torch.inference_mode()
+def test_nothing_beyond_a_clips_own_length_leaks_into_it() -> None:
+    model = tokenizer()
+    features = torch.randn(1, 48, 263)
+    other = features.clone()
+    other[0, 20:] = 1000.0
+    lengths = torch.tensor([20])
+    tokens = model.encode(features, lengths)
+    assert torch.equal(tokens, model.encode(other, lengths))
+    assert (tokens[0, 5:] == -1).all()
+    torch.testing.assert_close(tokens[:, :5], model.encode(features[:, :20]))
+
+
+@torch.inference_mode()
+def test_a_padded_clip_decodes_as_it_does_alone_and_is_zero_beyond() -> None:
+    model = tokenizer()
+    model.set_statistics(torch.randn(263), torch.rand(263) + 0.5)
+    tokens = torch.randint(32, (1, 12, 3))
+    alone = model.decode(tokens[:, :5])
+    padded = model.decode(tokens, torch.tensor([5]))
+    torch.testing.assert_close(padded[:, :20], alone, atol=1e-5, rtol=1e-5)
+    assert not padded[:, 20:].any()
+
+
+def test_the_loss_ignores_frames_beyond_the_clip() -> None:
+    model = tokenizer()
+    features = torch.randn(1, 48, 263)
+    other = features.clone()
+    other[0, 20:] = 1000.0
+    lengths = torch.tensor([20])
+    first, _ = tokenizer_loss(model, TINY, features, lengths)
+    second, _ = tokenizer_loss(model, TINY, other, lengths)
+    torch.testing.assert_close(first.total, second.total)
+
+
+def test_the_term_in_space_rises_over_the_first_half_of_the_budget() -> None:
+    model = tokenizer()
+    features = torch.randn(2, 16, 263)
+    totals = [float(tokenizer_loss(model, TINY, features, None, f)[0].total.detach()) for f in (0.0, 0.25, 0.5, 1.0)]
+    assert totals[0] < totals[1] < totals[2]
+    assert totals[2] == totals[3]
+
+
+def test_joints_in_torch_equal_the_layouts_own_decoding() -> None:
+    features = HUMANML3D_263.encode(swinging(50, 3))
+    features[:, 0] += 0.02  # turning
+    batch = torch.from_numpy(features)[None]
+    torch.testing.assert_close(
+        world_joints(batch, 22)[0], torch.from_numpy(HUMANML3D_263.decode(features)), atol=1e-4, rtol=1e-4
+    )
+    local = heading_joints(batch, 22)
+    assert float(local[0, :, 0, [0, 2]].abs().max()) == 0
+
+
+def test_the_bias_weighs_root_and_contacts_only() -> None:
+    scaled = biased_std(torch.ones(263), 5.0)
+    assert scaled[:4].tolist() == pytest.approx([0.2] * 4)
+    assert scaled[-4:].tolist() == pytest.approx([0.2] * 4)
+    assert (scaled[4:-4] == 1).all()
+
+
+def test_paper_sizes_are_the_published_ones() -> None:
+    t = PAPER.tokenizer
+    assert (t.levels, t.codes, t.code_width, t.frames_per_token) == (6, 512, 512, 4)
+    for c in (PAPER.masked, PAPER.predictor, PAPER.residual):
+        assert (c.layers, c.heads, c.width, c.feedforward, c.dropout) == (6, 6, 384, 1024, 0.2)
+    assert (PAPER.condition.max_actions, PAPER.condition.max_specifics) == (4, 8)
+    i = PAPER.inference
+    assert (i.steps, i.motion_steps, i.action_steps, i.guidance, i.top_k, i.residual_guidance) == (10, 2, 5, 4, 0.1, 5)
+    assert PAPER.max_tokens == 49
+
+
+def test_the_starter_bundle_fits_in_16_megabytes() -> None:
+    from workers.hgm3.bundle import NOT_STORED, Networks
+
+    networks = Networks.build(STARTER).parts()
+    stored = [v for n in networks.values() for k, v in n.state_dict().items() if k not in NOT_STORED]
+    assert sum(2 * v.numel() for v in stored) < 16e6
+
+
+def test_every_configuration_builds() -> None:
+    from workers.hgm3.bundle import Networks
+
+    for name in ("starter", "tiny"):
+        Networks.build(named_config(name))

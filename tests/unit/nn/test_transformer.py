@@ -1,0 +1,102 @@
+"""Transformer blocks, averages of weights."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+import torch
+from torch import nn
+
+from shared.nn.ema import WeightAverage, update_average, warm_momentum
+from shared.nn.transformer import Transformer, pad_length, sinusoidal_positions
+
+
+def transformer(*, norm_first: bool = True) -> Transformer:
+    torch.manual_seed(0)
+    return Transformer(2, 32, 4, 64, 0.1, norm_first=norm_first).eval()
+
+
+@pytest.mark.parametrize("norm_first", [True, False])
+@torch.inference_mode()
+def test_what_may_not_be_read_changes_nothing(norm_first: bool) -> None:
+    model = transformer(norm_first=norm_first)
+    x = torch.randn(2, 16, 32)
+    valid = torch.arange(16)[None] < torch.tensor([[5], [16]])
+    other = x.clone()
+    other[0, 5:] = 100.0
+    assert torch.equal(model(x, valid)[0, :5], model(other, valid)[0, :5])
+
+
+@torch.inference_mode()
+def test_more_padding_and_another_batch_change_no_bit() -> None:
+    model = transformer()
+    x = torch.randn(3, 48, 32)
+    valid = torch.arange(48)[None] < torch.tensor([[7], [16], [13]])
+    whole = model(x, valid)
+    cut = model(x[:, :16], valid[:, :16])
+    alone = model(x[2:, :32], valid[2:, :32])
+    for row, size in enumerate((7, 16, 13)):
+        assert torch.equal(whole[row, :size], cut[row, :size])
+    assert torch.equal(whole[2, :13], alone[0, :13])
+
+
+@torch.inference_mode()
+def test_post_norm_equals_the_reference_encoder_layer_of_torch() -> None:
+    model = transformer(norm_first=False)
+    x = torch.randn(2, 9, 32)
+    valid = torch.arange(9)[None] < torch.tensor([[9], [6]])
+    expected = x
+    for block in model.blocks:
+        layer = nn.TransformerEncoderLayer(32, 4, 64, 0.1, "gelu", batch_first=True).eval()
+        layer.self_attn.in_proj_weight.copy_(block.attention.qkv.weight)
+        layer.self_attn.in_proj_bias.copy_(block.attention.qkv.bias)
+        layer.self_attn.out_proj.load_state_dict(block.attention.out.state_dict())
+        layer.linear1.load_state_dict(block.wide.state_dict())
+        layer.linear2.load_state_dict(block.narrow.state_dict())
+        layer.norm1.load_state_dict(block.norm1.state_dict())
+        layer.norm2.load_state_dict(block.norm2.state_dict())
+        expected = layer(expected, src_key_padding_mask=~valid)
+    found = model(x, valid)
+    torch.testing.assert_close(found[0], expected[0], atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(found[1, :6], expected[1, :6], atol=1e-5, rtol=1e-5)
+
+
+def test_positions_are_sines_and_cosines() -> None:
+    table = sinusoidal_positions(10, 8)
+    assert table.shape == (10, 8)
+    assert float(table[3, 0]) == pytest.approx(math.sin(3))
+    assert float(table[3, 1]) == pytest.approx(math.cos(3))
+    assert float(table[3, 4]) == pytest.approx(math.sin(3 / 10000 ** (4 / 8)))
+
+
+def test_pad_length_is_the_next_multiple_of_16() -> None:
+    assert [pad_length(n) for n in (1, 16, 17, 62)] == [16, 16, 32, 64]
+
+
+def test_momentum_starts_low() -> None:
+    assert warm_momentum(0.999, 0) == 0.1
+    assert warm_momentum(0.999, 90) == pytest.approx(0.91)
+    assert warm_momentum(0.999, 10**6) == 0.999
+
+
+def test_an_average_moves_by_its_momentum_and_copies_buffers() -> None:
+    average, source = nn.BatchNorm1d(3), nn.BatchNorm1d(3)
+    source.weight.data.fill_(3.0)
+    source.running_mean.fill_(7.0)
+    update_average(average, source, 0.75)
+    assert average.weight.tolist() == [1.5] * 3
+    assert average.running_mean.tolist() == [7.0] * 3
+
+
+def test_averaged_weights_are_swapped_in_and_out() -> None:
+    model = nn.Linear(2, 1)
+    average = WeightAverage(model, 0.5)
+    before = model.weight.detach().clone()
+    model.weight.data.add_(1.0)
+    average.update(10**6)
+    with average.applied():
+        torch.testing.assert_close(model.weight, before + 0.5)
+    torch.testing.assert_close(model.weight, before + 1.0)
+    average.assign()
+    torch.testing.assert_close(model.weight, before + 0.5)
