@@ -91,7 +91,7 @@ def write_prepared(folder: Path, clips: int = 18) -> Path:
     np.save(folder / names.ROOTS, np.zeros((len(whole) + clips, 3), np.float32))
     np.savez(folder / names.STATISTICS, mean=whole.mean(0), std=std)
     files = {n: FileEntry(sha256=sha256_of(folder / n), bytes=(folder / n).stat().st_size) for n in names.FILES}
-    source = dict(name="synthetic", title="-", licence="MIT", credit="-", url="-")
+    source = {"name": "synthetic", "title": "-", "licence": "MIT", "credit": "-", "url": "-"}
     manifest = Manifest(
         format=names.FORMAT, sources=(source,), layout="humanml3d-263", facing_sigma=20, fps=20, skeleton="humanml3d",
         dim=263, frames=len(whole), clips=clips, splits={}, lengths={}, kinds={}, captions=2, left_out={},
