@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from shared.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
 from shared.motion.files import write_atomically
 from shared.motion.kinematics import forward_kinematics
 from shared.motion.rotations import Array
@@ -216,8 +215,9 @@ def _arrays(data: bytes, where: str) -> dict[str, NDArray[Any]]:
                     f"has no {', '.join(missing)}", where=where, hint="It is no motion that Marey wrote, or an old one."
                 )
             return {key: file[key] for key in KEYS}
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RuntimeError, MemoryError):
-        raise InvalidFile("is no npz file, or a broken one", where=where) from None
-    except (ValueError, OSError) as error:
-        reason = "holds pickled objects, which are never loaded" if "allow_pickle" in str(error) else "is broken"
+    except MareyError:
+        raise
+    except Exception as error:  # a crafted zip or header makes zipfile and numpy raise nearly anything
+        pickled = "allow_pickle" in str(error)
+        reason = "holds pickled objects, which are never loaded" if pickled else "is no npz file, or a broken one"
         raise InvalidFile(reason, where=where) from None

@@ -42,6 +42,7 @@ RULE = ContactRule()
 LONG_SWING = 0.8  # seconds; over a longer one the correction is taken back to zero in between
 RELEASE = 0.35  # seconds that this takes
 FLOOR_BAND = (0.0, 0.03)  # metres: a toe joint lies inside the foot, so it stands at up to 3 cm
+PRESS = 0.002  # metres that a foot may sink, so that touching the floor is no kick
 STILL = 0.015  # metres that an ankle, or a toe in height, may stray for noise; more is a heel or a foot that rolls
 
 
@@ -219,5 +220,5 @@ def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: 
 
 
 def _over_floor(height: Array) -> Array:
-    """Heights bent up smoothly so that none is below zero; 2 cm up it is a third of a millimetre, 5 cm up nothing."""
-    return 0.5 * (height + np.sqrt(height**2 + 0.005**2))
+    """Heights below zero pressed softly to at most `PRESS` below; those above stay as they are."""
+    return np.where(height < 0, PRESS * np.expm1(np.minimum(height, 0.0) / PRESS), height)

@@ -43,15 +43,16 @@ def test_any_joints_on_fixed_bones_come_back(skeleton):
     assert np.linalg.norm(pose.joints - clip.joints, axis=-1).max() < 1e-3
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(0, 1000))
-def test_rotations_of_pelvis_chest_and_bent_limbs_come_back(seed):
+@pytest.mark.parametrize("seed", range(5))
+def test_rotations_of_bodies_and_of_limbs_with_a_bend_come_back(seed):
     rotations, root = dancer(seed, 80)
-    pose = solve_pose(joints_of(rotations, root), HUMANML3D)
-    off = np.degrees(angle_between(pose.rotations, rotations))
-    for name in ("pelvis", "L_hip", "R_hip"):
-        assert off[:, HUMANML3D.index(name)].max() < 45, name
-        assert off[:, HUMANML3D.index(name)].mean() < 5, name
+    solved = solve_pose(joints_of(rotations, root), HUMANML3D).rotations
+    off = np.degrees(angle_between(solved, rotations))
+    assert off[:, HUMANML3D.index("pelvis")].max() < 0.01
+    for hip, knee in (("L_hip", "L_knee"), ("R_hip", "R_knee")):
+        bent = np.linalg.norm(to_rotvec(rotations[:, HUMANML3D.index(knee)]), axis=-1) > 0.6
+        assert off[bent, HUMANML3D.index(hip)].max() < 35
+        assert off[bent, HUMANML3D.index(hip)].mean() < 6
 
 
 def test_a_bent_knee_turns_about_its_hinge():

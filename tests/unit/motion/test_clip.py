@@ -1,0 +1,174 @@
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from shared.motion import clip as clips
+from shared.motion.clip import KEYS, MotionClip, load_npz, parse_npz
+from shared.motion.kinematics import forward_kinematics
+from shared.motion.skeleton import HUMANML3D, SNAPMOGEN
+from tests.support.exported import tumbling
+from tests.support.walker import walker
+
+
+def same(a: MotionClip, b: MotionClip) -> bool:
+    arrays = ("rotations", "root", "joints", "contacts", "features", "offsets")
+    return (
+        all(np.array_equal(getattr(a, n), getattr(b, n)) for n in arrays)
+        and (a.fps, a.features_fps, a.skeleton.joint_names) == (b.fps, b.features_fps, b.skeleton.joint_names)
+        and dict(a.manifest) == dict(b.manifest)
+    )
+
+
+@pytest.mark.parametrize("clip", [walker(prompt="é 🕺"), tumbling(SNAPMOGEN, 24000 / 1001)], ids=["walk", "tumble"])
+def test_a_clip_comes_back_from_its_file(clip, tmp_path):
+    clip.save_npz(tmp_path / "a.npz")
+    back = load_npz(tmp_path / "a.npz")
+    assert same(clip, back)
+    assert back.skeleton.feet == clip.skeleton.feet
+
+
+def test_the_file_is_the_contract(tmp_path):
+    clip = walker()
+    clip.save_npz(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as file:
+        assert sorted(file.files) == sorted(KEYS)
+        kinds = {key: (file[key].dtype.kind, file[key].dtype.itemsize, file[key].ndim) for key in KEYS}
+        assert kinds["joints"] == kinds["rotations"] == ("f", 4, 3)
+        assert kinds["root"] == kinds["offsets"] == kinds["features"] == ("f", 4, 2)
+        assert kinds["contacts"] == ("b", 1, 2)
+        assert kinds["fps"] == kinds["features_fps"] == ("f", 8, 0)
+        assert kinds["parents"][0] == "i"
+        assert kinds["names"][0] == kinds["manifest"][0] == "U"
+        assert json.loads(str(file["manifest"])) == {"prompt": "a person walks", "seed": 7}
+        joints = forward_kinematics(HUMANML3D, file["rotations"], file["root"])
+        np.testing.assert_allclose(joints, file["joints"], atol=1e-6)
+
+
+def test_equal_clips_give_equal_bytes():
+    assert walker().to_npz() == walker().to_npz()
+
+
+def test_seconds_and_frames():
+    clip = walker(seconds=3, fps=20)
+    assert (clip.frames, clip.seconds) == (61, 3.05)
+
+
+def changed(**arrays) -> bytes:
+    """A clip's file with some arrays replaced (None: left out)."""
+    with np.load(io.BytesIO(walker().to_npz())) as file:
+        everything = {key: file[key] for key in KEYS} | arrays
+    buffer = io.BytesIO()
+    np.savez(buffer, **{key: value for key, value in everything.items() if value is not None})
+    return buffer.getvalue()
+
+
+BAD = {
+    "no joints": ({"joints": None}, "has no joints"),
+    "names and fps missing": ({"names": None, "fps": None}, "names, fps"),
+    "joints of two axes": ({"joints": np.zeros((41, 22), np.float32)}, "`joints` has shape"),
+    "joints of integers": ({"joints": np.zeros((41, 22, 3), int)}, "`joints` holds int"),
+    "other frames": ({"root": np.zeros((3, 3), np.float32)}, "`root` has shape"),
+    "no frames": (
+        {
+            "joints": np.zeros((0, 22, 3), np.float32),
+            "rotations": np.zeros((0, 22, 4), np.float32),
+            "root": np.zeros((0, 3), np.float32),
+            "contacts": np.zeros((0, 4), bool),
+        },
+        "0 frames",
+    ),
+    "nan": ({"root": np.full((41, 3), np.nan, np.float32)}, "NaN"),
+    "quaternions too long": ({"rotations": np.ones((41, 22, 4), np.float32)}, "unit length"),
+    "contacts of numbers": ({"contacts": np.zeros((41, 4))}, "`contacts` holds float64"),
+    "rate of zero": ({"fps": np.float64(0)}, "0 fps"),
+    "cycle": ({"parents": np.arange(22)}, "root"),
+    "names twice": ({"names": np.array(["a"] * 22)}, "same name"),
+    "manifest of words": ({"manifest": np.array("hello")}, "JSON|Expecting"),
+    "manifest a list": ({"manifest": np.array("[1]")}, "not a JSON object"),
+    "pickle": ({"names": np.array([{"a": 1}] * 22, object)}, "pickled objects, which are never loaded"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_foreign_or_broken_file_is_refused_with_its_reason(name, tmp_path):
+    arrays, message = BAD[name]
+    path = tmp_path / "a.npz"
+    path.write_bytes(changed(**arrays))
+    with pytest.raises(InvalidFile, match=message) as caught:
+        load_npz(path)
+    assert caught.value.where == str(path)
+
+
+def test_a_pickle_is_never_run(tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (open, (str(tmp_path / "ran"), "w"))
+
+    path = tmp_path / "a.npz"
+    path.write_bytes(changed(names=np.array([Bomb()] * 22, object)))
+    with pytest.raises(InvalidFile):
+        load_npz(path)
+    path.write_bytes(pickle.dumps(Bomb()))
+    with pytest.raises(InvalidFile, match="no npz"):
+        load_npz(path)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_a_missing_file_is_not_found_and_a_folder_no_file(tmp_path):
+    with pytest.raises(NotFound):
+        load_npz(tmp_path / "none.npz")
+    with pytest.raises(InvalidFile):
+        load_npz(tmp_path)
+
+
+def test_a_file_that_unpacks_to_too_much_is_not_unpacked(monkeypatch):
+    monkeypatch.setattr(clips, "MAX_UNPACKED", 1000)
+    with pytest.raises(TooLarge):
+        parse_npz(walker().to_npz())
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.data())
+def test_no_damage_to_a_file_gives_anything_but_a_clip_or_an_expected_error(data):
+    content = bytearray(WALK)
+    for _ in range(data.draw(st.integers(1, 3))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        if data.draw(st.booleans()):
+            content[at : at + 4] = data.draw(st.binary(min_size=4, max_size=4))
+        else:
+            del content[at : at + data.draw(st.integers(1, 400))]
+    try:
+        clip = parse_npz(bytes(content))
+    except (InvalidFile, TooLarge):
+        return
+    assert clip.frames == 41
+
+
+WALK = walker().to_npz()
+
+
+def test_a_header_that_claims_too_many_numbers_is_refused():
+    header = np.lib.format.magic(1, 0)
+    text = b"{'descr': '<f4', 'fortran_order': False, 'shape': (999999999999, 22, 3), }"
+    text += b" " * (117 - len(text)) + b"\n"
+    body = header + len(text).to_bytes(2, "little") + text
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(WALK)) as old, zipfile.ZipFile(buffer, "w") as new:
+        for member in old.infolist():
+            new.writestr(member.filename, body if member.filename == "joints.npy" else old.read(member))
+    with pytest.raises(InvalidFile):
+        parse_npz(buffer.getvalue())
+
+
+def test_saving_into_no_folder_says_so(tmp_path):
+    with pytest.raises(InvalidInput, match="cannot be written"):
+        walker().save_npz(tmp_path / "none" / "a.npz")

@@ -1,0 +1,207 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shared.errors import InvalidInput
+from shared.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
+from shared.motion.kinematics import bone_lengths
+from shared.motion.legs import smooth_above, two_bone_knee
+from shared.motion.pose import solve_pose
+from shared.motion.resample import frame_times, interpolate, interpolate_rotations
+from shared.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton
+from tests.support.motions import drift
+from tests.support.walker import walker
+
+L_ANKLE, L_TOE, R_ANKLE, R_TOE = HUMANML3D.feet
+HIPS, KNEES, ANKLES = [1, 2], [4, 5], [7, 8]
+
+
+def stepping(fps: float = 20.0, seconds: float = 6.0):
+    """Joints of somebody who walks straight on, whose feet stand still on the floor while they stand, knees bent.
+
+    Feet are laid down first; the legs follow by two-bone inverse kinematics.
+    """
+    time = np.arange(round(seconds * fps)) / fps
+    rest = HUMANML3D.rest.astype(float)
+    joints = np.tile(rest, (len(time), 1, 1))
+    joints[..., 1] -= 0.08  # knees bend
+    joints[..., 2] += (1.0 * time)[:, None]
+    for side, (ankle, toe, phase) in enumerate(((7, 10, 0.0), (8, 11, 0.5))):
+        turns = time + phase
+        swing = np.clip((turns % 1 - 0.6) / 0.4, 0, 1)  # stands for 0.6 s of each second
+        forward = np.floor(turns) + (3 * swing**2 - 2 * swing**3) - phase - 0.3
+        lift = 0.12 * np.sin(np.pi * swing) ** 2
+        for j in (ankle, toe):
+            joints[:, j] = rest[j] + np.stack([0 * time, lift, forward + 0.6], axis=1)
+        hip, knee = HIPS[side], KNEES[side]
+        leg = np.tile(rest[[hip, knee, ankle]], (len(time), 1, 1))
+        joints[:, knee] = two_bone_knee(leg, joints[:, hip], joints[:, ankle], np.tile([0, 0, 1.0], (len(time), 1)))
+    return joints
+
+
+def sliding(amount: float = 0.02, seed: int = 0):
+    """The same with feet that wander, the legs following, as generated ones do."""
+    joints = stepping()
+    slide = drift(seed, len(joints), 6, amount).reshape(-1, 2, 3) * [1, 0.3, 1]
+    for side in range(2):
+        joints[:, [KNEES[side], ANKLES[side], (L_TOE, R_TOE)[side]]] += slide[:, side, None]
+    return solve_pose(joints, HUMANML3D, measure=False).joints
+
+
+def acceleration(joints, fps=20.0):
+    return np.linalg.norm(np.diff(joints, 2, axis=0), axis=-1) * fps**2
+
+
+def test_contacts_are_found_where_feet_were_laid_down():
+    contacts = find_contacts(stepping(), HUMANML3D, 20)
+    phase = (np.arange(120) / 20) % 1
+    wrong = contacts[:, 1] != (phase < 0.6)
+    near = np.minimum(phase, np.abs(phase - 0.6)) < 0.11  # touch-down and lift-off are gradual
+    assert not wrong[~near & (phase < 0.95)].any()
+    assert wrong.mean() < 0.15
+
+
+def test_planted_feet_stand_still_to_the_last_digit():
+    joints = sliding()
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert skate(joints, contacts, HUMANML3D, 20) > 0.02
+    assert skate(clean, contacts, HUMANML3D, 20) < 1e-6
+
+
+def test_every_bone_keeps_its_length():
+    joints = sliding()
+    clean, _ = clean_feet(joints, HUMANML3D, 20)
+    np.testing.assert_allclose(bone_lengths(clean, HUMANML3D), bone_lengths(joints, HUMANML3D), atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cleaning_makes_no_pops_and_hardly_moves_the_body(seed):
+    joints = sliding(seed=seed)
+    clean, _ = clean_feet(joints, HUMANML3D, 20)
+    was, now = acceleration(joints), acceleration(clean)
+    assert now.max() < 1.3 * was.max()
+    assert np.sqrt((now**2).mean()) < 1.1 * np.sqrt((was**2).mean())
+    upper = [j for j in range(22) if j not in KNEES + ANKLES + [L_TOE, R_TOE]]
+    assert np.linalg.norm((clean - joints)[:, upper], axis=-1).max() < 0.02
+
+
+def test_knees_do_not_pop_at_a_high_rate_either():
+    slow = solve_pose(sliding(0.03, seed=7), HUMANML3D, measure=False)
+    times = frame_times(len(slow.root), 20, 120)
+    fast = solve_pose(interpolate(slow.joints, times), HUMANML3D, fps=120, measure=False).joints
+    clean, contacts = clean_feet(fast, HUMANML3D, 120)
+    assert skate(clean, contacts, HUMANML3D, 120) < 1e-6
+    assert acceleration(clean, 120)[:, KNEES].max() < 1.5 * acceleration(fast, 120).max()
+    assert np.isfinite(interpolate_rotations(slow.rotations, times)).all()
+
+
+def test_motion_whose_feet_stand_already_is_left_alone():
+    joints = stepping()
+    clean, _ = clean_feet(joints, HUMANML3D, 20)
+    assert np.linalg.norm(clean - joints, axis=-1).mean() < 0.004
+
+
+def test_feet_come_out_of_the_floor():
+    joints = sliding()
+    joints[:, L_TOE, 1] -= 0.02 * (np.arange(len(joints)) % 40 < 10)
+    clean, _ = clean_feet(joints, HUMANML3D, 20)
+    assert joints[:, [L_TOE, R_TOE], 1].min() < -0.01
+    assert clean[:, [L_TOE, R_TOE], 1].min() > -0.0021
+
+
+@pytest.mark.parametrize("off", [-0.3, -0.05, 0.05, 0.4])
+def test_a_floor_that_is_off_is_put_to_zero(off):
+    joints = stepping() + np.array([0, off, 0])
+    assert floor_height(joints, HUMANML3D) == pytest.approx(off - np.clip(off, *FLOOR_BAND), abs=0.002)
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert clean[contacts[:, 1], L_TOE, 1].max() < FLOOR_BAND[1] + 0.005
+
+
+def test_a_body_in_the_air_is_not_pulled_down():
+    joints = stepping() + np.array([0, 1.0, 0])
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert floor_height(joints, HUMANML3D) == 0
+    assert np.isfinite(clean).all()
+    assert contacts.shape == (120, 4)
+
+
+def test_a_foot_that_means_to_slide_slides():
+    joints = np.tile(HUMANML3D.rest.astype(float), (60, 1, 1))
+    joints[..., 2] += np.linspace(0, 0.6, 60)[:, None]  # on ice, 0.2 m/s
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert not contacts[:, [1, 3]].any()
+    np.testing.assert_allclose(clean, joints, atol=1e-6)
+
+
+def test_a_turn_on_the_spot_keeps_the_toe_and_lets_the_heel_turn():
+    joints = np.tile(HUMANML3D.rest.astype(float), (40, 1, 1))
+    angle = np.linspace(0, 0.5, 40)
+    foot = joints[:, [L_ANKLE]] - joints[:, [L_TOE]]
+    joints[:, L_ANKLE, 0] = joints[:, L_TOE, 0] - np.sin(angle) * 0.13
+    joints[:, L_ANKLE, 2] = joints[:, L_TOE, 2] - np.cos(angle) * 0.13
+    assert np.linalg.norm(foot, axis=-1)[0] == pytest.approx(np.hypot(0.13, 0.06), abs=1e-6)
+    clean, contacts = clean_feet(joints, HUMANML3D, 20)
+    assert contacts[:, 1].all()
+    np.testing.assert_allclose(clean[:, L_TOE], clean[:1, L_TOE].repeat(40, 0), atol=1e-9)
+    heading = np.arctan2(*(clean[:, L_TOE] - clean[:, L_ANKLE])[:, [0, 2]].T)
+    assert np.ptp(heading) == pytest.approx(0.5, abs=0.05)
+
+
+def test_known_contacts_are_used():
+    joints = sliding()
+    none, contacts = clean_feet(joints, HUMANML3D, 20, contacts=np.zeros((120, 4), bool))
+    assert not contacts.any()
+    lift = none - joints
+    assert np.abs(lift[..., [0, 2]]).max() < 0.005
+
+
+def test_a_skeleton_without_feet_is_refused():
+    plain = Skeleton("x", ("a", "b"), (-1, 0), np.ones((2, 3), np.float32), (0, 1))
+    with pytest.raises(InvalidInput, match="feet"):
+        clean_feet(np.zeros((5, 2, 3)), plain, 30)
+
+
+def test_one_frame_and_other_rigs_are_cleaned():
+    for skeleton in (HUMANML3D, SNAPMOGEN):
+        clean, contacts = clean_feet(skeleton.rest[None].astype(float), skeleton, 20)
+        assert np.isfinite(clean).all()
+        assert contacts.shape == (1, 4)
+
+
+def test_a_long_walker_is_cleaned_like_a_short_one():
+    clip = walker(seconds=9.8)
+    clean, contacts = clean_feet(clip.joints, HUMANML3D, clip.fps)
+    assert skate(clean, contacts, HUMANML3D, clip.fps) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("mask", "found"),
+    [([], []), ([0, 0], []), ([1, 1, 1], [(0, 3)]), ([0, 1, 1, 0, 1], [(1, 3), (4, 5)])],
+)
+def test_runs_are_found(mask, found):
+    assert runs(np.array(mask, bool)) == found
+
+
+def test_a_smooth_cover_is_nowhere_below():
+    values = np.zeros(50)
+    values[[10, 30]] = [1, 0.5]
+    cover = smooth_above(values, 3.0)
+    assert (cover >= values - 1e-12).all()
+    assert np.abs(np.diff(cover)).max() < 0.3
+
+
+def test_a_leg_that_moved_nowhere_keeps_its_knee_and_one_that_moved_its_bones():
+    leg = np.array([[[0, 0.9, 0], [0.02, 0.5, 0.1], [0, 0.1, 0.02]]])
+    ahead = np.array([[0, 0, 1.0]])
+    np.testing.assert_allclose(two_bone_knee(leg, leg[:, 0], leg[:, 2], ahead), leg[:, 1], atol=1e-12)
+    moved = leg[:, 2] + [[0.05, 0.1, 0.2]]
+    knee = two_bone_knee(leg, leg[:, 0], moved, ahead)
+    for a, b, c in ((leg[:, 0], knee, 1), (knee, moved, 2)):
+        assert np.linalg.norm(a - b) == pytest.approx(np.linalg.norm(leg[0, c] - leg[0, c - 1]), abs=1e-9)
+
+
+def test_a_straight_leg_bends_ahead():
+    leg = np.array([[[0, 0.8, 0], [0, 0.4, 0], [0, 0.0, 0]]])
+    knee = two_bone_knee(leg, leg[:, 0], np.array([[0, 0.1, 0]]), np.array([[0, 0, 1.0]]))
+    assert knee[0, 2] > 0.1
