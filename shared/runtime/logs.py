@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import logging
 import sys
+import traceback
+from typing import TextIO
 
 import structlog
 from structlog.stdlib import BoundLogger
-from structlog.typing import EventDict, Processor, WrappedLogger
+from structlog.typing import EventDict, ExcInfo, Processor, WrappedLogger
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
 """Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""
@@ -30,6 +32,22 @@ def _add_service(service: str) -> Processor:
     return add
 
 
+def _brief_traceback(exc_info: ExcInfo) -> str:
+    """The calls, and the first line of each message: no local variables, no DETAIL of a database error, which quotes
+    the row, prompt and all."""
+    parts: list[str] = []
+    error: BaseException | None = exc_info[1]
+    while error is not None:
+        first = (str(error).splitlines() or [""])[0]
+        parts.append("".join(traceback.format_tb(error.__traceback__)) + f"{type(error).__name__}: {first}\n")
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return "caused:\n".join(reversed(parts))
+
+
+def _write_traceback(stream: TextIO, exc_info: ExcInfo) -> None:
+    stream.write("\n" + _brief_traceback(exc_info))
+
+
 def configure_logging(service: str, *, level: str = "INFO", json: bool = False) -> None:
     """Send structlog and the standard library's loggers to stderr, one line an event, with `service` in each."""
     shared: list[Processor] = [
@@ -39,12 +57,11 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
         structlog.processors.TimeStamper(fmt="iso", utc=True),
         _drop_forbidden,
     ]
-    renderer: list[Processor] = (
-        [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
-        if json
-        # The default traceback shows local variables, prompts among them.
-        else [structlog.dev.ConsoleRenderer(sys.stderr.isatty(), exception_formatter=structlog.dev.plain_traceback)]
-    )
+    renderer: list[Processor] = [
+        structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=_write_traceback)
+    ]
+    if json:
+        renderer = [structlog.processors.ExceptionRenderer(_brief_traceback), structlog.processors.JSONRenderer()]
     structlog.configure(
         processors=[*shared, structlog.stdlib.ProcessorFormatter.wrap_for_formatter],
         logger_factory=structlog.stdlib.LoggerFactory(),

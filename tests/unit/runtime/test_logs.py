@@ -38,18 +38,26 @@ def test_a_line_is_json_with_its_service_from_every_thread(capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("json_lines", [True, False])
-def test_a_traceback_shows_no_local_variables(capsys: pytest.CaptureFixture[str], json_lines: bool) -> None:
+def test_a_traceback_shows_neither_local_variables_nor_rows(
+    capsys: pytest.CaptureFixture[str], json_lines: bool
+) -> None:
     configure_logging("worker", json=json_lines)
 
     def fail(prompt: str) -> None:
-        raise ValueError(len(prompt))
+        raise ValueError(f"constraint violated\nDETAIL: failing row contains ({prompt})")
 
     try:
-        fail("a secret " + "scene")
-    except ValueError:
+        try:
+            fail("a secret " + "scene")
+        except ValueError as error:
+            raise RuntimeError("outer") from error
+    except RuntimeError:
         logger("test").exception("failed")
+        logging.getLogger("test").exception("failed")
     written = capsys.readouterr().err
-    assert "ValueError" in written
+    assert "ValueError: constraint violated" in written
+    assert "in fail" in written
+    assert "RuntimeError: outer" in written
     assert "secret scene" not in written
 
 
