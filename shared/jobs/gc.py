@@ -112,14 +112,7 @@ def _remove_orphan(engine: sa.Engine, store: ObjectStore, key: str) -> bool:
         if known is None:
             store.delete(key)
             return True
-        values = {
-            "id": new_id(),
-            "tenant_id": tenant,
-            "sha256": sha256,
-            "size": 0,
-            "media_type": "",
-            "state": "writing",
-        }
+        values = {"id": new_id(), "tenant_id": tenant, "sha256": sha256, "size": 0, "media_type": ""}
         ours = conn.execute(
             insert(schema.asset)
             .values(**values, state="writing", announced_at=CLOCK)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from types import SimpleNamespace
+from uuid import uuid4
 
 import pytest
 import sqlalchemy as sa
@@ -11,6 +11,7 @@ from sqlalchemy.exc import IntegrityError
 
 from shared.jobs import JobControl, schema, transaction
 from shared.jobs.ids import new_id
+from shared.jobs.journal import LockedJob
 from shared.jobs.states import ItemState, allowed, job_state
 from tests.servers.jobs import claim_some, parse_texts, submit_items
 
@@ -94,24 +95,17 @@ def test_a_row_that_contradicts_itself_is_refused(engine: sa.Engine, change: str
 
 
 def test_the_database_derives_the_state_of_a_job_as_the_code_does(engine: sa.Engine) -> None:
-    rows = [
-        dict(zip(ItemState, counts, strict=True)) | {"control": control, "started": started}
-        for counts in product((0, 2), repeat=6)
-        for control in JobControl
-        for started in (False, True)
-    ]
     with engine.begin() as conn:
-        for row in rows:
-            values = {str(name): value for name, value in row.items() if name != "started"}
-            total = sum(row[state] for state in ItemState)
+        for counts, control, started in product(product((0, 2), repeat=6), JobControl, (False, True)):
+            values = {str(state): count for state, count in zip(ItemState, counts, strict=True)}
             found = conn.execute(
                 sa.insert(schema.job)
-                .values(id=new_id(), tenant_id="default", total=total, **values)
-                .values(started_at=sa.func.now() if row["started"] else None)
+                .values(id=new_id(), tenant_id="default", total=sum(counts), control=control, **values)
+                .values(started_at=sa.func.now() if started else None)
                 .returning(schema.job.c.state)
             ).scalar_one()
-            counters = SimpleNamespace(total=total, **{str(state): row[state] for state in ItemState})
-            assert found == job_state(row["control"], counters, started=row["started"]), row
+            counters = LockedJob(uuid4(), "default", control, None, started, sum(counts), **values)
+            assert found == job_state(control, counters, started=started), (values, control, started)
 
 
 def test_counters_that_do_not_add_up_are_refused(engine: sa.Engine) -> None:

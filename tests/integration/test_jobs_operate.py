@@ -1,0 +1,273 @@
+"""Operator verbs, listings and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from uuid import UUID, uuid4
+
+import pytest
+import sqlalchemy as sa
+
+from shared.errors import Conflict, InvalidInput, NotFound, Unauthenticated
+from shared.jobs import (
+    ItemFailure,
+    ItemState,
+    JobControl,
+    JobState,
+    authenticate,
+    cancel,
+    claim,
+    create_key,
+    delete,
+    events_after,
+    fail_items,
+    get_job,
+    get_motion,
+    list_items,
+    list_jobs,
+    list_keys,
+    list_motions,
+    pause,
+    resume,
+    retry,
+    revoke_key,
+    set_comment,
+    set_priority,
+    transaction,
+)
+from shared.jobs.types import Page
+from tests.servers.audit import audit
+from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, parse_texts, submit_items
+
+
+def finish(engine: sa.Engine, *, failed: int = 0, succeeded: int = 0, left: int = 0) -> UUID:
+    """A job with so many items failed, succeeded and ready."""
+    job = submit_items(engine, failed + succeeded + left)
+    parse_texts(engine)
+    if failed + succeeded:
+        claimed = claim_some(engine, limit=failed + succeeded)
+        bad = [ItemFailure(item.id, PROBLEM, retryable=False) for item in claimed.items[:failed]]
+        with transaction(engine) as conn:
+            fail_items(conn, claimed.lease_token, bad)
+        if succeeded:
+            commit_all(engine, claimed, [item.id for item in claimed.items[failed:]])
+    return job
+
+
+def test_cancel_ends_what_is_open_and_keeps_what_is_done(engine: sa.Engine) -> None:
+    job = finish(engine, succeeded=2, failed=1, left=3)
+    claim_some(engine, limit=1)
+    with transaction(engine) as conn:
+        row = cancel(conn, "default", job, "wrong prompts")
+        assert (row.state, row.succeeded, row.failed, row.cancelled) == (JobState.CANCELLED, 2, 1, 3)
+        assert claim(conn, "hgm3", "w", 1) is None
+        assert cancel(conn, "default", job) == row
+        assert [event.reason for event in events_after(conn, "default", job) if event.kind == "cancelled"] == [
+            "wrong prompts"
+        ]
+        assert audit(conn) == []
+
+
+def test_retry_brings_back_failed_dead_and_cancelled_items(engine: sa.Engine) -> None:
+    job = finish(engine, succeeded=1, failed=2, left=2)
+    with transaction(engine) as conn:
+        cancel(conn, "default", job)
+        row = retry(conn, "default", job, failed_only=True)
+        assert (row.ready, row.cancelled, row.control, row.state) == (2, 2, JobControl.RUN, JobState.RUNNING)
+        assert audit(conn) == []
+        row = retry(conn, "default", job)
+        assert (row.ready, row.cancelled, row.succeeded) == (4, 0, 1)
+        items = list_items(conn, "default", job, states=[ItemState.READY]).rows
+        assert {(item.attempts, item.solo, item.problem, item.finished) for item in items} == {(0, False, None, None)}
+        assert audit(conn) == []
+    assert len(commit_all(engine, claim_some(engine))) == 4
+
+
+def test_retry_of_a_job_without_such_items_is_a_conflict(engine: sa.Engine) -> None:
+    job = finish(engine, succeeded=2)
+    with transaction(engine) as conn, pytest.raises(Conflict, match="no item of this job can be retried"):
+        retry(conn, "default", job)
+
+
+def test_pause_and_resume_say_no_to_a_job_that_has_ended(engine: sa.Engine) -> None:
+    job = finish(engine, succeeded=1)
+    with transaction(engine) as conn:
+        for verb in (pause, resume):
+            with pytest.raises(Conflict, match="succeeded"):
+                verb(conn, "default", job)
+
+
+def test_verbs_that_change_nothing_write_no_event(engine: sa.Engine) -> None:
+    job = submit_items(engine, 1)
+    with transaction(engine) as conn:
+        seq = pause(conn, "default", job).event_seq
+        assert pause(conn, "default", job).event_seq == seq
+        seq = resume(conn, "default", job).event_seq
+        assert resume(conn, "default", job).event_seq == seq
+
+
+def test_priority_and_comment_are_kept_and_told(engine: sa.Engine) -> None:
+    job = submit_items(engine, 1)
+    with transaction(engine) as conn:
+        assert set_priority(conn, "default", job, 7).priority == 7
+        assert set_comment(conn, "default", job, "for Monday").comment == "for Monday"
+        assert set_comment(conn, "default", job, None).comment is None
+        assert [event.kind for event in events_after(conn, "default", job, 1)] == ["priority", "comment", "comment"]
+        for priority in (-1001, 1001):
+            with pytest.raises(InvalidInput, match="1000"):
+                set_priority(conn, "default", job, priority)
+
+
+def test_delete_takes_everything_of_an_ended_job_and_of_no_other(engine: sa.Engine) -> None:
+    kept, job, running = finish(engine, succeeded=1), finish(engine, succeeded=2, failed=1), finish(engine, left=1)
+    with transaction(engine) as conn:
+        with pytest.raises(Conflict, match="Cancel it first"):
+            delete(conn, "default", running)
+        delete(conn, "default", job)
+        with pytest.raises(NotFound):
+            get_job(conn, "default", job)
+        assert {motion.job for motion in list_motions(conn, "default").rows} == {kept}
+        assert {row.id for row in list_jobs(conn, "default").rows} == {kept, running}
+        assert audit(conn) == []
+
+
+Verb = Callable[[sa.Connection, str, UUID], object]
+VERBS: dict[str, Verb] = {
+    "pause": pause,
+    "resume": resume,
+    "cancel": cancel,
+    "retry": retry,
+    "delete": delete,
+    "set_priority": lambda conn, tenant, job: set_priority(conn, tenant, job, 1),
+    "set_comment": lambda conn, tenant, job: set_comment(conn, tenant, job, "x"),
+    "get_job": get_job,
+    "list_items": list_items,
+    "list_motions": lambda conn, tenant, job: list_motions(conn, tenant, job=job),
+    "events_after": events_after,
+}
+
+
+@pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS)
+def test_a_job_of_another_tenant_is_not_there(engine: sa.Engine, verb: Verb) -> None:
+    job = finish(engine, failed=1)
+    with transaction(engine) as conn:
+        for tenant, identifier in (("studio", job), ("default", uuid4())):
+            with pytest.raises(NotFound, match=str(identifier)):
+                verb(conn, tenant, identifier)
+
+
+# --- listings ---
+
+
+def pages(read: Callable[[str | None], Page[object]]) -> list[object]:
+    """All rows, page by page."""
+    page = read(None)
+    rows = list(page.rows)
+    while page.cursor is not None:
+        page = read(page.cursor)
+        assert page.rows
+        rows += page.rows
+    return rows
+
+
+def test_pages_of_items_come_in_input_order_without_gaps(engine: sa.Engine) -> None:
+    job = submit_items(engine, 23)
+    with transaction(engine) as conn:
+        rows = pages(lambda cursor: list_items(conn, "default", job, cursor=cursor, limit=5))  # pyright: ignore
+        assert [row.position for row in rows] == list(range(23))  # pyright: ignore
+
+
+def test_pages_of_jobs_come_newest_first_and_by_state(engine: sa.Engine) -> None:
+    jobs: list[UUID] = []
+    for n in range(7):
+        jobs.append(finish(engine, succeeded=1) if n % 3 else submit_items(engine, 1))
+        if n % 3 == 0:
+            with transaction(engine) as conn:
+                cancel(conn, "default", jobs[-1])
+    with transaction(engine) as conn:
+        rows = pages(lambda cursor: list_jobs(conn, "default", cursor=cursor, limit=3))  # pyright: ignore
+        assert [row.id for row in rows] == jobs[::-1]  # pyright: ignore
+        done = list_jobs(conn, "default", states=[JobState.SUCCEEDED]).rows
+        assert [row.id for row in done] == [job for n, job in enumerate(jobs) if n % 3][::-1]
+
+
+def test_pages_of_motions_come_newest_first_and_of_a_job_in_order(engine: sa.Engine) -> None:
+    first, second = finish(engine, succeeded=5), finish(engine, succeeded=5)
+    with transaction(engine) as conn:
+        rows = pages(lambda cursor: list_motions(conn, "default", cursor=cursor, limit=3))  # pyright: ignore
+        assert [row.job for row in rows] == [second] * 5 + [first] * 5  # pyright: ignore
+        assert len({row.id for row in rows}) == 10  # pyright: ignore
+        of_job = pages(lambda cursor: list_motions(conn, "default", job=first, cursor=cursor, limit=2))  # pyright: ignore
+        assert [row.id for row in of_job] == [row.id for row in rows[5:]][::-1]  # pyright: ignore
+        motion = get_motion(conn, "default", rows[0].id)  # pyright: ignore
+        assert motion == rows[0]
+        for tenant, identifier in (("studio", motion.id), ("default", uuid4())):
+            with pytest.raises(NotFound):
+                get_motion(conn, tenant, identifier)
+
+
+@pytest.mark.parametrize("cursor", ["", "x", "!!", "AAAA", "bm90IGEgbnVtYmVy", "\0", "ü"])
+def test_a_foreign_cursor_is_refused(engine: sa.Engine, cursor: str) -> None:
+    job = submit_items(engine, 1)
+    with transaction(engine) as conn:
+        for read in (
+            lambda: list_jobs(conn, "default", cursor=cursor),
+            lambda: list_items(conn, "default", job, cursor=cursor),
+            lambda: list_motions(conn, "default", cursor=cursor),
+        ):
+            with pytest.raises(InvalidInput, match="no cursor"):
+                read()
+
+
+@pytest.mark.parametrize("limit", [0, -1, 1001])
+def test_a_page_holds_one_to_a_thousand_rows(engine: sa.Engine, limit: int) -> None:
+    with transaction(engine) as conn, pytest.raises(InvalidInput, match="limit"):
+        list_jobs(conn, "default", limit=limit)
+
+
+# --- keys ---
+
+
+def test_a_key_opens_until_it_is_revoked(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        made = create_key(conn, "ci", {"submit", "read"})
+        key = authenticate(conn, made.secret)
+        assert (key.id, key.tenant, key.scopes, key.name) == (made.key.id, "default", ("read", "submit"), "ci")
+        assert key.last_used is not None
+        assert revoke_key(conn, "default", key.id).revoked is not None
+        with pytest.raises(Unauthenticated, match="revoked"):
+            authenticate(conn, made.secret)
+        assert [row.id for row in list_keys(conn, "default")] == [key.id]
+
+
+def test_the_secret_is_stored_nowhere(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        made = create_key(conn, "ci", {"read"})
+        row = str(conn.execute(sa.text("SELECT row_to_json(api_key)::text FROM api_key")).scalar_one())
+    assert made.secret.rpartition("_")[2] not in row
+    assert made.secret not in repr(made.key)
+
+
+@pytest.mark.parametrize("change", [lambda s: s[:-1] + ("A" if s[-1] != "A" else "B"), lambda s: s[:-1], str.upper])
+def test_a_wrong_secret_opens_nothing(engine: sa.Engine, change: Callable[[str], str]) -> None:
+    with transaction(engine) as conn:
+        made = create_key(conn, "ci", {"read"})
+        with pytest.raises(Unauthenticated):
+            authenticate(conn, change(made.secret))
+
+
+def test_a_key_needs_known_scopes_and_a_tenant(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        for scopes in ({"root"}, set[str]()):
+            with pytest.raises(InvalidInput, match="scope"):
+                create_key(conn, "ci", scopes)
+        with pytest.raises(NotFound, match="tenant"):
+            create_key(conn, "ci", {"read"}, tenant="studio")
+        with pytest.raises(NotFound):
+            revoke_key(conn, "default", uuid4())
+
+
+def test_two_prompts_of_one_index_are_variants_in_a_listing(engine: sa.Engine) -> None:
+    job = submit_items(engine, [new_item(0, "walk"), new_item(0, "walk", variant=1), new_item(1, "run")])
+    with transaction(engine) as conn:
+        assert [(row.index, row.variant) for row in list_items(conn, "default", job).rows] == [(0, 0), (0, 1), (1, 0)]
