@@ -31,8 +31,8 @@ def toy() -> ToyHandler:
 def make_loop(engine: sa.Engine) -> Iterator[Callable[..., Loop]]:
     loops: list[Loop] = []
 
-    def make(store: FolderStore, *handlers: ToyHandler, interval: float = 0.1) -> Loop:
-        loops.append(Loop(engine, store, *handlers, interval=interval))
+    def make(store: FolderStore, *handlers: ToyHandler, interval: float = 0.1, rules: Policy | None = None) -> Loop:
+        loops.append(Loop(engine, store, *handlers, interval=interval, rules=rules))
         return loops[-1]
 
     yield make
@@ -213,6 +213,43 @@ def test_results_of_a_lost_lease_are_thrown_away(
         assert conn.execute(sa.select(sa.func.count()).select_from(motion)).scalar_one() == 3
     collect_garbage(engine, folder_store)
     assert audit(engine, folder_store) == []
+
+
+def test_a_hung_decode_loop_loses_its_lease(
+    engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
+) -> None:
+    loop = make_loop(folder_store, ToyHandler(), rules=Policy(lease=0.4, stall=0.4))
+    submit_toys(engine, ["walk"])
+    loop.run()  # the first batch after loading may be silent for long: it compiles
+    job = submit_toys(engine, ["walk"] * 3, silent_seconds=4.0)
+    thread = threading.Thread(target=loop.run, args=(0.1,))
+    thread.start()
+    wait(lambda: job_row(engine, job).leased == 3)
+    wait(lambda: sweep(engine).leases_lost == 1, seconds=3.5)
+    assert thread.is_alive()
+    assert job_row(engine, job).ready == 3
+    thread.join(20.0)
+    assert job_row(engine, job).succeeded == 0
+
+
+def test_loading_a_bundle_may_take_longer_than_a_stall(
+    engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
+) -> None:
+    class SlowToLoad(ToyHandler):
+        def load(self, bundle: str) -> None:
+            time.sleep(2.0)
+
+    job = submit_toys(engine, ["walk"] * 3)
+    loop = make_loop(folder_store, SlowToLoad(), rules=Policy(lease=0.4, stall=0.4))
+    thread = threading.Thread(target=loop.run)
+    thread.start()
+    wait(lambda: job_row(engine, job).leased == 3)
+    lost = 0
+    while thread.is_alive():
+        lost += sweep(engine).leases_lost
+        time.sleep(0.1)
+    assert lost == 0
+    assert job_row(engine, job).succeeded == 3
 
 
 class Flaky(FolderStore):

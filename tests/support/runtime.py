@@ -9,7 +9,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from shared.jobs import Heartbeat as Answer
-from shared.jobs import heartbeat, transaction
+from shared.jobs import Policy, heartbeat, transaction
 from shared.runtime.committer import Committer
 from shared.runtime.handler import Handler
 from shared.runtime.lease import Heartbeat
@@ -20,8 +20,16 @@ from shared.storage import AssetStore
 class Loop:
     """Heartbeat, committer and drain around one handler; `close` ends the threads."""
 
-    def __init__(self, engine: sa.Engine, store: AssetStore, *handlers: Handler, interval: float = 0.1) -> None:
+    def __init__(
+        self,
+        engine: sa.Engine,
+        store: AssetStore,
+        *handlers: Handler,
+        interval: float = 0.1,
+        rules: Policy | None = None,
+    ) -> None:
         self.engine = engine
+        self.rules = rules
         self.stopping = threading.Event()
         self.ticks = 0
         self.heartbeat = Heartbeat(self._renew, interval=interval, stopping=self.stopping)
@@ -55,4 +63,4 @@ class Loop:
 
     def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
         with transaction(self.engine) as conn:
-            return heartbeat(conn, token, items, progressed=progressed)
+            return heartbeat(conn, token, items, progressed=progressed, rules=self.rules)
