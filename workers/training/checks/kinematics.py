@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 PELVIS, NECK, HEAD = 0, 12, 15
 HIPS, SHOULDERS, ELBOWS, WRISTS = (1, 2), (16, 17), (18, 19), (20, 21)  # left, right
@@ -38,7 +38,10 @@ def velocity(points: Array, fps: float) -> Array:
 
 
 def heading(joints: Array, fps: float) -> Array:
-    """(T,) the body's heading in degrees, unwrapped, smoothed over a third of a second; 0 = +Z, positive to the left (+X)."""
+    """(T,) the body's heading in degrees, unwrapped, smoothed over a third of a second.
+
+    0 is +Z; positive is to the left (+X).
+    """
     across = joints[:, HIPS[0]] - joints[:, HIPS[1]] + joints[:, SHOULDERS[0]] - joints[:, SHOULDERS[1]]
     flat = smooth(across[:, [0, 2]], 0.15, fps)
     # forward = across x up = (-across_z, across_x) in (x, z)

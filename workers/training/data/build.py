@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,14 @@ from shared.motion.features import HUMANML3D_263
 from workers.training.data import manifest as names
 from workers.training.data.captions import captions
 from workers.training.data.compose import COUNTS, compose
-from workers.training.data.describe import STYLE_NAMES, Facts, describe, describe_cmu
+from workers.training.data.describe import Facts, describe, describe_cmu
 from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from workers.training.data.pack import SPLITS, JointsPack, PackClip, split_root
 from workers.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from workers.training.data.prepared import sha256_of
 from workers.training.data.sources import SOURCES
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 # Heading: smoothed over half a second, which keeps the sway of a gait (1 Hz) out of it and follows a turn; hips and
 # shoulders count alike; frame 0 has no jump. Decoding is that of HumanML3D.
 LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed")
@@ -46,7 +47,7 @@ def windows(frames: int) -> list[slice]:
         return [slice(first, first + limit)]
     count = -(-frames // limit)
     edges = np.linspace(0, frames, count + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def held_out_pairs(packs: Sequence[JointsPack]) -> frozenset[tuple[str, str]]:
@@ -72,6 +73,8 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
                     facts = _facts(clip, content, joints)
                     if len(joints) <= MIN_FRAMES:
                         left_out[name] = "shorter than a second"
+                    elif _jumps(joints):
+                        left_out[name] = "the body has no clear heading"
                     elif facts is None:
                         left_out[name] = "label and motion contradict each other"
                     else:
@@ -82,6 +85,14 @@ def _facts(clip: PackClip, content: str, joints: NDArray[np.float32]) -> Facts |
     if clip.dataset == "cmu":
         return describe_cmu(content, joints, FPS)
     return describe(content, clip.style, joints, FPS)
+
+
+_LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a second
+
+
+def _jumps(joints: NDArray[np.float32]) -> bool:
+    """Whether the heading jumps: a body bent over backwards has hips and shoulders square to each other."""
+    return bool(np.abs(LAYOUT.encode(joints)[:, 0]).max() > _LARGEST_YAW_STEP)
 
 
 class FolderWriter:
@@ -124,6 +135,7 @@ class FolderWriter:
                 mirrored=part.mirrored,
                 spliced=spliced,
                 acts=tuple(facts.act for facts in acts),
+                sides=tuple(facts.side for facts in acts),
                 measured=Measured(
                     seconds=round(len(features) / FPS, 2),
                     path=round(walked.path, 2),
@@ -132,7 +144,7 @@ class FolderWriter:
                     steps=walked.steps,
                     side=acts[0].side,
                 ),
-                captions=captions(acts, name),
+                captions=captions(acts, name, 2 if spliced else 3),
             )
         )
         self.frames += len(features)

@@ -17,7 +17,16 @@ from workers.training.data.describe import LOCOMOTION, Facts
 from workers.training.data.english import conjugate, number, sentence, with_adjective
 
 _FIELD = re.compile(r"{(\w+)}")
-_PRONOUNS = {"a man": "his", "a guy": "his", "he": "his", "a woman": "her", "a lady": "her", "she": "her"}
+_PRONOUNS = {
+    "a man": "his",
+    "a guy": "his",
+    "he": "his",
+    "a woman": "her",
+    "a lady": "her",
+    "she": "her",
+    "the man": "his",
+    "the woman": "her",
+}
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
 
@@ -32,12 +41,20 @@ class Style:
 
 
 @dataclass(frozen=True)
+class Detail:
+    """How a measured detail is said: behind the act, or as a sentence."""
+
+    clause: tuple[str, ...]
+    sentence: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Grammar:
     """`grammar.toml`."""
 
     subjects: tuple[str, ...]
     acts: dict[str, tuple[str, ...]]
-    details: dict[str, tuple[str, ...]]
+    details: dict[str, Detail]
     pace: dict[str, tuple[str, ...]]
     height: dict[str, tuple[str, ...]]
     styles: dict[str, Style]
@@ -52,7 +69,9 @@ def grammar() -> Grammar:
     return Grammar(
         subjects=tuple(table["subjects"]),
         acts={act: tuple(rows["phrases"]) for act, rows in table["acts"].items()},
-        details={name: tuple(rows) for name, rows in table["details"].items()},
+        details={
+            name: Detail(tuple(rows["clause"]), tuple(rows["sentence"])) for name, rows in table["details"].items()
+        },
         pace={name: tuple(rows) for name, rows in table["pace"].items()},
         height={name: tuple(rows) for name, rows in table["height"].items()},
         styles={
@@ -66,10 +85,10 @@ def grammar() -> Grammar:
 
 def seeded(*parts: object) -> random.Random:
     """A generator that depends on the parts alone, on every machine."""
-    return random.Random(hashlib.sha256("\0".join(map(str, parts)).encode()).digest())
+    return random.Random(hashlib.sha256("\0".join(map(str, parts)).encode()).digest())  # noqa: S311
 
 
-# -- what may be said of a motion ----------------------------------------------------------------------------------------
+# -- what may be said of a motion ----------------------------------------------------------------------------------
 
 
 def pace_of(facts: Facts) -> str | None:
@@ -128,7 +147,7 @@ def _fill(phrase: str, values: dict[str, str]) -> str | None:
     if any(name not in values for name in _FIELD.findall(phrase)):
         return None
     text = _FIELD.sub(lambda match: values[match.group(1)], phrase)
-    return text.replace("the both ", "both ")
+    return text.replace("the both ", "both ").replace("The both ", "Both ")
 
 
 def _details(facts: Facts) -> list[str]:
@@ -153,7 +172,7 @@ def _details(facts: Facts) -> list[str]:
     return [name for name in names if name]
 
 
-# -- sentences -----------------------------------------------------------------------------------------------------------
+# -- sentences -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -185,15 +204,21 @@ def _voice(rng: random.Random, *, plain: bool, adjective: str = "") -> _Voice:
 
 
 def _phrase(facts: Facts, rng: random.Random, pronoun: str) -> str:
-    """A verb phrase of the act, filled; verbs still in angle brackets."""
+    """A verb phrase of the act, filled; verbs still in angle brackets. After a pace it ends in `and`: see `_with`."""
     phrases = list(grammar().acts[facts.act])
     values = fields(facts, rng, pronoun)
     rng.shuffle(phrases)
     for phrase in phrases:
         filled = _fill(phrase, values)
         if filled is not None:
-            return filled + (_times(facts.repeats, rng) if facts.repeats > 1 else "")
+            text = filled + (_times(facts.repeats, rng) if facts.repeats > 1 else "")
+            return text + " and" if phrase.endswith("{pace}") else text
     raise AssertionError(f"no phrase of {facts.act} without fields")
+
+
+def _with(phrase: str, after: str) -> str:
+    """Phrase and adverb: `walks slowly and` takes `sadly`, or loses its `and`."""
+    return f"{phrase} {after}".strip() if after else phrase.removesuffix(" and")
 
 
 def _times(repeats: int, rng: random.Random) -> str:
@@ -211,8 +236,8 @@ def short_caption(facts: Facts, rng: random.Random) -> str:
     text = voice.clause(_phrase(facts, rng, voice.pronoun))
     after = "" if adjective or draw > 0.88 else rng.choice(style.after)
     if after and rng.random() < 0.12 and voice.subject:
-        return sentence(f"{after}, {text}")
-    return _loosen(f"{text} {after}", rng)
+        return sentence(f"{after}, {_with(text, '')}")
+    return _loosen(_with(text, after), rng)
 
 
 def long_caption(facts: Facts, rng: random.Random) -> str:
@@ -221,17 +246,15 @@ def long_caption(facts: Facts, rng: random.Random) -> str:
     style = g.styles[facts.style]
     voice = _voice(rng, plain=True)
     values = fields(facts, rng, voice.pronoun)
-    parts = [voice.clause(_phrase(facts, rng, voice.pronoun)) + " " + rng.choice(style.after)]
+    act = _with(voice.clause(_phrase(facts, rng, voice.pronoun)), rng.choice(style.after))
     names = _details(facts)
     rng.shuffle(names)
-    said = [text for name in names if (text := _fill(rng.choice(g.details[name]), values))]
-    first, rest = said[:2], said[2:]
-    sentences = [sentence(", ".join([parts[0], *first])), rng.choice(style.sentence)]
-    for text in rest:
-        sentences.append(sentence(f"{rng.choice(_OPENERS)} {text}"))
+    clauses = [text for name in names[:2] if (text := _fill(rng.choice(g.details[name].clause), values))]
+    said = [text for name in names[2:] if (text := _fill(rng.choice(g.details[name].sentence), values))]
+    sentences = [sentence(", ".join([act, *clauses])), rng.choice(style.sentence), *map(sentence, said)]
     again = _voice(rng, plain=True)
     while len(" ".join(sentences).split()) < LONG_WORDS[0]:
-        more = again.clause(_phrase(facts, rng, again.pronoun))
+        more = _with(again.clause(_phrase(facts, rng, again.pronoun)), "")
         sentences.append(sentence(f"{rng.choice(_AGAIN)} {more}"))
     words, kept = 0, []
     for text in sentences:
@@ -242,7 +265,6 @@ def long_caption(facts: Facts, rng: random.Random) -> str:
     return " ".join(kept)
 
 
-_OPENERS = ("All this is done", "It happens", "The motion goes on", "One sees it done")
 _AGAIN = ("In other words,", "Seen from outside,", "That is to say,", "To put it differently,", "In short,")
 
 
@@ -254,7 +276,7 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     phrases = []
     for facts in parts:
         after = rng.choice(g.styles[facts.style].after) if not same and rng.random() < 0.6 else ""
-        phrases.append(f"{_phrase(facts, rng, voice.pronoun)} {after}".strip())
+        phrases.append(_with(_phrase(facts, rng, voice.pronoun), after))
     frame = rng.choice(g.two if len(parts) == 2 else g.three)
     text = (
         frame.replace("{a}", phrases[0]).replace("{b_ing}", conjugate(phrases[1], "gerund")).replace("{b}", phrases[1])
@@ -272,22 +294,28 @@ def _loosen(text: str, rng: random.Random) -> str:
     return proper if rng.random() < 0.6 else proper[:-1][:1].lower() + proper[:-1][1:]
 
 
-def captions(parts: Sequence[Facts], seed: str, count: int = 4) -> tuple[str, ...]:
-    """Different captions of a clip, all true of it: short ones, and a long one last where there is one act.
+LONG_SHARE = 0.5  # of the captured clips; a long caption is nearly always a new string, and each costs text features
+
+
+def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ...]:
+    """Different captions of a clip, all true of it: short ones, and for half the clips of one act a long one.
 
     Args:
         parts: the acts of the clip in order.
         seed: the clip's id: the same clip has the same captions everywhere.
         count: how many.
     """
+    if parts[0].text:
+        return parts[0].text
     rng = seeded("captions", seed)
     out: dict[str, None] = {}
-    if parts[0].text:
-        out |= dict.fromkeys(parts[0].text)
-    if len(parts) == 1 and not parts[0].text:
-        out[long_caption(parts[0], rng)] = None
+    wanted = count
+    if len(parts) == 1 and rng.random() < LONG_SHARE:
+        wanted -= 1
     for _ in range(20):
-        if len(out) >= count or parts[0].text:
+        if len(out) >= wanted:
             break
         out[short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)] = None
-    return tuple(reversed(out))
+    if wanted < count:
+        out[long_caption(parts[0], rng)] = None
+    return tuple(out)

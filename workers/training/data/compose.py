@@ -16,17 +16,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from workers.training.checks.judge import straightness
 from workers.training.checks.kinematics import heading, lean, smooth, trunk_up
 from workers.training.data.captions import seeded
-from workers.training.data.describe import CYCLIC, LOCOMOTION, Facts, describe
+from workers.training.data.describe import CYCLIC, Facts, describe
 from workers.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from workers.training.data.splice import join_clips, seam_costs, seam_features
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 LIMIT = MAX_FRAMES + 1  # poses
 
-# How often an act is drawn for a sequence. Travel and greetings are what prompts ask for; the acts of one or two clips stay
-# rare, or the model would learn those clips by heart.
+# How often an act is drawn for a sequence. Travel and greetings are what prompts ask for; the acts of one or two clips
+# stay rare, or the model would learn those clips by heart.
 SEQUENCE_WEIGHTS: dict[str, float] = {
     "walk": 3.0,
     "run": 2.0,
@@ -44,6 +45,7 @@ SEQUENCE_WEIGHTS: dict[str, float] = {
     "call": 0.2,
     "dance": 0.2,
 }
+_STRAIGHT = ("walk", "run", "dash", "walk_back")  # a loop must not bend the way
 _CANDIDATES = 8  # clips among which the best seam is taken
 _WORST_SEAM = 0.6  # mean squared metres, see splice.seam_costs; a bow into a run has 0.4 and looks well
 _ARMS = {"left": (0,), "right": (1,), "both": (0, 1)}
@@ -198,7 +200,7 @@ class Composer:
                 best, least = (part, i, j), cost
         return best
 
-    # -- one act, another length -----------------------------------------------------------------------------------------
+    # -- one act, another length ------------------------------------------------------------------------------------
 
     def retimed(self, name: str) -> Composed | None:
         """One act, longer or shorter than it was captured."""
@@ -219,6 +221,8 @@ class Composer:
             return None
         joints, used, repeats = made
         facts = _measured(part, joints)
+        if act in _STRAIGHT and not straightness(joints, FPS).straight:
+            return None
         return None if facts is None else Composed(name, used, joints, (replace(facts, repeats=repeats),))
 
     def _with_run_up(self, rng: random.Random, part: Part, target: int) -> tuple[Array, tuple[Part, ...], int] | None:
@@ -231,7 +235,7 @@ class Composer:
         leave = range(max(10, min(room, len(walk.joints)) - 20), min(room, len(walk.joints)))
         if not leave:
             return None
-        i, j, cost = best_cut(walk, leave, part, range(0, max(1, core(part)[0])))
+        i, j, cost = best_cut(walk, leave, part, range(max(1, core(part)[0])))
         if cost > _WORST_SEAM / 4:
             return None
         joints = join_clips(walk.joints[: i + 1].astype(np.float64), part.joints[j:].astype(np.float64), FPS)
@@ -248,7 +252,7 @@ def _loop(part: Part, target: int) -> tuple[Array, tuple[Part, ...], int] | None
     """A gait that goes on: jump back to the frame that fits best, as often as it takes."""
     frames = len(part.joints)
     half = max(frames // 2, 8)
-    i, j, cost = best_cut(part, range(max(half, frames - 30), frames), part, range(0, min(half, 30)))
+    i, j, cost = best_cut(part, range(max(half, frames - 30), frames), part, range(min(half, 30)))
     if cost > 0.15 or i - j < 10:
         return None
     whole = part.joints.astype(np.float64)
@@ -266,7 +270,7 @@ def _stretch(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[
     if last - b >= 4 and a >= 1 and rng.random() < 0.35 and target > 1.4 * (b - a):
         joints, repeats = whole, 1
         while len(joints) + (b - a) < target and repeats < 4:
-            i, j, cost = best_cut(part, range(b, last + 1), part, range(0, a + 1))
+            i, j, cost = best_cut(part, range(b, last + 1), part, range(a + 1))
             if cost > 0.1:
                 return None
             joints = join_clips(joints[: len(joints) - (last - i)], whole[j:], FPS)
@@ -318,8 +322,8 @@ def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple
 
 def _enter_range(part: Part) -> range:
     if part.facts.act in CYCLIC:
-        return range(0, max(len(part.joints) - 40, 1))
-    return range(0, core(part)[0] + 1)
+        return range(max(len(part.joints) - 40, 1))
+    return range(core(part)[0] + 1)
 
 
 def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> range:

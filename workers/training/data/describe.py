@@ -1,4 +1,4 @@
-"""What a clip shows, as facts: from its labels, and from what is measured on its joints. Captions are made of these alone."""
+"""What a clip shows, as facts: labels, and what is measured on its joints. Captions are made of these alone."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workers.training.checks.kinematics import Gait, Hand, gait, hand, lean
+from workers.training.checks.strikes import is_lively, kicks, punches, slashes
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
@@ -41,6 +42,7 @@ ACTS: dict[str, str] = {
     "1/slash": "slash",
     "1/dance-short": "dance",
 }
+STRIKES = {"kick": kicks, "punch": punches, "slash": slashes, "dance": is_lively}
 LOCOMOTION = ("walk", "run", "dash", "walk_back", "walk_diagonal", "turn")
 CYCLIC = ("walk", "run", "dash", "walk_back", "walk_diagonal")
 # one style, two names in the two data sets
@@ -101,6 +103,8 @@ def describe(content: str, style: str, joints: NDArray[np.floating], fps: float)
         return replace(facts, side=side) if side else None
     if act == "walk_back":
         return facts if walked.along < -0.5 else None
+    if act in STRIKES:
+        return facts if STRIKES[act](np.asarray(joints, np.float64), fps) else None
     if act in ("walk", "run", "dash"):
         return facts if walked.along > 0.5 and abs(walked.turn) < 40 else None
     return facts
@@ -113,8 +117,8 @@ def _signed(value: float) -> str:
 def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
     """Which hand is up: left, right, both, or empty.
 
-    A hand counts when it gets near the shoulder line, and either rises there by 15 cm and 0.45 of the other hand's rise, or
-    is up for most of the clip (takes that begin with the hands up).
+    A hand counts when it gets near the shoulder line, and either rises there by 15 cm and 0.45 of the other hand's
+    rise, or is up for most of the clip (takes that begin with the hands up).
     """
     rise = [h.rise for h in hands]
     up = [
@@ -134,10 +138,7 @@ _CMU_TEXT: dict[str, tuple[str, ...]] = {
 
 
 def describe_cmu(content: str, joints: NDArray[np.floating], fps: float) -> Facts | None:
-    """Facts of a CMU trial: its captions follow CMU's own description, in a few plain sentences.
-
-    Trials whose description holds for the whole take only (a sequence of several acts) are used when they are one window.
-    """
+    """Facts of a CMU trial: its captions follow CMU's own description, in a few plain sentences."""
     walked, hands, bend = measure(joints, fps)
     kind, _, rest = content.partition(" - ")
     if content in _CMU_TEXT:

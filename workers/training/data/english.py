@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 _DOUBLE = {"run", "jog", "step", "put", "let", "spin", "cut", "jab", "drag", "hop", "stop", "get", "slip", "nod"}
-_WORDS = "zero one two three four five six seven eight nine ten eleven twelve".split()
+_WORDS = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
 _VERB = re.compile(r"<([a-z]+)>")
 
 

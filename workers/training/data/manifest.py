@@ -80,8 +80,9 @@ class Measured(BaseModel):
 class Clip(BaseModel):
     """One line of `clips.jsonl`.
 
-    `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of its
-    first part. `acts` are the acts in order, as the caption grammar calls them.
+    `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
+    its first part. `acts` are the acts in order, as the caption grammar calls them, `sides` the measured side of each:
+    left, right, both, or empty.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -97,5 +98,6 @@ class Clip(BaseModel):
     mirrored: bool
     spliced: tuple[str, ...]
     acts: tuple[str, ...]
+    sides: tuple[str, ...] = ()
     measured: Measured
     captions: tuple[str, ...]

@@ -20,7 +20,7 @@ from shared.motion.rotations import cross, normalize, rotate
 from shared.motion.skeleton import HUMANML3D
 from workers.training.data.rigs import Rig
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 FPS = 20.0
 _UP = np.array([0.0, 1.0, 0.0])
 _REST: Array = HUMANML3D.offsets.astype(np.float64)
@@ -68,8 +68,8 @@ def read_source(clip: BvhClip, rig: Rig, *, where: str) -> SourceMotion:
 def resample_points(points: Array, fps: float, target: float) -> Array:
     """Points (T, ..., 3) at another frame rate by Catmull-Rom splines; whole ratios pick frames and change nothing.
 
-    A straight line between two poses of a punch is 7 mm off at 30 fps; the spline is third order. Bones are brought back
-    to their length by retargeting.
+    A straight line between two poses of a punch is 7 mm off at 30 fps; the spline is third order. Bones are brought
+    back to their length by retargeting.
     """
     count = int(np.floor((len(points) - 1) * target / fps + 1e-6)) + 1
     time = np.arange(count) * (fps / target)
@@ -127,7 +127,7 @@ def _bone(limb: Array, a: int, b: int) -> float:
 
 
 def _frame(up: Array, left: Array) -> Array:
-    """Rotation matrices (T, 3, 3) whose columns are left (X), up (Y), forward (Z); `up` is kept, `left` squared to it."""
+    """Rotation matrices (T, 3, 3) with columns left, up, forward; `up` is kept, `left` squared to it."""
     y = normalize(up)
     z = normalize(cross(left, y))
     return np.stack([cross(y, z), y, z], axis=-1)
@@ -148,7 +148,7 @@ def _sole(leg: Array, lateral: Array, rig: Rig) -> Array:
 
 
 def _ankle_shift(legs: tuple[Array, Array], rig: Rig, scale: float) -> tuple[float, float]:
-    """How much further forward and up the target's ankle is over its flat toe than the scaled source's: hips go along."""
+    """How much further forward and up the target's ankle is over its flat toe than the source's: hips go along."""
     bone = scale * np.mean([_bone(leg, 2, 3) for leg in legs])
     pitch = np.radians(rig.sole_pitch)
     return float(bone * np.cos(pitch) - _REST[10, 2]), float(-_REST[10, 1] - bone * np.sin(pitch))
@@ -175,7 +175,7 @@ def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float
 
 
 def _on_floor(joints: Array) -> Array:
-    """Shift the clip so that standing toes are at height 0: the level under which the lowest 2 % of foot heights lie."""
+    """Shift the clip so that standing toes are at height 0: under it lie the lowest 2 % of foot heights."""
     lowest = joints[:, [7, 8, 10, 11], 1].min(axis=1)
     out = joints.copy()
     out[..., 1] -= np.percentile(lowest, 2)

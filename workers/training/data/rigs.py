@@ -11,7 +11,7 @@ class Limb:
 
     joints: tuple[str, str, str, str]
     foot_lateral: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """For a leg: the direction, in the ankle joint's own frame, that points to the body's left while the foot is flat."""
+    """For a leg: the direction in the ankle joint's frame that points to the body's left while the foot is flat."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,6 @@ class Rig:
         middle: the spine joint under the chest; the bone from it to the chest is the target's second spine bone.
         legs, arms: left, right.
         sole_pitch: degrees by which the ankle-to-toe bone points down while the sole is flat on the floor.
-        toe_height: height of the toe joint over the floor while the sole is flat, in leg lengths.
     """
 
     name: str

@@ -10,31 +10,45 @@ from numpy.typing import NDArray
 
 from workers.training.data.manifest import Clip
 
+SEQUENCE_SHARE = {2: 0.22, 3: 0.05}
+"""Share of the draws that are sequences of two and of three acts; clips of one act have the rest."""
+
 
 def sampling_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
     """Probability of each clip (N,), summing to 1.
 
-    The training split has 1,064 raised hands and one kick. A group is drawn by count^-0.5 of its clips, first by content,
-    then by style within the content: a content with 100 times fewer clips is drawn 10 times more rarely, not 100 times.
-    The content of a looped or spliced clip is its sequence of acts with the content of its first part, so that splices of
-    frequent acts do not crowd out the rest.
+    The training split has 1,064 raised hands and one kick. Clips of one act weigh count^-0.5 of their content, shared
+    out within the content by count^-0.5 of the style: a content with 100 times fewer clips is drawn 10 times more
+    rarely, not 100 times. Sequences have a fixed share (`SEQUENCE_SHARE`) and are drawn evenly, since they were
+    composed by weights.
     """
-    contents = [_content(clip) for clip in clips]
-    styles = list(zip(contents, (clip.style for clip in clips), strict=True))
-    per_content, per_style = Counter(contents), Counter(styles)
-    share_of_content = {name: count**0.5 for name, count in per_content.items()}
-    share_of_style = {key: count**0.5 for key, count in per_style.items()}
-    styles_of: Counter[str] = Counter()
-    for (content, _), share in share_of_style.items():
-        styles_of[content] += share  # type: ignore[assignment]
-    weights = np.array(
-        [
-            share_of_content[content] * share_of_style[content, style] / styles_of[content] / per_style[content, style]
-            for content, style in styles
-        ]
-    )
+    weights = np.zeros(len(clips))
+    single = [k for k, clip in enumerate(clips) if len(clip.acts) == 1]
+    weights[single] = _by_content([clips[k] for k in single])
+    lengths = np.array([len(clip.acts) for clip in clips])
+    for length, share in SEQUENCE_SHARE.items():
+        chosen = lengths == length
+        weights[chosen] = share / max(int(chosen.sum()), 1)
+    weights[single] *= 1 - weights[lengths > 1].sum()
     return weights / weights.sum()
 
 
+def _by_content(clips: Sequence[Clip]) -> NDArray[np.float64]:
+    """Weights of clips of one act, summing to 1."""
+    keys = [(_content(clip), clip.style) for clip in clips]
+    per_content, per_key = Counter(content for content, _ in keys), Counter(keys)
+    styles: dict[str, float] = {}
+    for (content, _), count in per_key.items():
+        styles[content] = styles.get(content, 0.0) + count**0.5
+    weights = np.array(
+        [
+            per_content[content] ** 0.5 * (per_key[content, style] ** 0.5 / styles[content]) / per_key[content, style]
+            for content, style in keys
+        ]
+    )
+    return weights / weights.sum() if len(weights) else weights
+
+
 def _content(clip: Clip) -> str:
-    return "+".join(clip.acts) if len(clip.acts) > 1 else clip.content
+    """Label of a clip of one act; the kind alone of a source whose labels are free text."""
+    return f"{clip.dataset}/{clip.content.split(' - ')[0]}" if clip.acts == ("cmu",) else clip.content

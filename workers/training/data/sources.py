@@ -24,8 +24,8 @@ SOURCES: dict[str, Source] = {
             "bandai-namco",
             "Bandai-Namco Research Motion Dataset 1 and 2",
             "CC BY-NC 4.0",
-            "Kobayashi et al., Motion Capture Dataset for Practical Use of AI-based Motion Editing and Stylization, 2023, "
-            "arXiv 2306.08861; Bandai Namco Research Inc.",
+            "Kobayashi et al., Motion Capture Dataset for Practical Use of AI-based Motion Editing and Stylization, "
+            "2023, arXiv 2306.08861; Bandai Namco Research Inc.",
             "https://github.com/BandaiNamcoResearchInc/Bandai-Namco-Research-Motiondataset",
         ),
         Source(

@@ -16,7 +16,7 @@ from shared.motion.skeleton import HUMANML3D
 from workers.training.checks.kinematics import heading
 from workers.training.data.retarget import two_bones
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 
 BLEND_SECONDS = 0.5
 _PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
@@ -162,7 +162,7 @@ def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array
     return joints
 
 
-# -- where to cut ----------------------------------------------------------------------------------------------------
+# -- where to cut --------------------------------------------------------------------------------------------------
 
 
 def seam_features(joints: Array, fps: float) -> Array:

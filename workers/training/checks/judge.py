@@ -1,0 +1,414 @@
+"""Does a motion do what a prompt says? Judged on joints (T, 22, 3) and frames a second alone.
+
+Thresholds were set on the training clips of the Bandai-Namco sets; the checker's own rate on their test clips, and how
+often it passes clips of other acts, stand in the report of `rates.py` beside every number it gives on generated motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from workers.training.checks.kinematics import (
+    ANKLES,
+    HEAD,
+    PELVIS,
+    SHOULDERS,
+    TOES,
+    WRISTS,
+    Array,
+    Gait,
+    body_frame,
+    gait,
+    heading,
+    lean,
+    runs,
+    smooth,
+    trunk_up,
+    turning_points,
+    velocity,
+)
+from workers.training.checks.strikes import is_lively, kicks, punches, slashes
+
+Act = Literal["walk", "run", "walk_back", "turn", "wave", "raise", "bow", "kick", "punch", "slash", "dance"]
+Side = Literal["", "left", "right", "both"]
+
+_LEAST_PART = 0.8  # seconds that each act of a sequence needs
+_SPLIT_STEP = 0.2  # seconds between the moments at which a sequence is tried to be split
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """One act that a prompt asks for.
+
+    Attributes:
+        act: what is done.
+        side: for turns left or right; for hands left, right or both.
+        straight: the way must be straight (for walking, running and walking backward).
+    """
+
+    act: Act
+    side: Side = ""
+    straight: bool = False
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a motion passes, and why not."""
+
+    passed: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What one hand does within a stretch.
+
+    Attributes:
+        peak: highest wrist over the shoulder line, metres, along the trunk.
+        rise: highest over lowest, metres.
+        lifted: seconds near the shoulder line or over it.
+        swings: half swings of the lifted hand of at least 3 cm.
+        flutter: half swings of at least 1 cm, well within the lift.
+    """
+
+    peak: float
+    rise: float
+    lifted: float
+    swings: int
+    flutter: int
+
+    @property
+    def up(self) -> bool:
+        """Lifted on purpose: arms of runners get to -0.1, but are not stretched up from below."""
+        return self.peak > -0.14 and (self.rise > 0.25 or self.lifted > 1.0)
+
+    @property
+    def down(self) -> bool:
+        """Clearly not lifted."""
+        return self.peak < -0.16 or (self.peak < -0.05 and self.rise < 0.25)
+
+    @property
+    def waves(self) -> bool:
+        """Swings: five and more (raised hands have up to three), or small ones within a lift that lasts: a wave from the
+        wrist moves the wrist joint by a centimetre or two."""
+        return (
+            self.swings >= 5 or (self.lifted >= 1.5 and self.flutter >= 4) or (self.lifted >= 4.5 and self.flutter >= 3)
+        )
+
+
+class Stretch:
+    """A motion or a part of it, with what is measured on it, each measure taken once."""
+
+    def __init__(self, joints: Array, fps: float) -> None:
+        self.joints = np.asarray(joints, np.float64)
+        self.fps = fps
+
+    @property
+    def seconds(self) -> float:
+        """Length."""
+        return len(self.joints) / self.fps
+
+    @cached_property
+    def heading(self) -> Array:
+        """(T,) degrees."""
+        return heading(self.joints, self.fps)
+
+    @cached_property
+    def gait(self) -> Gait:
+        """Travel, turn, steps."""
+        return gait(self.joints, self.fps)
+
+    @cached_property
+    def along(self) -> Array:
+        """(T,) speed in the direction the body faces, metres a second, smoothed over a step."""
+        pelvis = smooth(self.joints[:, PELVIS], 0.25, self.fps)
+        return body_frame(velocity(pelvis, self.fps), self.heading)[0]
+
+    @cached_property
+    def arms(self) -> tuple[Arm, Arm]:
+        """Left and right."""
+        return arm(self.joints, self.heading, self.fps, 0), arm(self.joints, self.heading, self.fps, 1)
+
+    @cached_property
+    def running(self) -> bool:
+        """Whether the travel is a run."""
+        return is_run(self.joints, self.fps)
+
+    @cached_property
+    def bend(self) -> float:
+        """Deepest forward lean over the upright one, degrees, that is held by standing legs."""
+        angle = lean(self.joints, self.fps)
+        standing = np.abs(smooth(self.along, 0.1, self.fps)) < 0.35
+        return float(angle[standing].max() - np.percentile(angle, 20)) if standing.any() else 0.0
+
+    def part(self, first: int, last: int) -> Stretch:
+        """Frames `first` to `last` (exclusive)."""
+        return Stretch(self.joints[first:last], self.fps)
+
+
+def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
+    """Measure a hand; side 0 is the left one."""
+    wrist = joints[:, WRISTS[side]]
+    middle = (joints[:, SHOULDERS[0]] + joints[:, SHOULDERS[1]]) / 2
+    over = smooth(np.einsum("ti,ti->t", wrist - middle, trunk_up(joints)), 0.05, fps)
+    lifted = over > -0.16
+    high = lifted & (over > over.max() - max(0.4 * float(np.ptp(over)), 0.25))
+    hold = np.zeros_like(high)
+    if high.any():
+        hold[np.argmax(high) : len(high) - np.argmax(high[::-1])] = True
+    local = np.stack([*body_frame(wrist - joints[:, SHOULDERS[side]], angle), wrist[:, 1]], axis=-1)
+    swings = flutter = 0
+    for a, b in runs(hold):
+        moved = local - smooth(local, 0.5, fps)
+        swings = max(swings, _swings(moved[a:b], 0.15, 0.03, fps))
+        flutter = max(flutter, _swings(moved[a:b], 0.4, 0.01, fps))
+    return Arm(float(over.max()), float(np.ptp(over)), float(lifted.sum() / fps), swings, flutter)
+
+
+def _swings(moved: Array, margin: float, least: float, fps: float) -> int:
+    """Half swings of at least `least` metres along the main axis, `margin` seconds of the lift itself left out."""
+    edge = round(margin * fps)
+    moved = moved[edge : len(moved) - edge]
+    if len(moved) < 6:
+        return 0
+    axes = np.linalg.svd(moved - moved.mean(axis=0), full_matrices=False)[2]
+    return turning_points(moved @ axes[0], least)
+
+
+def is_run(joints: Array, fps: float) -> bool:
+    """Running: for a share of the time no foot stands (walks have next to none).
+
+    A foot stands while its ankle or toe is slower than about a third of the body. Between 1 and 8 % (a shuffle of an
+    old runner, a lively walk) the knees decide: walkers stretch one leg nearly at all times, runners none.
+    """
+    body = gait(joints, fps)
+    if body.speed < 0.9:
+        return False
+    points = joints[:, [*ANKLES, *TOES]]
+    speed = np.linalg.norm(velocity(points, fps), axis=-1)
+    slow = np.minimum(speed[:, :2], speed[:, 2:]) < 0.35 * body.speed + 0.1
+    flight = float((~slow).all(axis=1).mean())
+    straighter = np.minimum(_flexion(joints, 1, 4, 7), _flexion(joints, 2, 5, 8))
+    return flight > 0.08 or (flight > 0.012 and float(np.median(straighter)) > 38.5)
+
+
+def _flexion(joints: Array, a: int, b: int, c: int) -> Array:
+    u, v = joints[:, a] - joints[:, b], joints[:, c] - joints[:, b]
+    cosine = np.einsum("ti,ti->t", u, v) / np.maximum(np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1), 1e-9)
+    return 180 - np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+# -- single acts ---------------------------------------------------------------------------------------------------
+
+
+def _travels(m: Stretch, want: Expectation, *, run: bool) -> str:
+    body = m.gait
+    needed = max(0.5, (0.5 if run else 0.25) * m.seconds)
+    if body.along < needed:
+        return f"goes {body.along:.1f} m forward in {m.seconds:.1f} s"
+    if np.mean(m.along > 0.2) < 0.6:
+        return "stands for much of the time"
+    if abs(body.turn) > 45:
+        return f"turns by {body.turn:.0f} degrees"
+    if m.running != run:
+        return "runs" if m.running else "walks, does not run"
+    return _drifts(m) if want.straight else ""
+
+
+def _drifts(m: Stretch) -> str:
+    way = straightness(m.joints, m.fps)
+    return f"drifts {way.deviation:.2f} m off a straight way of {way.length:.1f} m" if not way.straight else ""
+
+
+def _walk(m: Stretch, want: Expectation) -> str:
+    return _travels(m, want, run=False)
+
+
+def _run(m: Stretch, want: Expectation) -> str:
+    return _travels(m, want, run=True)
+
+
+def _walk_back(m: Stretch, want: Expectation) -> str:
+    if m.gait.along > -max(0.5, 0.2 * m.seconds):
+        return f"goes {-m.gait.along:.1f} m backward in {m.seconds:.1f} s"
+    if np.mean(m.along < -0.12) < 0.6:
+        return "does not go backward for much of the time"
+    if abs(m.gait.turn) > 60:
+        return f"turns by {m.gait.turn:.0f} degrees"
+    return _drifts(m) if want.straight else ""
+
+
+def _turn(m: Stretch, want: Expectation) -> str:
+    angle = m.gait.turn if want.side == "left" else -m.gait.turn
+    if angle < 45:
+        return f"turns {angle:.0f} degrees to the {want.side}"
+    if angle > 200:
+        return f"turns {angle:.0f} degrees: more than a turn"
+    return "" if m.gait.path > 0.6 and m.gait.along > 0.4 else f"turns on the spot ({m.gait.path:.1f} m)"
+
+
+def _arms(m: Stretch, side: Side) -> tuple[list[Arm], list[Arm]]:
+    """The arms asked for, and the others."""
+    named = list(zip(m.arms, ("left", "right"), strict=True))
+    return [a for a, name in named if side in (name, "both")], [a for a, name in named if side not in (name, "both")]
+
+
+def _side_up(m: Stretch, side: Side) -> str:
+    wanted, others = _arms(m, side)
+    if not side:
+        return "" if any(a.up for a in m.arms) else "no hand is lifted"
+    if not all(a.up for a in wanted):
+        return f"the {side} hand is not lifted" if side != "both" else "not both hands are lifted"
+    if any(a.up and not a.down and a.rise > 0.6 * max(w.rise for w in wanted) for a in others):
+        return "the other hand is lifted too"
+    return ""
+
+
+def _wave(m: Stretch, want: Expectation) -> str:
+    if problem := _side_up(m, want.side):
+        return problem
+    wanted, others = _arms(m, want.side)
+    if m.gait.path > 0.3 * m.seconds + 0.4 and max(a.peak for a in wanted or others) < 0.15:
+        return "swings the arms while walking"
+    if not any(a.waves for a in wanted or others):
+        return f"the hand is lifted, but swings {max((a.swings for a in wanted or others), default=0)} times"
+    return ""
+
+
+def _raise(m: Stretch, want: Expectation) -> str:
+    if problem := _side_up(m, want.side):
+        return problem
+    wanted, others = _arms(m, want.side)
+    if any(a.swings >= 6 for a in (wanted or others)):
+        return "waves"
+    return f"walks {m.gait.path:.1f} m meanwhile" if m.gait.path > 0.3 * m.seconds + 0.5 else ""
+
+
+def _bow(m: Stretch, want: Expectation) -> str:
+    if m.bend < 14:
+        return f"leans forward by {m.bend:.0f} degrees"
+    if m.gait.path > 0.2 * m.seconds + 0.4:
+        return f"walks {m.gait.path:.1f} m meanwhile"
+    head = smooth(m.joints[:, HEAD, 1], 0.1, m.fps)
+    return "" if np.percentile(head, 95) - head.min() > 0.05 else "the head does not go down"
+
+
+def _kick(m: Stretch, want: Expectation) -> str:
+    return "" if kicks(m.joints, m.fps) else "no foot comes near the height of the hips"
+
+
+def _punch(m: Stretch, want: Expectation) -> str:
+    if m.gait.path > 0.5 * m.seconds + 0.5:
+        return f"travels {m.gait.path:.1f} m"
+    return "" if punches(m.joints, m.fps) else "no fist shoots forward"
+
+
+def _slash(m: Stretch, want: Expectation) -> str:
+    return "" if slashes(m.joints, m.fps) else "the hands do not cut down together from over the head"
+
+
+def _dance(m: Stretch, want: Expectation) -> str:
+    if not is_lively(m.joints, m.fps):
+        return "moves little"
+    direct = float(np.linalg.norm((m.joints[-1, PELVIS] - m.joints[0, PELVIS])[[0, 2]])) / m.seconds
+    if direct > 0.7:
+        return f"travels ahead at {direct:.1f} m/s"
+    if _variety(m, ANKLES) < 0.12:
+        return "the legs hardly move"
+    return "" if _variety(m, WRISTS) > 0.2 else "the arms hardly move"
+
+
+def _variety(m: Stretch, joints: tuple[int, int]) -> float:
+    """Root mean square of how far two joints get from their mean place in the body, metres."""
+    limbs = m.joints[:, list(joints)] - m.joints[:, [PELVIS]]
+    forward, left = body_frame(limbs, m.heading[:, None])
+    local = np.stack([forward, limbs[..., 1], left], axis=-1)
+    return float(np.sqrt(np.sum((local - local.mean(axis=0)) ** 2, axis=-1).mean()))
+
+
+_CHECKS: dict[str, Callable[[Stretch, Expectation], str]] = {
+    "walk": _walk,
+    "run": _run,
+    "walk_back": _walk_back,
+    "turn": _turn,
+    "wave": _wave,
+    "raise": _raise,
+    "bow": _bow,
+    "kick": _kick,
+    "punch": _punch,
+    "slash": _slash,
+    "dance": _dance,
+}
+
+
+# -- motions -------------------------------------------------------------------------------------------------------
+
+
+def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict:
+    """Whether a motion does what is expected, in that order.
+
+    Args:
+        joints: (T, 22, 3) metres, Y up, anywhere and facing anywhere.
+        fps: frames a second.
+        expected: one act, or several in their order.
+    """
+    motion = Stretch(joints, fps)
+    if len(expected) == 1:
+        reason = _CHECKS[expected[0].act](motion, expected[0])
+        return Verdict(not reason, reason)
+    reason = _in_order(motion, list(expected))
+    return Verdict(not reason, reason)
+
+
+def _in_order(motion: Stretch, expected: list[Expectation]) -> str:
+    """Look for moments that part the motion so that each part does its act, and does not do the next one already."""
+    step, least = round(_SPLIT_STEP * motion.fps), round(_LEAST_PART * motion.fps)
+    frames = len(motion.joints)
+    rest = (len(expected) - 1) * least
+    first, second = expected[0], expected[1]
+    reason = "too short for its acts"
+    for at in range(least, frames - rest + 1, step):
+        before = motion.part(0, at)
+        reason_before = _CHECKS[first.act](before, first)
+        if reason_before:
+            reason = reason if reason.startswith("then") else f"first ({first.act}): {reason_before}"
+            continue
+        if (first.act, first.side) != (second.act, second.side) and not _CHECKS[second.act](before, second):
+            reason = f"then: the {second.act} comes before or together with the {first.act}"
+            continue
+        after = motion.part(at, frames)
+        last = len(expected) == 2
+        reason_after = _CHECKS[second.act](after, second) if last else _in_order(after, expected[1:])
+        if not reason_after:
+            return ""
+        reason = f"then ({second.act}): {reason_after}"
+    return reason
+
+
+@dataclass(frozen=True)
+class Straightness:
+    """How straight a way is: length and largest distance from the line between its ends, metres."""
+
+    length: float
+    deviation: float
+
+    @property
+    def straight(self) -> bool:
+        """Real straight walks sway by a step's width and are up to 8 % off."""
+        return self.deviation < 0.12 + 0.08 * self.length
+
+
+def straightness(joints: Array, fps: float) -> Straightness:
+    """Measure the way of the pelvis over the floor, sway taken out."""
+    way = smooth(np.asarray(joints, np.float64)[:, PELVIS], 0.4, fps)[:, [0, 2]]
+    chord = way[-1] - way[0]
+    length = float(np.linalg.norm(chord))
+    if length < 1e-6:
+        return Straightness(0.0, 0.0)
+    offset = way - way[0]
+    return Straightness(length, float(np.abs(offset[:, 0] * chord[1] - offset[:, 1] * chord[0]).max() / length))
