@@ -8,6 +8,7 @@ It is the labeller's; node features come from the float32 one, since "left hand"
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,9 +99,11 @@ class _Layer:
 def _int8_linear(weight: torch.Tensor, bias: torch.Tensor) -> Linear:
     scale = (weight.abs().amax(dim=1) / 127).clamp(min=1e-8).double()
     zero = torch.zeros(len(weight), dtype=torch.long)
-    quantized: Any = torch.quantize_per_channel(weight, scale, zero, 0, torch.qint8)
     operators: Any = torch.ops.quantized
-    packed = operators.linear_prepack(quantized, bias)
+    with warnings.catch_warnings():  # "deprecated": torch is pinned, and its successor needs another package
+        warnings.simplefilter("ignore", UserWarning)
+        quantized: Any = torch.quantize_per_channel(weight, scale, zero, 0, torch.qint8)
+        packed = operators.linear_prepack(quantized, bias)
     return lambda x: operators.linear_dynamic(x, packed, True)  # True: one bit less on x, no overflow without VNNI
 
 

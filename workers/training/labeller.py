@@ -26,7 +26,7 @@ from shared.text.light import LightLabeller, WordStates
 from shared.text.light_network import LightConfig, LightNetwork
 from shared.text.roles import Frame
 from workers.training.labeller_card import card
-from workers.training.labeller_data import distinct, fold_of, read_gold
+from workers.training.labeller_data import corrected, distinct, fold_of, read_gold
 from workers.training.labeller_fit import FitConfig, fit, tag_set
 from workers.training.labeller_grammar import Example
 from workers.training.labeller_score import Scores, confusions
@@ -70,7 +70,7 @@ def cross_validate(
     said: list[tuple[Frame, ...]] = []
     wanted: list[tuple[Frame, ...]] = []
     for fold in range(folds):
-        train = [example for example in unique if fold_of(example.words, folds) != fold]
+        train = [corrected(example) for example in unique if fold_of(example.words, folds) != fold]
         head = fit(train, states, network, config, seed)
         labeller = LightLabeller(head, states, "")
         for example in unique:
@@ -143,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.folds:
             result = cross_validate(gold, states, network, config, options.folds, options.seed)
             _say("  ".join(f"{name} {value}" for name, value in result.metrics().items()))
-        head = fit(distinct(gold), states, network, config, options.seed)
+        head = fit([corrected(example) for example in distinct(gold)], states, network, config, options.seed)
         bundle = pack(options.output, head, minilm, options.gold, config, options.seed, result)
     except MareyError as error:
         _say(str(error))

@@ -21,12 +21,12 @@ from workers.training.labeller_grammar import Example, sentence
 class FitConfig:
     """How the head is trained."""
 
-    steps: int = 900
+    steps: int = 1000
     batch: int = 24  # sentences
     learning_rate: float = 2e-3
     weight_decay: float = 0.05
     variants: int = 6  # augmented copies of each gold sentence
-    grammar: int = 700  # silver sentences
+    grammar: int = 1000  # silver sentences
     gold_weight: float = 2.0
     grammar_weight: float = 0.7
     predicate_weight: float = 2.0

@@ -38,6 +38,12 @@ SUBJECTS = (
     "a character|the man|a young man|an old woman|an elderly man|a tired person|a happy person|an actor|a dancer|"
     "the character|a guy|a girl|a boy|a child|a standing person|a person|a person|a person|a person|subject|person"
 )
+MODIFIERS = (
+    "in a childish mood|in a good mood|with long hair|in a bad mood|of old age|on the left|with a limp|"
+    "in a feminine mood|full of energy|in a musical mood|with low confidence|in a red shirt"
+)
+"""Stand between subject and verb, inside the subject's span."""
+PRODUCT_VERBS = frozenset({"wave", "raise", "bow", "kick", "punch", "slash", "dance", "walk", "run", "turn"})
 PHRASES = {
     "way": "forward|forwards|backward|backwards|straight ahead|to the left|to the right|to the side|left|right|"
     "sideways|straight forward|ahead|away|around|to his left|to their right|diagonally|back|straight|up|down|"
@@ -183,7 +189,7 @@ def sentence(rng: random.Random) -> Example:
     """One sentence of the grammar, without capitals and final stop (the augmentation adds noise)."""
     builder = _Builder()
     style = rng.random()
-    subject = None if style < 0.15 else builder.add(pick(SUBJECTS, rng))
+    subject = None if style < 0.15 else _subject(builder, rng)
     form = 0 if subject is None else 2 if style < 0.4 else 3 if style < 0.45 else 1
     clauses = rng.choices((1, 2, 3, 4), (50, 33, 12, 5))[0]
     for index in range(clauses):
@@ -196,6 +202,20 @@ def sentence(rng: random.Random) -> Example:
         if rng.random() < 0.1:
             _while(builder, rng, subject)
     return Example(tuple(builder.words), tuple(sorted(builder.frames, key=lambda frame: frame.predicate)))
+
+
+def _subject(builder: _Builder, rng: random.Random) -> tuple[int, int]:
+    start, stop = builder.add(pick(SUBJECTS, rng))
+    if rng.random() < 0.08:
+        _, stop = builder.add(rng.choice(MODIFIERS.split("|")))
+    return start, stop
+
+
+def _verb(rng: random.Random) -> Verb:
+    """A verb; those the captions hardly have and prompts often do come more often."""
+    verb = rng.choice(VERBS)
+    again = rng.random() < 0.4 and verb.forms.split()[0] not in PRODUCT_VERBS
+    return rng.choice(VERBS) if again else verb
 
 
 def _join(builder: _Builder, rng: random.Random) -> list[tuple[str, str]]:
@@ -228,7 +248,7 @@ def _clause(
     if form != 0 and subject and rng.random() < 0.08:
         _start(builder, rng, subject, form, spans)
         return
-    verb = rng.choice(VERBS)
+    verb = _verb(rng)
     predicate, _ = builder.add(verb.forms.split()[form])
     spans += _arguments(builder, rng, verb)
     builder.frames.append(_frame(predicate, subject and (verb.subject, *subject), spans))
@@ -261,7 +281,7 @@ def _start(
     inner_form = 0 if rng.random() < 0.6 else 2
     if inner_form == 0:
         builder.add("to")
-    verb = rng.choice(VERBS)
+    verb = _verb(rng)
     inner, _ = builder.add(verb.forms.split()[inner_form])
     builder.frames.append(_frame(inner, (verb.subject, *subject), _arguments(builder, rng, verb)))
     spans = [*spans, ("ARG1", start, len(builder.words))]
@@ -273,7 +293,7 @@ def _while(builder: _Builder, rng: random.Random, subject: tuple[int, int] | Non
     frame = builder.frames.pop()
     start = len(builder.words)
     builder.add(rng.choice(("while", "while", "while", "before", "after")))
-    verb = rng.choice(VERBS)
+    verb = _verb(rng)
     inner, _ = builder.add(verb.forms.split()[2])
     inner_frame = _frame(inner, subject and (verb.subject, *subject), _arguments(builder, rng, verb))
     time = Argument("ARGM-TMP", start, len(builder.words))

@@ -1,0 +1,40 @@
+"""Text on one thread: labelling a caption of 12 words, encoding it, and a whole new prompt."""
+
+from __future__ import annotations
+
+import itertools
+
+import torch
+
+from benchmarks.harness import measure, table
+from shared.bundles import TextSpec
+from shared.text.encoders import find_weights
+from shared.text.minilm import MiniLM
+from shared.text.pipeline import TextPipeline
+
+CAPTION = "a person walks forward in a circle and then waves his hand"
+
+
+def main() -> None:
+    """Print the tables."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        pipeline = TextPipeline.load(TextSpec())
+        words = CAPTION.split()
+        coarse = MiniLM(find_weights("minilm"), int8=True)
+        ids = coarse.tokenizer.encode(CAPTION).ids
+        numbers = itertools.count()
+        functions = {
+            "MiniLM int8, one sentence": lambda: coarse.states(ids),
+            "label 12 words (goal: 5 ms)": lambda: pipeline.labeller.label([words]),
+            "MiniLM float32, one sentence": lambda: pipeline.encoder.encode(CAPTION),
+            "features of a prompt with new words": lambda: pipeline.features([f"{CAPTION} x{next(numbers)}"]),
+        }
+        print(table("Text, one thread", measure(functions, repeats=200, warm_up=20)))
+    finally:
+        torch.set_num_threads(threads)
+
+
+if __name__ == "__main__":
+    main()

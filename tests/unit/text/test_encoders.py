@@ -1,0 +1,176 @@
+"""Text encoders: MiniLM as it is, CLIP and T5 with tiny random weights."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.bundles import TextSpec
+from shared.errors import InvalidBundle, InvalidFile, NotFound
+from shared.settings import Settings
+from shared.text.encoders import Encoding, find_weights, load_encoder, weights_sha256
+from shared.text.minilm import MiniLM
+from shared.text.minilm_encoder import MiniLMEncoder
+from shared.text.pipeline import TextPipeline
+
+TEXT = "a person walks, and waves his left hand"
+LONG = " ".join(["a person walks forward and then turns left slowly"] * 20)
+
+
+@pytest.fixture(scope="module")
+def minilm() -> MiniLMEncoder:
+    return MiniLMEncoder(find_weights("minilm"))
+
+
+def check_alignment(encoding: Encoding, text: str, word: str) -> None:
+    """The span of a word is the mean of exactly the tokens whose characters lie in it."""
+    start = text.index(word)
+    rows = [i for i, (a, b) in enumerate(encoding.offsets) if a >= start and b <= start + len(word) and b > a]
+    assert rows
+    assert "".join(text[a:b] for a, b in (encoding.offsets[i] for i in rows)) == word
+    span = encoding.span(start, start + len(word))
+    assert span is not None
+    assert np.allclose(span, encoding.tokens[rows].mean(axis=0))
+
+
+def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
+    import torch
+    from transformers import AutoTokenizer, BertModel
+
+    folder = find_weights("minilm")
+    model = BertModel.from_pretrained(folder, add_pooling_layer=False).eval()
+    inputs = AutoTokenizer.from_pretrained(folder)(TEXT, return_tensors="pt")
+    with torch.inference_mode():
+        reference = model(**inputs, output_hidden_states=True).hidden_states
+    states = MiniLM(folder).states(inputs["input_ids"][0].tolist())
+    assert len(states) == 7
+    for mine, theirs in zip(states, reference, strict=True):
+        assert torch.allclose(mine, theirs[0], atol=2e-5)
+    mean = reference[-1][0].mean(0)
+    assert np.allclose(minilm.encode(TEXT).pooled, (mean / mean.norm()).numpy(), atol=2e-6)
+
+
+def test_minilm_int8_is_close_but_not_equal() -> None:
+    ids = [101, 1037, 2711, 7365, 102]
+    exact = MiniLM(find_weights("minilm")).states(ids)[-1]
+    coarse = MiniLM(find_weights("minilm"), int8=True).states(ids)[-1]
+    similarity = float((exact * coarse).sum() / exact.norm() / coarse.norm())
+    assert 0.9 < similarity < 0.9999
+
+
+def test_minilm_vectors_are_unit_and_tell_sides_apart(minilm: MiniLMEncoder) -> None:
+    left, right = (minilm.encode(f"a person raises the {side} hand").pooled for side in ("left", "right"))
+    assert left.shape == (384,)
+    assert np.isclose(np.linalg.norm(left), 1.0, atol=1e-5)
+    assert float(left @ right) < 0.999
+
+
+def test_minilm_tokens_align_with_words(minilm: MiniLMEncoder) -> None:
+    encoding = minilm.encode(TEXT)
+    for word in ("person", "waves", "left hand"):
+        assert encoding.span(TEXT.index(word), TEXT.index(word) + len(word)) is not None
+    check_alignment(encoding, TEXT, "waves")
+
+
+def test_minilm_leaves_out_what_lies_past_its_limit(minilm: MiniLMEncoder) -> None:
+    text = "counterclockwise " * 200
+    encoding = minilm.encode(text)
+    assert len(encoding.tokens) == len(encoding.offsets) == 256
+    assert encoding.span(len(text) - 10, len(text)) is None
+
+
+def test_clip_gives_512_wide_vectors_and_aligned_tokens(tiny_clip: Path) -> None:
+    encoder = load_encoder("clip-vit-b32", tiny_clip)
+    encoding = encoder.encode(TEXT)
+    assert encoder.width == 512
+    assert encoding.pooled.shape == (512,)
+    assert encoding.tokens.shape == (len(encoding.offsets), 512)
+    check_alignment(encoding, TEXT, "waves")
+
+
+def test_clip_pools_the_end_token_in_the_space_of_its_tokens(tiny_clip: Path) -> None:
+    encoding = load_encoder("clip-vit-b32", tiny_clip).encode(TEXT)
+    assert np.allclose(encoding.pooled, encoding.tokens[-1], atol=1e-5)
+
+
+def test_clip_reads_prompts_past_77_tokens(tiny_clip: Path) -> None:
+    encoding = load_encoder("clip-vit-b32", tiny_clip).encode(LONG)
+    assert len(encoding.tokens) == 77
+    assert np.isfinite(encoding.pooled).all()
+    assert encoding.span(len(LONG) - 6, len(LONG)) is None
+
+
+def test_t5_gives_768_wide_vectors_and_aligned_tokens(tiny_t5: tuple[str, Path]) -> None:
+    name, folder = tiny_t5
+    encoder = load_encoder(name, folder)
+    encoding = encoder.encode("a person walks and waves")
+    assert (encoder.name, encoder.width) == (name, 768)
+    assert encoding.tokens.shape == (len(encoding.offsets), 768)
+    assert np.allclose(encoding.pooled, encoding.tokens.mean(axis=0), atol=1e-5)
+    first, last = encoding.span(0, 1), encoding.span(19, 24)
+    assert first is not None
+    assert last is not None
+    assert not np.allclose(first, last)
+
+
+def test_t5_reads_prompts_past_77_tokens(tiny_t5: tuple[str, Path]) -> None:
+    encoding = load_encoder(*tiny_t5).encode(LONG)
+    assert len(encoding.tokens) > 77
+    assert encoding.span(len(LONG) - 6, len(LONG)) is not None
+
+
+def test_the_two_t5_of_one_width_are_not_taken_for_each_other(tiny_t5: tuple[str, Path]) -> None:
+    name, folder = tiny_t5
+    other = {"t5-base": "t5-v1_1-base", "t5-v1_1-base": "t5-base"}[name]
+    with pytest.raises(InvalidFile, match="feed-forward"):
+        load_encoder(other, folder)
+
+
+def test_another_model_is_not_taken_for_clip(tiny_t5: tuple[str, Path]) -> None:
+    with pytest.raises(InvalidFile, match="CLIP"):
+        load_encoder("clip-vit-b32", tiny_t5[1])
+
+
+def test_truncated_weights_are_refused(tiny_clip: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "clip"
+    shutil.copytree(tiny_clip, broken)
+    file = broken / "model.safetensors"
+    file.write_bytes(file.read_bytes()[:10_000])
+    with pytest.raises(InvalidFile):
+        load_encoder("clip-vit-b32", broken)
+
+
+def test_pickled_weights_are_not_loaded(tiny_clip: Path, tmp_path: Path) -> None:
+    pickled = tmp_path / "clip"
+    shutil.copytree(tiny_clip, pickled)
+    (pickled / "model.safetensors").rename(pickled / "pytorch_model.bin")
+    with pytest.raises(InvalidFile, match="safetensors"):
+        load_encoder("clip-vit-b32", pickled)
+
+
+def test_weights_that_are_nowhere_say_how_to_get_them(tmp_path: Path) -> None:
+    with pytest.raises(NotFound) as caught:
+        find_weights("clip-vit-b32", config=Settings(models=tmp_path, home=tmp_path))
+    assert "openai/clip-vit-base-patch32" in str(caught.value)
+
+
+def test_other_weights_than_the_bundle_names_are_refused(tiny_clip: Path) -> None:
+    spec = TextSpec(encoder="clip-vit-b32", width=512, encoder_sha256="0" * 64, labeller="none")
+    with pytest.raises(InvalidBundle, match="trained with encoder"):
+        TextPipeline.load(spec, encoder_path=tiny_clip)
+
+
+def test_another_width_than_the_bundle_names_is_refused(tiny_clip: Path) -> None:
+    with pytest.raises(InvalidBundle, match="width"):
+        TextPipeline.load(TextSpec(encoder="clip-vit-b32", width=384, labeller="none"), encoder_path=tiny_clip)
+
+
+def test_a_pipeline_on_clip_encodes_nodes_of_both_kinds(tiny_clip: Path) -> None:
+    for kind in ("pooled", "span"):
+        spec = TextSpec(encoder="clip-vit-b32", width=512, labeller="none", node_features=kind)
+        pipeline = TextPipeline.load(spec, encoder_path=tiny_clip)
+        assert pipeline.spec.encoder_sha256 == weights_sha256(tiny_clip)
+        assert pipeline.features([LONG])[0].nodes.shape == (1, 512)
