@@ -1,0 +1,213 @@
+"""Does a bundle do what the prompt says? The 200 evaluation prompts, several seeds, judged on the exported joints.
+
+    python -m workers.hgm3.obedience models/hgm3-starter --seeds 3 -o report
+
+The checker (`workers/training/checks`) reads joints only and knows nothing of the model; its own rate on real clips
+belongs beside every number here. Motions are judged as users get them: feet cleaned, rotations solved.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shared.errors import InvalidBundle, MareyError
+from shared.text.features import TextFeatures
+from shared.text.pipeline import TextPipeline
+from workers.hgm3.export import finish
+from workers.hgm3.generate import MAX_ROWS, Generator, Request, Settings
+from workers.training.checks.judge import judge, straightness
+from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from workers.training.checks.quality import Quality, quality
+from workers.training.checks.rates import Rate, mean_quality
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One motion and what the checker says of it."""
+
+    prompt: str
+    group: str
+    seed: int
+    seconds: float
+    passed: bool
+    reason: str
+    straight: bool | None  # None where no straight way was asked for
+    quality: Quality
+    decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
+
+
+@dataclass(frozen=True)
+class Report:
+    """Rates of one bundle under one way of decoding."""
+
+    bundle: str
+    settings: Settings
+    trials: tuple[Trial, ...]
+
+    def rate(self, wanted: Callable[[EvaluationPrompt], bool]) -> Rate:
+        """Share of passed trials among the prompts that `wanted` picks."""
+        texts = {p.text for p in evaluation_prompts() if wanted(p)}
+        passed = [t.passed for t in self.trials if t.prompt in texts]
+        return Rate(len(passed), sum(passed))
+
+    @property
+    def summary(self) -> dict[str, Rate]:
+        """The numbers that the bars are set on."""
+        straight = [t.straight for t in self.trials if t.straight is not None]
+        return {
+            "one action": self.rate(lambda p: not p.separate and len(p.expected) == 1),
+            "side and hand": self.rate(lambda p: not p.separate and p.sided),
+            "two actions in order": self.rate(lambda p: not p.separate and len(p.expected) > 1),
+            "all but kick, punch, slash, dance": self.rate(lambda p: not p.separate),
+            "straight ways": Rate(len(straight), sum(straight)),
+        }
+
+    @property
+    def groups(self) -> dict[str, Rate]:
+        """By group of prompts."""
+        names = dict.fromkeys(t.group for t in self.trials)
+        return {name: self.rate(lambda p, name=name: p.group == name) for name in names}
+
+    def markdown(self) -> str:
+        """Tables for a card or a page of results."""
+        physical = mean_quality(t.quality for t in self.trials)
+        decided = np.sum([t.decided for t in self.trials], axis=0)
+        lines = [
+            f"Bundle `{self.bundle}`, {len(self.trials)} motions.",
+            "",
+            "| prompts | motions | obeyed |",
+            "|---|---|---|",
+        ]
+        lines += [
+            f"| {name} | {r.clips} | {r.share:.1%} |" for name, r in [*self.summary.items(), *self.groups.items()]
+        ]
+        lines += ["", f"Foot skate {physical.skate:.3f}, jerk {physical.jerk:.1f} m/s³, floor penetration "]
+        lines[-1] += f"{1000 * physical.penetration:.0f} mm. Base tokens decided by motion, action and specific level: "
+        lines[-1] += f"{', '.join(f'{share:.1%}' for share in decided / decided.sum())}."
+        return "\n".join(lines) + "\n"
+
+    def to_json(self) -> dict[str, object]:
+        """Everything, each trial included."""
+        return {
+            "bundle": self.bundle,
+            "settings": asdict(self.settings),
+            "summary": {name: asdict(rate) for name, rate in self.summary.items()},
+            "groups": {name: asdict(rate) for name, rate in self.groups.items()},
+            "trials": [asdict(t) for t in self.trials],
+        }
+
+
+def measure(
+    generator: Generator,
+    texts: Sequence[TextFeatures],
+    prompts: Sequence[EvaluationPrompt],
+    *,
+    seeds: Iterable[int],
+    settings: Settings,
+    frames: int | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Report:
+    """Generate every prompt with every seed and judge it.
+
+    Args:
+        generator: the loaded bundle.
+        texts: features of each prompt, in the order of `prompts`.
+        prompts: what to ask for and what must be seen.
+        seeds: one motion a prompt and seed.
+        settings: way of decoding.
+        frames: length of every motion; None = the length estimator's.
+        progress: called with motions done and wanted.
+    """
+    jobs = [
+        (prompt, Request(text, seed, frames)) for seed in seeds for prompt, text in zip(prompts, texts, strict=True)
+    ]
+    trials: list[Trial] = []
+    for start in range(0, len(jobs), MAX_ROWS):
+        part = jobs[start : start + MAX_ROWS]
+        trials += _judged(generator, part, settings)
+        progress(len(trials), len(jobs))
+    return Report(generator.bundle.reference, settings, tuple(trials))
+
+
+def _judged(
+    generator: Generator, jobs: Sequence[tuple[EvaluationPrompt, Request]], settings: Settings
+) -> Iterator[Trial]:
+    results = generator.generate([request for _, request in jobs], settings)
+    for (prompt, request), made in zip(jobs, results, strict=True):
+        assert made is not None  # nothing drops rows here
+        clip = finish(generator, request, made, settings)
+        verdict = judge(clip.joints, clip.fps, prompt.expected)
+        wants_straight = len(prompt.expected) == 1 and prompt.expected[0].straight
+        yield Trial(
+            prompt.text,
+            prompt.group,
+            request.seed,
+            len(clip.joints) / clip.fps,
+            verdict.passed,
+            verdict.reason,
+            straightness(clip.joints, clip.fps).straight if wants_straight else None,
+            quality(clip.joints, clip.fps),
+            made.decided,
+        )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure one bundle; JSON and Markdown into a folder, the table on stdout."""
+    parser = argparse.ArgumentParser(
+        prog="python -m workers.hgm3.obedience", description="Does a bundle do what the prompts say?"
+    )
+    parser.add_argument("bundle", help="name or path")
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, help="length of every motion; else the length estimator's")
+    parser.add_argument("--flat", action="store_true", help="all conditions from the first pass on (ablation)")
+    parser.add_argument("--min-progress", action="store_true", help="decide at least one token a pass (ablation)")
+    parser.add_argument("--steps", type=int)
+    parser.add_argument("--guidance", type=float)
+    parser.add_argument("--every", type=int, default=1, help="only each K-th prompt, for a quick look")
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("-o", "--output", type=Path, help="folder of report.json and report.md")
+    chosen = parser.parse_args(arguments)
+    generator = Generator.load(chosen.bundle, threads=chosen.threads)
+    text = generator.bundle.manifest.text
+    if text is None:
+        raise InvalidBundle("does not say how it reads prompts", where=str(generator.bundle.path))
+    prompts = evaluation_prompts()[:: chosen.every]
+    report = measure(
+        generator,
+        TextPipeline.load(text).features([p.text for p in prompts]),
+        prompts,
+        seeds=range(chosen.seeds),
+        settings=Settings(
+            steps=chosen.steps, guidance=chosen.guidance, flat=chosen.flat, min_progress=chosen.min_progress
+        ),
+        frames=None if chosen.seconds is None else round(chosen.seconds * generator.config.fps),
+        progress=lambda done, total: print(f"\r{done}/{total}", end="", file=sys.stderr),  # noqa: T201
+    )
+    print(file=sys.stderr)  # noqa: T201
+    print(report.markdown())  # noqa: T201
+    failures = defaultdict(list)
+    for trial in report.trials:
+        if not trial.passed:
+            failures[trial.group].append(f"{trial.prompt!r} (seed {trial.seed}): {trial.reason}")
+    for group, reasons in failures.items():
+        print(f"{group}:", *reasons[:6], sep="\n  ", file=sys.stderr)  # noqa: T201
+    if chosen.output is not None:
+        chosen.output.mkdir(parents=True, exist_ok=True)
+        (chosen.output / "report.json").write_text(json.dumps(report.to_json(), indent=1), encoding="utf-8")
+        (chosen.output / "report.md").write_text(report.markdown(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except MareyError as error:
+        sys.exit(f"{error}")
