@@ -146,7 +146,7 @@ def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
         _give(data, account)
         log = home / "postgres.log"
         if not (data / "PG_VERSION").exists():
-            _make_cluster(data, account, log)
+            _make_cluster(data, account, log, durable=durable)
         _check_version(data)
         _stop_leftover(data)
         values = POSTGRES_SETTINGS | ({} if durable else EPHEMERAL_SETTINGS)
@@ -217,7 +217,7 @@ def _account() -> pwd.struct_passwd | None:
     return pwd.getpwnam(ROOTLESS_USER) if os.geteuid() == 0 else None
 
 
-def _make_cluster(data: Path, account: pwd.struct_passwd | None, log: Path) -> None:
+def _make_cluster(data: Path, account: pwd.struct_passwd | None, log: Path, *, durable: bool) -> None:
     command = [
         str(_postgres("initdb")),
         f"--pgdata={data}",
@@ -229,6 +229,7 @@ def _make_cluster(data: Path, account: pwd.struct_passwd | None, log: Path) -> N
         "--builtin-locale=C.UTF-8",
         "--locale=C",
         "--no-instructions",
+        *([] if durable else ["--no-sync"]),
     ]
     process = _spawn(command, log, account, signal.SIGTERM)
     if process.wait() != 0:
