@@ -15,7 +15,7 @@ from safetensors.numpy import load, save
 from shared.errors import InvalidFile
 from shared.text.graph import SemanticGraph
 
-FORMAT = "1"
+FORMAT = 1
 MAX_HEADER_BYTES = 2**20
 
 
@@ -35,12 +35,9 @@ class TextFeatures:
 
     def to_blob(self) -> bytes:
         """Safetensors fp16; prompt, rewritten prompt and graph stand in its metadata."""
-        metadata = {
-            "format": FORMAT,
-            "prompt": self.prompt,
-            "rewritten": self.rewritten,
-            "graph": json.dumps(self.graph.to_json(), ensure_ascii=False),
-        }
+        about = {"format": FORMAT, "prompt": self.prompt, "rewritten": self.rewritten, "graph": self.graph.to_json()}
+        # one entry: safetensors writes several in random order, and equal features should be equal bytes
+        metadata = {"features": json.dumps(about, ensure_ascii=False)}
         return save({"nodes": np.ascontiguousarray(self.nodes, dtype=np.float16)}, metadata=metadata)
 
     @classmethod
@@ -52,13 +49,13 @@ class TextFeatures:
         """
         try:
             nodes = load(blob)["nodes"]
-            metadata = _metadata(blob)
-            if metadata["format"] != FORMAT:
-                raise ValueError(f"format {metadata['format']!r} is not {FORMAT!r}")
-            graph = SemanticGraph.from_json(json.loads(metadata["graph"]))
+            about = json.loads(_metadata(blob)["features"])
+            if about["format"] != FORMAT:
+                raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
+            graph = SemanticGraph.from_json(about["graph"])
             if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != len(graph.nodes):
                 raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {len(graph.nodes)} nodes")
-            return cls(metadata["prompt"], metadata["rewritten"], graph, nodes)
+            return cls(about["prompt"], about["rewritten"], graph, nodes)
         except (SafetensorError, ValueError, KeyError, TypeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",

@@ -29,8 +29,8 @@ def parsed(labeller: LightLabeller, text: str) -> dict[str, dict[str, str]]:
     """Arguments by predicate and role, punctuation stripped."""
     words = text.split()
     return {
-        words[f.predicate].strip(".,").lower(): {
-            a.role: " ".join(words[a.start : a.stop]).strip(".,").lower() for a in f.arguments
+        words[f.predicate].strip(".,!").lower(): {
+            a.role: " ".join(words[a.start : a.stop]).strip(".,!").lower() for a in f.arguments
         }
         for f in labeller.label([words])[0]
     }

@@ -132,7 +132,7 @@ def test_units_are_written_out(text: str, expected: str) -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "right"),
-    [("wlaks", "walks"), ("fowards", "forwards"), ("Jmps,", "Jmps,"), ("persn", "person"), ("wade", "wade"),
+    [("wlaks", "walks"), ("fowards", "forwards"), ("Jmps,", "jumps,"), ("persn", "person"), ("wade", "wade"),
      ("zzzz", "zzzz"), ("walk", "walk"), ("backwrds.", "backwards.")],
 )  # fmt: skip
 def test_only_unknown_words_one_slip_from_one_motion_word_are_corrected(wrong: str, right: str) -> None:
