@@ -10,8 +10,6 @@ import socket
 import threading
 import time
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
-from pathlib import Path
 from types import FrameType
 from typing import cast
 from uuid import UUID
@@ -25,6 +23,7 @@ from shared.runtime.handler import Handler, HandlerFactory, Role
 from shared.runtime.lease import Heartbeat
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.loop import Drain
+from shared.runtime.status import WorkerStatus, status_file, write_status
 from shared.settings import Settings, settings
 from shared.storage import open_store
 
@@ -33,50 +32,6 @@ log = logger(__name__)
 ROLE_VARIABLE = "MAREY_ROLE"
 """Environment variable by which a parent tells its child, a fresh interpreter, what to serve."""
 NAME_VARIABLE = "MAREY_WORKER_NAME"
-
-FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
-TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the last batch's end, doubled
-
-
-@dataclass(frozen=True)
-class WorkerStatus:
-    """What a child says of itself to probes, in `home/run/worker-NAME.json`, every few seconds."""
-
-    pid: int
-    ready: bool
-    """The model is loaded and queues are served."""
-    tick_age: float
-    """Seconds since the last claim or step of progress. Idle workers tick too: the relay sends each a hint."""
-    written: float
-    """Wall clock."""
-    error: str | None = None
-    """Why the child could not start; its parent ends then."""
-
-    def alive(self, now: float) -> bool:
-        """Whether a liveness probe should pass."""
-        return now - self.written < FRESH and self.tick_age < TICK_LIMIT
-
-
-def status_file(home: Path, name: str) -> Path:
-    """Where the worker `name` keeps its status."""
-    return home / "run" / f"worker-{name}.json"
-
-
-def read_status(home: Path, name: str) -> WorkerStatus | None:
-    """The status of the worker `name`; None where there is none yet."""
-    try:
-        return WorkerStatus(**json.loads(status_file(home, name).read_text(encoding="utf-8")))
-    except (FileNotFoundError, ValueError, TypeError):
-        return None
-
-
-def write_status(home: Path, name: str, status: WorkerStatus) -> None:
-    """Replace the status of the worker `name`."""
-    path = status_file(home, name)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(f".{os.getpid()}")
-    temporary.write_text(json.dumps(asdict(status)), encoding="utf-8")
-    temporary.replace(path)
 
 
 def import_handler(reference: str) -> Handler:
@@ -189,10 +144,14 @@ class Child:
         write_status(self._settings.home, self._name, WorkerStatus(os.getpid(), self._ready, age, time.time()))
 
     def _present(self) -> None:
-        """Tell probes (by file) and the relay (by row) that this worker lives."""
-        self._tell_status()
-        if not self._ready or self._stopping.is_set():
-            return
+        """Tell the relay (by row) and probes (by file) that this worker lives."""
+        try:
+            if self._ready and not self._stopping.is_set():
+                self._beat()
+        finally:
+            self._tell_status()
+
+    def _beat(self) -> None:
         with transaction(self._beats) as conn:
             for queue in self._role.handlers:
                 loaded = self._drain.loaded.get(queue)

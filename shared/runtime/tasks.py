@@ -13,8 +13,9 @@ from celery.signals import worker_process_init, worker_process_shutdown
 
 from shared.errors import MareyError, Unreachable
 from shared.runtime.app import DRAIN
-from shared.runtime.child import NAME_VARIABLE, Child, WorkerStatus, write_status
+from shared.runtime.child import NAME_VARIABLE, Child
 from shared.runtime.logs import logger
+from shared.runtime.status import WorkerStatus, write_status
 from shared.settings import settings
 
 log = logger(__name__)

@@ -22,9 +22,10 @@ from celery.platforms import SecurityWarning
 
 from shared.errors import InvalidInput
 from shared.runtime.app import create_app
-from shared.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, read_status, status_file, wait_for_database
+from shared.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, wait_for_database
 from shared.runtime.handler import Role
 from shared.runtime.logs import configure_logging, logger
+from shared.runtime.status import read_status, status_file
 from shared.settings import Settings
 
 log = logger(__name__)

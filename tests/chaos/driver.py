@@ -15,9 +15,9 @@ import redis
 import sqlalchemy as sa
 
 from shared.jobs import create_engine, upgrade
-from shared.runtime.child import read_status
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
 from shared.runtime.queue import redis_client
+from shared.runtime.status import read_status
 from tests.support.toy import QUEUE, REFERENCE
 
 REPOSITORY = Path(__file__).resolve().parents[2]

@@ -13,8 +13,9 @@ from pydantic import SecretStr
 from shared.errors import InvalidInput, Unreachable
 from shared.jobs import list_workers, live_workers, transaction
 from shared.jobs.schema import item, lease
-from shared.runtime.child import FRESH, TICK_LIMIT, WorkerStatus, import_handler, read_status, write_status
+from shared.runtime.child import import_handler
 from shared.runtime.handler import Role
+from shared.runtime.status import read_status
 from shared.runtime.worker import wait_for_database, worker_main
 from shared.settings import Settings
 from tests.chaos.driver import Cluster
@@ -58,23 +59,6 @@ def test_a_worker_whose_bundle_is_not_here_ends_and_says_why(cluster: Cluster) -
     assert cluster.processes["one"].wait(60.0) == 1
     cluster.processes.pop("one")
     assert "there is no bundle 'missing@0'" in (cluster.home / "one.log").read_text()
-
-
-def test_a_probe_sees_a_child_that_beats_and_ticks(tmp_path: Path) -> None:
-    assert read_status(tmp_path, "one") is None
-    write_status(tmp_path, "one", WorkerStatus(pid=7, ready=True, tick_age=3.0, written=1000.0))
-    status = read_status(tmp_path, "one")
-    assert status is not None
-    assert status.alive(1000.0)
-    assert not status.alive(1000.0 + FRESH + 1), "its threads are dead"
-    assert not WorkerStatus(7, True, TICK_LIMIT + 1, 1000.0).alive(1000.0), "it beats, but no hint reaches it"
-
-
-def test_a_half_written_status_is_none(tmp_path: Path) -> None:
-    path = tmp_path / "run" / "worker-one.json"
-    path.parent.mkdir()
-    path.write_text('{"pid": 7')
-    assert read_status(tmp_path, "one") is None
 
 
 def test_handlers_come_by_name_from_wherever_they_are() -> None:

@@ -1,0 +1,75 @@
+"""What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds.
+
+`python -m shared.runtime.status` is the liveness probe of a machine's workers, with `ready` the readiness probe.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from shared.settings import settings
+
+FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
+TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the last batch's end, doubled
+
+
+@dataclass(frozen=True)
+class WorkerStatus:
+    """State of one child."""
+
+    pid: int
+    ready: bool
+    """The model is loaded and queues are served."""
+    tick_age: float
+    """Seconds since the last claim or step of progress. Idle workers tick too: the relay sends each a hint."""
+    written: float
+    """Wall clock."""
+    error: str | None = None
+    """Why the child could not start; its parent ends then."""
+
+    def alive(self, now: float) -> bool:
+        """Whether a liveness probe should pass: its threads beat, and hints reach it."""
+        return now - self.written < FRESH and (not self.ready or self.tick_age < TICK_LIMIT)
+
+
+def status_file(home: Path, name: str) -> Path:
+    """Where the worker `name` keeps its status."""
+    return home / "run" / f"worker-{name}.json"
+
+
+def read_status(home: Path, name: str) -> WorkerStatus | None:
+    """The status of the worker `name`; None where there is none (yet)."""
+    return _read(status_file(home, name))
+
+
+def write_status(home: Path, name: str, status: WorkerStatus) -> None:
+    """Replace the status of the worker `name`."""
+    path = status_file(home, name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+    temporary.write_text(json.dumps(asdict(status)), encoding="utf-8")
+    temporary.replace(path)
+
+
+def probe(home: Path, *, ready: bool = False, now: float | None = None) -> bool:
+    """Whether this machine's workers live (and, with `ready`, serve): at least one is there, and none is stuck."""
+    now = time.time() if now is None else now
+    found = [status for path in (home / "run").glob("worker-*.json") if (status := _read(path)) is not None]
+    return bool(found) and all(status.alive(now) and (status.ready or not ready) for status in found)
+
+
+def _read(path: Path) -> WorkerStatus | None:
+    try:
+        return WorkerStatus(**json.loads(path.read_text(encoding="utf-8")))
+    except (FileNotFoundError, ValueError, TypeError):
+        return None
+
+
+if __name__ == "__main__":
+    sys.exit(not probe(settings().home, ready="ready" in sys.argv[1:]))

@@ -1,0 +1,46 @@
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from shared.runtime.status import FRESH, TICK_LIMIT, WorkerStatus, probe, read_status, write_status
+
+
+def test_a_living_worker_beats_and_ticks() -> None:
+    status = WorkerStatus(pid=7, ready=True, tick_age=3.0, written=1000.0)
+    assert status.alive(1000.0)
+    assert not status.alive(1000.0 + FRESH + 1), "its threads are dead"
+    assert not WorkerStatus(7, True, TICK_LIMIT + 1, 1000.0).alive(1000.0), "it beats, but no hint reaches it"
+    assert WorkerStatus(7, False, TICK_LIMIT + 1, 1000.0).alive(1000.0), "loading may take long"
+
+
+def test_what_was_written_is_read(tmp_path: Path) -> None:
+    assert read_status(tmp_path, "one") is None
+    status = WorkerStatus(pid=7, ready=True, tick_age=3.0, written=1000.0)
+    write_status(tmp_path, "one", status)
+    assert read_status(tmp_path, "one") == status
+
+
+def test_a_half_written_status_is_none(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "worker-one.json").write_text('{"pid": 7')
+    assert read_status(tmp_path, "one") is None
+
+
+def test_a_probe_wants_every_worker_of_the_machine(tmp_path: Path) -> None:
+    assert not probe(tmp_path, now=1000.0), "there is none"
+    write_status(tmp_path, "one", WorkerStatus(7, True, 3.0, 1000.0))
+    write_status(tmp_path, "two", WorkerStatus(8, False, 3.0, 1000.0))
+    assert probe(tmp_path, now=1000.0)
+    assert not probe(tmp_path, ready=True, now=1000.0), "two still loads"
+    write_status(tmp_path, "two", WorkerStatus(8, True, TICK_LIMIT + 1, 1000.0))
+    assert not probe(tmp_path, now=1000.0), "two is stuck"
+
+
+def test_the_probe_is_a_command(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "shared.runtime.status", "ready"]
+    environment = {**os.environ, "MAREY_HOME": str(tmp_path)}
+    assert subprocess.run(command, env=environment, check=False).returncode == 1
+    write_status(tmp_path, "one", WorkerStatus(7, True, 3.0, time.time()))
+    assert subprocess.run(command, env=environment, check=False).returncode == 0
