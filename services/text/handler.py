@@ -42,18 +42,27 @@ class TextHandler:
         return [batch.items]
 
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
-        """The features of each prompt; equal prompts cost once."""
+        """The features of each prompt, as soon as they are made."""
         assert self._pipeline is not None  # the loop loads before it runs
         for done, item in enumerate(batch.items, 1):
             if item.id in control.dropped():
                 continue
-            try:
-                (features,) = self._pipeline.features([item.prompt])
-            except MareyError as error:
-                yield Failed(item.id, error)
-            else:
-                yield TextDone(item.id, item.text_key, features.to_blob())
+            yield _outcome(self._pipeline, item)
             control.progress(done, len(batch.items))
+
+
+def _outcome(pipeline: TextPipeline, item: ClaimedItem) -> Outcome:
+    """The features of one item under the key it was submitted with, which promises weights: the key is checked."""
+    try:
+        if pipeline.key(item.prompt) != item.text_key:
+            raise InvalidBundle(
+                "the server that took this job has another text encoder or labeller than this worker",
+                hint="Install the same models on both, then retry the job's failed items.",
+            )
+        (features,) = pipeline.features([item.prompt])
+    except MareyError as error:
+        return Failed(item.id, error)
+    return TextDone(item.id, item.text_key, features.to_blob())
 
 
 def create_handler() -> TextHandler:

@@ -1,0 +1,123 @@
+"""The work of the `text` queue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from uuid import UUID, uuid4
+
+import numpy as np
+import pytest
+
+from services.text.handler import TextHandler, create_handler
+from shared.bundles import BundleWriter, TextSpec
+from shared.errors import InvalidBundle
+from shared.jobs import Claim, ClaimedItem, Stage
+from shared.runtime.handler import Batch, Failed, TextDone
+from shared.text.features import TextFeatures
+from shared.text.keys import feature_key, resolve
+
+
+def write_bundle(path: Path, text: TextSpec | None) -> str:
+    with BundleWriter(path) as writer:
+        writer.add_part("masked", {"weight": np.zeros((1, 1), np.float32)})
+        writer.finish(
+            name=path.name, version="1", kind="generator", model="hgm3", config="tiny", parameters={}, text=text,
+            licence="MIT",
+        )  # fmt: skip
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return write_bundle(tmp_path_factory.mktemp("models") / "tiny", TextSpec())
+
+
+@pytest.fixture(scope="module")
+def handler(bundle: str) -> TextHandler:
+    made = create_handler()
+    made.load(bundle)
+    return made
+
+
+def items(*prompts: str, key: str | None = None) -> tuple[ClaimedItem, ...]:
+    spec = resolve(TextSpec())
+    return tuple(
+        ClaimedItem(
+            id=uuid4(), position=i, index=i, variant=0, name=None, prompt=prompt, model="hgm3", bundle="tiny",
+            text_key=key or feature_key(prompt, spec), seed=0, seconds=None, settings={}, tags=(), attempts=0,
+        )
+        for i, prompt in enumerate(prompts)
+    )  # fmt: skip
+
+
+def batch(claimed: tuple[ClaimedItem, ...]) -> Batch:
+    claim = Claim(uuid4(), "default", uuid4(), "text", Stage.TEXT, "key", "tiny", solo=False, items=claimed)
+    return Batch(claim, claimed, {})
+
+
+class Control:
+    """Says which items nobody wants any more, and counts progress."""
+
+    def __init__(self) -> None:
+        self.gone: set[UUID] = set()
+        self.seen: list[tuple[int, int]] = []
+
+    def progress(self, done: int, total: int) -> None:
+        self.seen.append((done, total))
+
+    def dropped(self) -> frozenset[UUID]:
+        return frozenset(self.gone)
+
+
+def test_each_prompt_gets_its_features_under_its_key(handler: TextHandler) -> None:
+    claimed = items("a person walks forward", "someone bows")
+    control = Control()
+    outcomes = list(handler.run(batch(claimed), control))
+    assert [(o.item, o.key) for o in outcomes if isinstance(o, TextDone)] == [(i.id, i.text_key) for i in claimed]
+    read = TextFeatures.from_blob(outcomes[0].blob)  # type: ignore[union-attr]
+    assert read.prompt == "a person walks forward"
+    assert read.nodes.shape[1] == 384
+    assert control.seen[-1] == (2, 2)
+
+
+def test_a_prompt_that_cannot_be_used_fails_alone_and_for_good(handler: TextHandler) -> None:
+    claimed = (*items("a person walks"), *items("走", key="0" * 64), *items("someone bows"))
+    done, failed, last = handler.run(batch(claimed), Control())
+    assert isinstance(done, TextDone)
+    assert isinstance(last, TextDone)
+    assert isinstance(failed, Failed)
+    assert not failed.retryable
+    assert "no English words" in failed.problem.message
+
+
+def test_a_job_taken_with_other_weights_is_not_given_wrong_features(handler: TextHandler) -> None:
+    (failed,) = handler.run(batch(items("a person walks", key="0" * 64)), Control())
+    assert isinstance(failed, Failed)
+    assert "another text encoder or labeller" in failed.problem.message
+
+
+def test_items_dropped_on_the_way_are_left_out(handler: TextHandler) -> None:
+    claimed = items("a person walks", "someone bows", "a man kicks")
+    control = Control()
+    running: Iterator[object] = handler.run(batch(claimed), control)
+    next(running)
+    control.gone = {claimed[1].id}
+    assert [o.item for o in running] == [claimed[2].id]  # type: ignore[attr-defined]
+
+
+def test_a_claim_is_one_bucket(handler: TextHandler) -> None:
+    claimed = items("a person walks", "someone bows")
+    assert handler.buckets(batch(claimed)) == [claimed]
+    assert handler.batch_size == 64
+
+
+def test_a_bundle_that_reads_no_prompts_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidBundle, match="does not read prompts"):
+        create_handler().load(write_bundle(tmp_path / "mute", None))
+
+
+def test_a_bundle_of_other_weights_is_refused_on_loading(tmp_path: Path) -> None:
+    path = write_bundle(tmp_path / "other", TextSpec(encoder_sha256="0" * 64))
+    with pytest.raises(InvalidBundle, match="trained with encoder"):
+        create_handler().load(path)
