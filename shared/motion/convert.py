@@ -11,8 +11,9 @@ from shared.errors import Conflict, InvalidInput
 from shared.motion.bvh import BvhClip, read_bvh, write_bvh
 from shared.motion.clip import MotionClip, load_npz
 from shared.motion.feet import find_contacts
-from shared.motion.kinematics import facing
+from shared.motion.kinematics import facing, forward_kinematics
 from shared.motion.resample import frame_times, interpolate, interpolate_rotations, resample
+from shared.motion.rigs import feet_and_facing
 from shared.motion.rotations import Array, about, multiply, rotate
 from shared.motion.skeleton import known_order, skeleton_of
 from shared.motion.units import Unit, Up
@@ -30,7 +31,7 @@ def convert(
     source_unit: Unit = "cm",
     source_up: Up = "y",
     overwrite: bool = False,
-) -> None:
+) -> tuple[str, ...]:
     """Convert a motion file; the endings of the names tell the kinds.
 
     Args:
@@ -39,6 +40,9 @@ def convert(
         unit, up: of a BVH result; npz is always metres and Y up.
         source_unit, source_up: of a BVH source.
         overwrite: replace an existing file.
+
+    Returns:
+        What was odd about a BVH source, for a person.
 
     Raises:
         InvalidInput: a kind of file that is not known, or a rate out of bounds.
@@ -58,13 +62,14 @@ def convert(
             clip_from_bvh(clip, source.name).save_npz(target)
         else:
             write_bvh(target, clip, unit=unit, up=up)
-        return
+        return clip.notes
     motion = load_npz(source)
     motion = motion if fps is None else resample(motion, fps)
     if target.suffix.lower() == ".npz":
         motion.save_npz(target)
     else:
         write_bvh(target, motion, unit=unit, up=up)
+    return ()
 
 
 def resample_bvh(clip: BvhClip, fps: float) -> BvhClip:
@@ -114,7 +119,8 @@ def _without_root(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
 
 
 def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
-    """A clip of what a BVH file held: with contacts, and facing +Z in frame 0, where the skeleton is one of ours.
+    """A clip of what a BVH file held: facing +Z in frame 0 and with contacts, where hips, shoulders and feet are known
+    by their names.
 
     Args:
         clip: with constant bone lengths (see `steady`).
@@ -127,10 +133,16 @@ def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
     known = known_order(tree.joint_names, tree.parents)
     if known is not None:
         ours, order = known
-        tree, rotations = ours.with_offsets(tree.offsets[list(order)]), rotations[:, list(order)].copy()
-        joints = clip.joints()[:, list(order)]
+        tree, rotations = ours.with_offsets(tree.offsets[list(order)]), rotations[:, list(order)]
+    else:
+        feet, looks = feet_and_facing(tree)
+        tree = replace(tree, name="other", feet=feet, facing=looks)
+    joints = forward_kinematics(tree, rotations, root)
+    if tree.facing:
         forward = facing(joints[0], tree)
         turn = about("Y", -np.arctan2(forward[0], forward[2]))
-        rotations[:, 0], root = multiply(turn, rotations[:, 0]), rotate(turn, root)
+        rotations = np.concatenate([multiply(turn, rotations[:, :1]), rotations[:, 1:]], axis=1)
+        root = rotate(turn, root)
+    if tree.feet:
         contacts = find_contacts(joints, tree, clip.fps)
     return MotionClip.of(tree, rotations, root, contacts, clip.fps, manifest=manifest)

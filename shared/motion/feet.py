@@ -65,7 +65,8 @@ def clean_feet(
         InvalidInput: the skeleton has no feet.
     """
     joints = np.array(joints, np.float64)
-    _need_feet(skeleton)
+    if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
+        raise InvalidInput("this skeleton's feet or hips are not known", where=skeleton.name)
     joints[..., 1] -= floor_height(joints, skeleton)
     stands = find_contacts(joints, skeleton, fps, rule=rule) if contacts is None else np.array(contacts, bool)
     before = joints.copy()
@@ -92,7 +93,8 @@ def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: Contac
     A foot begins to stand when it is low and slow, and stands until it is high or clearly fast. Low is relative to the
     tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
     """
-    _need_feet(skeleton)
+    if len(skeleton.feet) != 4:
+        raise InvalidInput("this skeleton's feet are not known", where=skeleton.name)
     places = joints[:, list(skeleton.feet)]
     speed = np.linalg.norm(np.gradient(places, axis=0), axis=-1) * fps if len(joints) > 1 else np.zeros((1, 4))
     ground = np.quantile(places[..., 1], 0.1, axis=0)
@@ -127,11 +129,6 @@ def skate(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> floa
     speed = np.linalg.norm(np.diff(joints[:, toes], axis=0)[..., [0, 2]], axis=-1) * fps
     both = contacts[1:, 1::2] & contacts[:-1, 1::2]
     return float(speed[both].mean()) if both.any() else 0.0
-
-
-def _need_feet(skeleton: Skeleton) -> None:
-    if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
-        raise InvalidInput("this skeleton's feet are not known", where=skeleton.name)
 
 
 def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:

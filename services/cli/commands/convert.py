@@ -54,7 +54,7 @@ def convert(
         from shared.motion.convert import convert as convert_file
     except ImportError as error:
         raise needs_extra("motion", error) from error
-    convert_file(
+    notes = convert_file(
         source,
         target,
         fps=fps,
@@ -64,6 +64,8 @@ def convert(
         source_up=from_up.value,
         overwrite=overwrite,
     )
+    for note in notes:
+        console.say(f"{console.home_relative(source)}: {note}")
     console.result(console.home_relative(target))
 
 
