@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
@@ -16,6 +17,14 @@ from shared.runtime.embedded import socket_folder
 from tests.support.marey import Marey, serving
 
 COUNT = 40
+
+
+def slow_items() -> list[dict[str, object]]:
+    """Items that are made four at a time, for the settings of a batch are the same: enough batches to kill in between."""
+    return [
+        {"prompt": f"a person walks {n} steps", "seconds": 9, "settings": {"steps": 20, "guidance": 1 + n // 4}}
+        for n in range(COUNT)
+    ]
 
 
 def wait_for(what: Callable[[], object], seconds: float = 60) -> None:
@@ -33,7 +42,7 @@ def alone(models: Path, short_home: Path) -> Marey:
 
 def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Marey) -> None:
     with serving(alone) as server:
-        job = alone.submit(*[f"a person walks {n} steps" for n in range(COUNT)], "--seconds", 9)
+        job = alone.submit("-f", "-", stdin="\n".join(map(json.dumps, slow_items())))
         with alone.client() as client:
 
             def succeeded() -> int:

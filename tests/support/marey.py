@@ -118,7 +118,11 @@ class Serving:
 
     def children(self) -> dict[str, psutil.Process]:
         """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`."""
-        return {_role(child): child for child in psutil.Process(self.process.pid).children()}
+        found: dict[str, psutil.Process] = {}
+        for child in psutil.Process(self.process.pid).children():
+            with contextlib.suppress(psutil.Error):  # just killed, and not waited for yet
+                found[_role(child)] = child
+        return found
 
     def stop(self) -> None:
         """SIGTERM, and wait."""
@@ -166,4 +170,4 @@ def _role(process: psutil.Process) -> str:
     command = process.cmdline()
     if "services.cli" in command:
         return command[command.index("services.cli") + 1]
-    return Path(command[0]).name if command else process.name()
+    return process.name()
