@@ -1,0 +1,142 @@
+"""The queue's SQL on a real Postgres, with fsync: submitting 10,000 prompts, and claims where much or little waits."""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from uuid import uuid4
+
+import sqlalchemy as sa
+
+from benchmarks.harness import measure, table
+from shared.jobs import NewItem, NewJob, claim, create_engine, release, schema, submit, transaction, upgrade
+from shared.jobs.ids import new_id
+from shared.runtime.embedded import EmbeddedServer, start_postgres
+
+PROMPTS = 10_000
+CLAIMS = 400
+BATCH = 32
+DEPTHS = {"100 items in 1 job": (1, 100), "100,000 items in 1 job": (1, 100_000), "100,000 in 1,000": (1000, 100)}
+
+
+def main() -> None:
+    """Print both tables."""
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    try:
+        with start_postgres(home) as server:
+            _submits(_database(server, "submits"))
+            _claims({name: _filled(server, index, *depth) for index, (name, depth) in enumerate(DEPTHS.items())})
+    finally:
+        shutil.rmtree(home, ignore_errors=True)
+
+
+def _submits(engine: sa.Engine) -> None:
+    def by_submit() -> None:
+        with transaction(engine) as conn:
+            submit(conn, NewJob(_items(PROMPTS)))
+
+    def by_inserts() -> None:
+        """What an ORM's bulk insert would do: the same rows, SQLAlchemy's insertmanyvalues."""
+        job = new_id()
+        with transaction(engine) as conn:
+            conn.execute(sa.insert(schema.job).values(id=job, tenant_id="default", total=PROMPTS, ready=PROMPTS))
+            conn.execute(sa.insert(schema.item), [_row(item, job) for item in _items(PROMPTS)])
+
+    timings = measure(
+        {f"submit() of {PROMPTS:,} prompts": by_submit, "bulk INSERT of as many rows": by_inserts},
+        repeats=7,
+        warm_up=1,
+        seconds=60,
+    )
+    print(table("Submitting", timings, baseline="bulk INSERT of as many rows"))
+
+
+def _claims(engines: dict[str, sa.Engine]) -> None:
+    times: dict[str, list[float]] = {name: [] for name in engines}
+    for _ in range(CLAIMS):  # in turns, so that a busy moment of the machine hits all alike
+        for name, engine in engines.items():
+            with transaction(engine) as conn:
+                start = time.perf_counter()
+                found = claim(conn, "hgm3", "bench", BATCH)
+                times[name].append(time.perf_counter() - start)
+            assert found is not None
+            assert len(found.items) == BATCH
+            with transaction(engine) as conn:
+                release(conn, found.lease_token, "measured")
+    print(f"A claim of {BATCH} ({CLAIMS} each, in turns)\n")
+    print("| waiting | median | p95 | p95 against 100 |")
+    print("|---|---|---|---|")
+    least: float | None = None
+    for name, taken in times.items():
+        p95 = statistics.quantiles(taken, n=20)[-1]
+        least = least or p95
+        median = statistics.median(taken)
+        print(f"| {name} | {median * 1e3:.2f} ms | {p95 * 1e3:.2f} ms | {p95 / least:.2f} |")
+
+
+def _database(server: EmbeddedServer, name: str) -> sa.Engine:
+    home = create_engine(server.url)
+    with home.connect().execution_options(isolation_level="AUTOCOMMIT") as conn:
+        conn.execute(sa.text(f"CREATE DATABASE {name}"))
+    home.dispose()
+    engine = create_engine(sa.make_url(server.url).set(database=name).render_as_string(hide_password=False))
+    upgrade(engine)
+    return engine
+
+
+def _filled(server: EmbeddedServer, index: int, jobs: int, items: int) -> sa.Engine:
+    """A database with so many jobs of so many items, their texts parsed."""
+    engine = _database(server, f"claims_{index}")
+    with transaction(engine) as conn:
+        conn.execute(sa.insert(schema.text_features).values(key="known", blob=b""))
+    for _ in range(jobs):
+        with transaction(engine) as conn:
+            submit(conn, NewJob(_items(items, text_key="known")))
+    with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as conn:
+        conn.execute(sa.text("ANALYZE"))
+    return engine
+
+
+def _items(count: int, text_key: str | None = None) -> Iterator[NewItem]:
+    settings = {"steps": 10, "guidance": 4.0, "formats": ["npz", "bvh"]}
+    for index in range(count):
+        yield NewItem(
+            index=index,
+            prompt=f"a person walks {index} steps forward, turns left and waves with the right hand",
+            model="hgm3",
+            bundle="starter@0123456789abcdef",
+            batch_key="0123456789abcdef",
+            text_key=text_key or f"{uuid4().hex}{uuid4().hex}",
+            text_batch_key="fedcba9876543210",
+            seed=index,
+            settings=settings,
+        )
+
+
+def _row(item: NewItem, job: object) -> dict[str, object]:
+    return {
+        "id": new_id(),
+        "job_id": job,
+        "position": item.index,
+        "index": item.index,
+        "variant": 0,
+        "prompt": item.prompt,
+        "model": item.model,
+        "bundle": item.bundle,
+        "seed": item.seed,
+        "settings": item.settings,
+        "tags": [],
+        "text_key": item.text_key,
+        "generate_batch_key": item.batch_key,
+        "stage": "text",
+        "queue": "text",
+        "batch_key": item.text_batch_key,
+    }
+
+
+if __name__ == "__main__":
+    main()
