@@ -67,8 +67,11 @@ def create_app(queue_url: str) -> Celery:
         task_create_missing_queues=True,
         task_serializer="json",
         accept_content=["json"],  # never pickle
-        # Prefetched hints would wait behind a long drain (celery #2788, #6500).
-        worker_prefetch_multiplier=1,
+        # Prefetched hints would wait behind a long drain (celery #2788, #6500). A prefetch count of 1 prevents that
+        # too, but an acknowledgement that fails while the queue is away then counts as a message in hand for ever:
+        # the worker reconnects and consumes nothing (measured; as in #8030). Without a count nothing counts wrong.
+        worker_disable_prefetch=True,
+        worker_prefetch_multiplier=0,
         # One child = one device. CUDA does not survive fork (celery #6036), nor do torch's threads.
         worker_pool="prefork",
         worker_concurrency=1,

@@ -32,6 +32,7 @@ log = logger(__name__)
 
 STOP_SECONDS = 25.0  # below the 30 s after which Kubernetes kills
 KILL_SECONDS = 3.0
+WATCH_SECONDS, WATCH_LOOKS = 30.0, 3
 
 
 def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int:
@@ -79,6 +80,7 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
         without_heartbeat=True,  # Celery's, over the broker; ours stands in the database
         quiet=True,
     )
+    threading.Thread(target=_watch, args=(home, own_name), name="watch", daemon=True).start()
     worker.start()
     status = read_status(chosen.home, name)
     if status is not None and status.error is not None:
@@ -89,6 +91,20 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
 
 def _keep_logging(**_: Any) -> None:
     """Being connected is enough: Celery then leaves logging alone."""
+
+
+def _watch(home: Path, name: str) -> None:
+    """End this worker when its child is stuck, or no hint reaches it: whoever started it starts it again.
+
+    Three looks must agree: after a suspended laptop wakes up, the first status it finds is old.
+    """
+    stuck = 0
+    while stuck < WATCH_LOOKS:
+        time.sleep(WATCH_SECONDS)
+        status = read_status(home, name)
+        stuck = stuck + 1 if status is not None and not status.alive(time.time()) else 0
+    log.error("worker_stuck", worker=name)
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _stop_child(home: Path, name: str) -> None:

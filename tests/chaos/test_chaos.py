@@ -225,8 +225,8 @@ def test_sigterm_gives_items_back_at_no_cost(stage: Stage, tmp_path: Path) -> No
     assert job_row(cluster.engine, job).succeeded == 40
 
 
-@pytest.mark.slow
 def test_two_schedulers_and_a_restarted_queue_are_harmless(stage: Stage, tmp_path: Path) -> None:
+    """The queue is away while both workers end their drain, so that their acknowledgements fail."""
     disk = Folder(tmp_path / "assets")
     cluster = stage(disk.environment)
     cluster.start_scheduler("scheduler-2")

@@ -17,7 +17,8 @@ def test_a_dead_child_gives_its_hint_back_and_nothing_is_prefetched_behind_a_lon
     conf = create_app("redis://localhost").conf
     assert conf.task_acks_late
     assert conf.task_reject_on_worker_lost
-    assert conf.worker_prefetch_multiplier == 1
+    assert conf.worker_disable_prefetch
+    assert conf.worker_prefetch_multiplier == 0
     assert conf.worker_pool_start_method == "spawn"
     assert conf.worker_concurrency == 1
 
