@@ -27,23 +27,6 @@ def pad_length(size: int) -> int:
     return -(-size // SEQUENCE_MULTIPLE) * SEQUENCE_MULTIPLE
 
 
-def linear(x: Tensor, layer: nn.Linear) -> Tensor:
-    """The layer in the precision of its weights: a bfloat16 layer takes and gives bfloat16 whatever flows around it."""
-    return (
-        layer(x.to(layer.weight.dtype))
-        if layer.weight.dtype != x.dtype and not torch.is_autocast_enabled()
-        else (layer(x))
-    )
-
-
-def lower_matrices(module: nn.Module, dtype: torch.dtype) -> None:
-    """Cast the matrices of the blocks in `module` to `dtype`, for inference; norms, embeddings and heads stay."""
-    for part in module.modules():
-        if isinstance(part, Block):
-            for layer in (part.attention.qkv, part.attention.out, part.wide, part.narrow):
-                layer.to(dtype)
-
-
 class Attention(nn.Module):
     """Multi-head self-attention."""
 
@@ -59,11 +42,11 @@ class Attention(nn.Module):
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """(B, S, w) -> (B, S, w); `mask` (B, 1, 1, S) bool, true where a key may be read."""
         batch, size, width = x.shape
-        qkv = linear(x, self.qkv).view(batch, size, 3, self.heads, width // self.heads)
+        qkv = self.qkv(x).view(batch, size, 3, self.heads, width // self.heads)
         query, key, value = qkv.permute(2, 0, 3, 1, 4)  # each (B, H, S, w / H)
         dropout = self.dropout if self.training else 0.0
         mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=dropout)
-        return linear(mixed.transpose(1, 2).reshape(batch, size, width), self.out)
+        return self.out(mixed.transpose(1, 2).reshape(batch, size, width))
 
 
 class Block(nn.Module):
@@ -88,7 +71,7 @@ class Block(nn.Module):
         return self.norm2(x + self._feedforward(x))
 
     def _feedforward(self, x: Tensor) -> Tensor:
-        return self._drop(linear(self._drop(F.gelu(linear(x, self.wide))), self.narrow))
+        return self._drop(self.narrow(self._drop(F.gelu(self.wide(x)))))
 
     def _drop(self, x: Tensor) -> Tensor:
         return F.dropout(x, self.dropout, self.training)
@@ -106,14 +89,23 @@ class Transformer(nn.Module):
         )
         self.norm = nn.LayerNorm(width) if norm_first else nn.Identity()
         self.dropout = dropout
+        self.dtype = torch.float32
 
     def forward(self, x: Tensor, valid: Tensor | None) -> Tensor:
-        """(B, S, w) -> (B, S, w); `valid` (B, S) bool, None = all. Every sample needs at least one valid position."""
+        """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
+
+        After `lower` everything between runs in bfloat16: casting around each matrix costs more than it saves.
+        """
         mask = None if valid is None else valid[:, None, None, :]
-        x = F.dropout(x, self.dropout, self.training)
+        x = F.dropout(x, self.dropout, self.training).to(self.dtype)
         for block in self.blocks:
             x = block(x, mask)
-        return self.norm(x)
+        return self.norm(x).float()
+
+    def lower(self, dtype: torch.dtype) -> None:
+        """Cast to `dtype` for inference; what goes in and comes out stays float32."""
+        self.to(dtype)
+        self.dtype = dtype
 
 
 def sinusoidal_positions(size: int, width: int) -> Tensor:

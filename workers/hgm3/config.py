@@ -29,7 +29,7 @@ class TokenizerConfig:
     rotation_weight: float = 1.0  # ours: the 6-D block is redundant, export solves rotations from positions
     position_weight: float = 5.0  # ours: L1 on joints in the heading frame, metres
     velocity_weight: float = 0.5  # ours: L1 on their velocity, m/s; against jitter and skating
-    world_weight: float = 5.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
+    world_weight: float = 2.0  # ours: L1 on joints in space, metres; rises over the first half of the budget
 
     @property
     def frames_per_token(self) -> int:

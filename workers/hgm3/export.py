@@ -15,7 +15,18 @@ from shared.motion.finish import finish_motion
 from shared.runtime.handler import Export, ExportedFile
 from workers.hgm3.generate import Generated, Generator, Request, Settings
 
+OUTPUT_FPS = "fps"
+"""The one setting of an item that is not the network's: the frame rate of its files."""
 MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
+
+
+def split_settings(values: Mapping[str, Any]) -> tuple[Settings, float | None]:
+    """An item's settings as the network's own and the output's frame rate (None = the model's).
+
+    Raises:
+        TypeError: a name that `shared.items` does not let through.
+    """
+    return Settings(**{k: v for k, v in values.items() if k != OUTPUT_FPS}), values.get(OUTPUT_FPS)
 
 
 def manifest_of(generator: Generator, request: Request, settings: Settings) -> dict[str, Any]:

@@ -17,12 +17,13 @@ from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
 from shared.nn.sampling import uniform
-from shared.nn.transformer import lower_matrices
+from shared.nn.transformer import Transformer
 from shared.text.features import TextFeatures
 from workers.hgm3.bundle import Networks, load_networks
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import HGM3Config, InferenceConfig
 from workers.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from workers.hgm3.tokenizer import Residuals
 from workers.training.loop import choose_device
 
 BUCKET = 8
@@ -150,8 +151,12 @@ class Generator:
         dtype = dtype or (torch.bfloat16 if _fast_bf16(chosen) else torch.float32)
         for part in networks.parts().values():
             part.to(chosen)
-            if dtype != torch.float32:
-                lower_matrices(part, dtype)
+        if dtype != torch.float32:
+            # the encoder stays as it was in training: its tokens must not change
+            for part in (networks.masked, networks.residual, networks.tokenizer.decoder):
+                for module in part.modules():
+                    if isinstance(module, Transformer | Residuals):
+                        module.lower(dtype)
         return cls(verified, config, networks, chosen, dtype)
 
     @property

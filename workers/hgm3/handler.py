@@ -15,7 +15,7 @@ from shared.settings import Settings as Configuration
 from shared.settings import settings as configuration
 from shared.text.features import TextFeatures
 from workers.hgm3.bundle import MODEL
-from workers.hgm3.export import export_clip, finish
+from workers.hgm3.export import export_clip, finish, split_settings
 from workers.hgm3.generate import BUCKET, MAX_ROWS, Generated, Generator, Request, Settings
 
 
@@ -77,12 +77,12 @@ class Hgm3Handler:
                 requests.append(request)
         if not items:
             return
-        settings = _settings(items[0])
+        settings, fps = split_settings(items[0].settings)  # the same for the whole batch
         made = self.generator.generate(requests, settings, control=_Rows(items, control))
         elapsed = (time.monotonic() - started) / len(items)
         for item, request, generated in zip(items, requests, made, strict=True):
             if generated is not None:
-                yield Done(item.id, partial(_export, self.generator, request, generated, settings), elapsed)
+                yield Done(item.id, partial(_export, self.generator, request, generated, settings, fps), elapsed)
 
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
         text = TextFeatures.from_blob(blob)
@@ -109,17 +109,10 @@ class _Rows:
         return {self._rows[item] for item in self._control.dropped() if item in self._rows}
 
 
-def _settings(item: ClaimedItem) -> Settings:
-    """The batch's sampling settings: the item's, which are the same for the whole batch.
-
-    Raises:
-        TypeError: a name the API does not let through.
-    """
-    return Settings(**item.settings)  # pyright: ignore[reportArgumentType] - numbers, checked by `shared.items`
-
-
-def _export(generator: Generator, request: Request, generated: Generated, settings: Settings) -> Export:
-    return export_clip(finish(generator, request, generated, settings), generator.bundle.manifest.licence)
+def _export(
+    generator: Generator, request: Request, generated: Generated, settings: Settings, fps: float | None
+) -> Export:
+    return export_clip(finish(generator, request, generated, settings, fps=fps), generator.bundle.manifest.licence)
 
 
 def create_handler() -> Hgm3Handler:

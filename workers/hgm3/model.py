@@ -310,11 +310,15 @@ class ResidualTransformer(nn.Module):
         """(B, n, w) -> (B, n, K) float32, with the codes of each sample's own level (B,)."""
         if not self.compact:
             hidden = self.norm(F.gelu(self.dense(hidden)))
+            if bool((index == index[0]).all()):  # decoding: one level at a time
+                return F.linear(hidden, self.output[index[0]]).float() + self.bias[index[0]]
             return (
                 torch.bmm(hidden, self.output[index].to(hidden.dtype).transpose(1, 2)).float()
                 + (self.bias[index][:, None])
             )
         leaving = self.leave(hidden).float() * self.scale[index][:, None, None]  # (B, n, d)
+        if bool((index == index[0]).all()):
+            return F.linear(leaving, self.codebooks[1 + index[0]]) + self.bias[index[0]]
         codes = self.codebooks[1:][index]  # (B, K, d)
         return torch.bmm(leaving, codes.transpose(1, 2)) + self.bias[index][:, None]
 

@@ -45,12 +45,20 @@ class Residuals(nn.Module):
         super().__init__()
         dilations = [3**i for i in reversed(range(config.depth))]
         self.blocks = nn.ModuleList(ResidualBlock(config.width, d, config.dropout) for d in dilations)
+        self.dtype: torch.dtype | None = None
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """(B, C, T) -> (B, C, T)."""
+        if self.dtype is not None:
+            x = x.to(self.dtype)
         for block in self.blocks:
             x = block(x, mask)
-        return x
+        return x if self.dtype is None else x.float()
+
+    def lower(self, dtype: torch.dtype) -> None:
+        """Cast to `dtype` for inference; what goes in and comes out is float32, so that no frame is rounded."""
+        self.to(dtype)
+        self.dtype = dtype
 
 
 class Encoder(nn.Module):

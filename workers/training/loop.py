@@ -6,6 +6,7 @@ Resuming is exact because nothing random is carried along: batches and torch's g
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import time
@@ -155,7 +156,8 @@ def train(stage: Stage, options: RunOptions, config: dict[str, Any]) -> dict[str
 
 class _Run:
     def __init__(self, stage: Stage, options: RunOptions, config: dict[str, Any]) -> None:
-        self.stage, self.options, self.config = stage, options, config
+        self.stage, self.options = stage, options
+        self.config: dict[str, Any] = json.loads(json.dumps(config))  # tuples become lists, as in a checkpoint
         o = stage.optimisation
         self.device = next(stage.module.parameters()).device
         trained = [p for group in stage.clip_groups() for p in group]
@@ -170,7 +172,7 @@ class _Run:
         self.main = distributed.rank() == 0
         if options.resume:
             state = load_checkpoint(self.checkpoint, stage.module, self.average, self.optimizer)
-            if (state.stage, state.seed, state.config) != (stage.name, options.seed, config):
+            if (state.stage, state.seed, state.config) != (stage.name, options.seed, self.config):
                 raise InvalidInput(
                     "the checkpoint was made with another stage, seed or configuration",
                     where=str(self.checkpoint),

@@ -89,7 +89,8 @@ def test_a_run_killed_and_resumed_ends_with_the_same_weights_bit_for_bit(
 
     def go(folder: Path, stage: TokenizerStage | MaskedStage, *, resume: bool = False) -> dict[str, torch.Tensor]:
         budget = Budget(steps=6)
-        train(stage, RunOptions(folder, budget, resume=resume, bf16=False, quiet=True, checkpoint_minutes=0), {})
+        run_options = RunOptions(folder, budget, resume=resume, bf16=False, quiet=True, checkpoint_minutes=0)
+        train(stage, run_options, TINY.to_dict())
         return stage.module.state_dict()
 
     whole = go(tmp_path / "whole", stage())
