@@ -89,7 +89,7 @@ def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
     change = smooth((_bend(wanted, l1, l2)[1] - off_was)[:, None], 0.04 * fps)[:, 0]
     off = np.clip(off_was + change, 0.0, np.minimum(l1, l2))
     smoothed = np.sqrt(l1**2 - off**2) + np.sqrt(l2**2 - off**2)
-    straight = np.clip((was / (l1 + l2) - 0.85) / 0.1, 0.0, 1.0)
+    straight = np.clip((was / np.maximum(l1 + l2, 1e-9) - 0.85) / 0.1, 0.0, 1.0)
     return wanted + straight**2 * (3 - 2 * straight) * (smoothed - wanted)
 
 
@@ -104,7 +104,7 @@ def _draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
     far, span = np.linalg.norm(up, axis=1), np.linalg.norm(sole, axis=1)
     up = normalize(up)
     turned = distance + hold * (wanted - distance)
-    cosine = np.clip((span**2 + far**2 - turned**2) / (2 * span * far), -1.0, 1.0)
+    cosine = np.clip((span**2 + far**2 - turned**2) / np.maximum(2 * span * far, 1e-9), -1.0, 1.0)
     beside = normalize(sole - up * np.einsum("ti,ti->t", up, sole)[:, None])
     raised = span[:, None] * (cosine[:, None] * up + np.sqrt(1 - cosine**2)[:, None] * beside)
     turn = between(sole, np.where((np.abs(turned - distance) > 1e-7)[:, None], raised, sole))
@@ -126,7 +126,7 @@ def smooth_above(values: Array, sigma: float) -> Array:
 
 def _bend(distance: Array, l1: Array, l2: Array) -> tuple[Array, Array]:
     """Where the knee is for a distance (T,) from hip to ankle: along the line between them, and off it."""
-    distance = np.clip(distance, np.abs(l1 - l2) + 1e-9, l1 + l2)
+    distance = np.maximum(np.clip(distance, np.abs(l1 - l2), l1 + l2), 1e-9)
     along = (distance**2 + l1**2 - l2**2) / (2 * distance)
     return along, np.sqrt(np.maximum(l1**2 - along**2, 0.0))
 

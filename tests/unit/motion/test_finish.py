@@ -121,6 +121,30 @@ def test_kit_features_are_finished_too():
     assert np.isfinite(done.joints).all()
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3, 7])
+@pytest.mark.parametrize("fps", [20, 60])
+def test_the_shortest_clips_are_finished(frames, fps):
+    clip = finish_motion(generated(frames), HUMANML3D_263, fps=fps)
+    assert clip.frames == (frames - 1) * fps // 20 + 1
+    assert np.isfinite(clip.joints).all()
+
+
+@pytest.mark.parametrize("scale", [0.0, 1.0])
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_body_is_finished_without_nan(scale):
+    noise = scale * np.random.default_rng(0).normal(size=(50, 263)).astype(np.float32)
+    clip = finish_motion(noise, HUMANML3D_263, fps=60)
+    assert np.isfinite(clip.joints).all()
+    assert np.isfinite(clip.rotations).all()
+
+
+def test_features_that_are_not_finite_are_refused():
+    features = generated()
+    features[10, 20] = np.nan
+    with pytest.raises(InvalidInput, match="NaN"):
+        finish_motion(features, HUMANML3D_263)
+
+
 def test_features_of_another_shape_are_refused():
     with pytest.raises(InvalidInput, match="shape"):
         finish_motion(np.zeros((2, 10, 263)), HUMANML3D_263)
