@@ -1,0 +1,26 @@
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from shared.runtime import worker
+from shared.runtime.status import TICK_LIMIT, WorkerStatus, write_status
+
+
+def test_a_worker_that_hints_no_longer_reach_ends_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[tuple[int, int]] = []
+    looks: list[float] = []
+
+    def sleep(_seconds: float) -> None:
+        looks.append(_seconds)
+        stuck = len(looks) != 3  # alive at the third look: the count begins anew
+        age = TICK_LIMIT + 1 if stuck else 0.0
+        write_status(tmp_path, "one", WorkerStatus(7, ready=True, tick_age=age, written=time.time()))
+
+    monkeypatch.setattr(worker.time, "sleep", sleep)
+    monkeypatch.setattr(worker.os, "kill", lambda pid, number: sent.append((pid, number)))
+    worker._watch(tmp_path, "one")
+    assert sent == [(os.getpid(), signal.SIGTERM)]
+    assert len(looks) == 3 + worker.WATCH_LOOKS
