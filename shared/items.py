@@ -37,8 +37,9 @@ SETTINGS = {
     "residual_guidance": (0.0, 100.0),
     "residual_temperature": (0.0, 100.0),
     "residual_top_k": (0.001, 1.0),
+    "fps": (1.0, 240.0),
 }
-"""Sampling settings an item may set, each with its range. One with whole bounds is whole."""
+"""Settings of sampling, and the frame rate of the files, each with its range. One with whole bounds is whole."""
 
 NAME = re.compile(r"[^\W_][\w .()+=@,-]{0,99}", re.ASCII)
 """A name becomes a file name on the client: plain characters, no separators, no leading dot or dash."""

@@ -50,9 +50,9 @@ def main() -> int:
         random = _ensure_bundle(home)
         with _server(home):
             lines = _run()
-        sheets = _draw(lines)
+        _draw(lines)
         shutil.rmtree(home)  # after a failure it stays, with its logs
-        _show(lines, sheets, random=random)
+        _show(lines, random=random)
     except MareyError as error:
         console.say(f"make demo: {error}")
         return error.exit_code
@@ -129,23 +129,19 @@ def _run() -> list[dict[str, Any]]:
         return fetch_job(client, job["id"], OUT, template="{name}", overwrite=True)
 
 
-def _draw(lines: list[dict[str, Any]]) -> dict[str, Path]:
-    """A contact sheet of each motion, by its npz."""
+def _draw(lines: list[dict[str, Any]]) -> None:
+    """A contact sheet beside each npz."""
     from shared.motion.clip import load_npz
     from shared.motion.render import contact_sheet
 
     with console.bar() as bar:
-        task = bar.add_task("drawing", total=len(lines))
-        sheets: dict[str, Path] = {}
-        for line in lines:
+        for line in bar.track(lines, description="drawing"):
             if "npz" in line["files"]:
                 npz = Path(line["files"]["npz"])
-                sheets[str(npz)] = contact_sheet(load_npz(npz), npz.with_suffix(".png"))
-            bar.advance(task)
-    return sheets
+                contact_sheet(load_npz(npz), npz.with_suffix(".png"))
 
 
-def _show(lines: list[dict[str, Any]], sheets: dict[str, Path], *, random: bool) -> None:
+def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -153,15 +149,16 @@ def _show(lines: list[dict[str, Any]], sheets: dict[str, Path], *, random: bool)
     if random:
         title = f"RANDOM WEIGHTS ({title}): these motions show the machinery, not the prompts"
     table = Table(title=title, title_justify="left")
-    for column in ("prompt", "state", "length", "seed", "took", "files"):
+    for column in ("prompt", "weights", "state", "length", "seed", "took", "files"):
         table.add_column(column)
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
         took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""
         npz = line["files"].get("npz")
-        names = [Path(path).name for path in line["files"].values()] + ([sheets[npz].name] if npz else [])
-        prompt = f"{line['prompt']} (random weights)" if random else line["prompt"]
-        table.add_row(prompt, line["state"], length, str(line["seed"]), took, " ".join(names))
+        endings = [*line["files"], "png"] if npz else list(line["files"])
+        files = f"{line['name']}.{{{','.join(sorted(endings))}}}"
+        weights = "random" if random else "trained"
+        table.add_row(line["prompt"], weights, line["state"], length, str(line["seed"]), took, files)
     Console().print(table)
 
 

@@ -97,8 +97,8 @@ class OneShot:
         Raises:
             InvalidInput: a length this bundle cannot make; before anything is made.
         """
-        from workers.hgm3.export import finish
-        from workers.hgm3.generate import MAX_ROWS, Request, Settings
+        from workers.hgm3.export import finish, split_settings
+        from workers.hgm3.generate import MAX_ROWS, Request
 
         features = self._text.features([w.prompt for w in wanted])
         fps = self._generator.config.fps
@@ -110,7 +110,7 @@ class OneShot:
         start = 0
         for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
             rows = list(group)
-            settings = Settings(**rows[0].settings)  # pyright: ignore[reportArgumentType] - checked by shared.items
+            settings, output_fps = split_settings(rows[0].settings)
             for low in range(0, len(rows), MAX_ROWS):
                 batch = requests[start + low : start + min(low + MAX_ROWS, len(rows))]
                 began = time.monotonic()
@@ -118,7 +118,7 @@ class OneShot:
                 elapsed = (time.monotonic() - began) / len(batch)
                 for row, request, generated in zip(rows[low:], batch, made, strict=False):
                     assert generated is not None  # nothing was dropped
-                    yield row, finish(self._generator, request, generated, settings), elapsed
+                    yield row, finish(self._generator, request, generated, settings, fps=output_fps), elapsed
             start += len(rows)
 
 
@@ -162,12 +162,13 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
         NotFound, InvalidFile: no such folder or clip, or a changed file.
     """
     try:
+        from workers.training.data.inspect import summarize
         from workers.training.data.prepared import PreparedData
     except ImportError as error:
         raise needs_extra("worker", error) from error
     data = PreparedData.open(folder)
     if clip is None:
-        return data.manifest.model_dump(mode="json")
+        return summarize(data).model_dump(mode="json")
     for found in data.clips:
         if found.id == clip:
             return found.model_dump(mode="json")

@@ -48,6 +48,7 @@ def items_from_file(path: str, file_format: Format | None = None) -> list[Item]:
 def with_defaults(
     items: Sequence[Item], *, model: str | None = None, seconds: float | None = None, seed: int | None = None,
     variants: int | None = None,
+    fps: float | None = None,
 ) -> list[Item]:  # fmt: skip
     """The items with the options of the command where an item itself says nothing; checked anew."""
     changed = [
@@ -57,6 +58,7 @@ def with_defaults(
             seconds=item.seconds if item.seconds is not None else seconds,
             seed=item.seed if item.seed is not None else seed,
             variants=item.variants if item.variants != 1 else variants or 1,
+            settings=item.settings if fps is None else {"fps": fps, **item.settings},
         )
         for item in items
     ]

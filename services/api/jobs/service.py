@@ -115,21 +115,29 @@ def _checked(fields: JobFields, raws: Iterator[tuple[int, object]], catalogue: C
     offers: list[Offer] = []
     problems: list[Problem] = []
     for line, item in zip(lines, items, strict=True):
-        try:
-            offer = catalogue.offer(item.model)
-        except MareyError as error:
-            if error.status >= 500:
-                raise
-            problems.append(Problem(line, "model", f"{error.message}. {error.hint}" if error.hint else error.message))
-            continue
-        try:
-            offer.check_seconds(item.seconds)
-        except InvalidInput as error:
-            problems.append(Problem(line, "seconds", error.message))
-        offers.append(offer)
+        found = _offer(line, item, catalogue)
+        if isinstance(found, Offer):
+            offers.append(found)
+        elif found not in problems:
+            problems.append(found)
     if problems:
         raise InvalidItems(problems)
     return Submission(fields, items, offers)
+
+
+def _offer(line: int, item: Item, catalogue: Catalogue) -> Offer | Problem:
+    """What the item is made with, or why it cannot be made."""
+    field = "model"
+    try:
+        offer = catalogue.offer(item.model)
+        field = "seconds"
+        offer.check_seconds(item.seconds)
+    except MareyError as error:
+        if error.status >= 500:
+            raise
+        where = None if item.model is None and field == "model" else line  # the default model is nobody's line
+        return Problem(where, field, f"{error.message}. {error.hint}" if error.hint else error.message)
+    return offer
 
 
 def job_fields(values: Mapping[str, Any]) -> JobFields:

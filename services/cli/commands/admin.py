@@ -24,11 +24,14 @@ Scopes = Annotated[list[str] | None, typer.Option("--scope", help="read, submit,
 
 @app.command()
 def migrate() -> None:
-    """Bring the database to the newest revision."""
+    """Bring the database to the newest revision, and make the folder or bucket of the asset store."""
+    config = _settings()
     from shared.jobs import upgrade
+    from shared.storage import open_store
 
-    upgrade(_engine(_settings()))
-    console.say("the database is at the newest revision")
+    upgrade(_engine(config))
+    open_store(config).prepare()
+    console.say("the database is at the newest revision, the asset store is there")
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -55,8 +55,17 @@ def inspect(
         console.result_json(found)
         return
     for name, value in found.items():
-        for line in value if isinstance(value, list) else [value]:
-            console.result(f"{name:<10} {line}")
+        rows = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        if not rows:
+            console.result(f"{name:<10} {value}")
+        for key, entry in rows:
+            console.result(f"{name:<10} {key}: {_inline(entry)}")
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {entry}" for key, entry in value.items())
+    return " | ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 @app.command()

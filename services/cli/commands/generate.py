@@ -40,6 +40,7 @@ def generate(
     seconds: options.Seconds = None,
     seed: options.Seed = None,
     variants: options.Variants = None,
+    fps: options.Fps = None,
     formats: options.Formats = None,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
@@ -52,7 +53,7 @@ def generate(
 
     check_template(name_template)
     items = read_prompts(prompts, file, input_format)
-    items = rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants)
+    items = rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps)
     try:
         from shared.bundles import choose_bundle
         from shared.settings import settings

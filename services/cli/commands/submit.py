@@ -28,6 +28,7 @@ def submit(
     seconds: options.Seconds = None,
     seed: options.Seed = None,
     variants: options.Variants = None,
+    fps: options.Fps = None,
     watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
     fetch: Annotated[
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
@@ -45,7 +46,7 @@ def submit(
 
         check_folder(fetch)  # before anything is enqueued
     items = read_prompts(prompts, file, input_format)
-    items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants)
+    items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants, fps=fps)
     with Client.here() as client:
         job = client.submit(
             [item.as_json() for item in items],
