@@ -181,7 +181,7 @@ class SequenceModel(nn.Module):
         readable = readable.gather(1, order)
         readable[:, size + slots :] = False
         rows = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))
-        return self.transformer(rows, readable)[:, :size]
+        return self.transformer(rows, readable)[:, :size].contiguous()
 
 
 class TokenHead(nn.Module):
