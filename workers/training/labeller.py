@@ -70,7 +70,7 @@ def cross_validate(
     said: list[tuple[Frame, ...]] = []
     wanted: list[tuple[Frame, ...]] = []
     for fold in range(folds):
-        train = [corrected(example) for example in unique if fold_of(example.words, folds) != fold]
+        train = corrected([example for example in unique if fold_of(example.words, folds) != fold])
         head = fit(train, states, network, config, seed)
         labeller = LightLabeller(head, states, "")
         for example in unique:
@@ -143,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.folds:
             result = cross_validate(gold, states, network, config, options.folds, options.seed)
             _say("  ".join(f"{name} {value}" for name, value in result.metrics().items()))
-        head = fit([corrected(example) for example in distinct(gold)], states, network, config, options.seed)
+        head = fit(corrected(distinct(gold)), states, network, config, options.seed)
         bundle = pack(options.output, head, minilm, options.gold, config, options.seed, result)
     except MareyError as error:
         _say(str(error))

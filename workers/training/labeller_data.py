@@ -61,10 +61,18 @@ def _gold(entry: dict[str, list[dict[str, object]]]) -> Example:
     return Example(words, tuple(frames))
 
 
-def corrected(example: Example) -> Example:
-    """Without the parser's verb "left": in these captions it is always the side, never a form of "leave"."""
-    frames = (f for f in example.frames if not example.words[f.predicate].lower().startswith("left"))
-    return Example(example.words, tuple(frames))
+def corrected(examples: Sequence[Example]) -> list[Example]:
+    """Training sentences without two kinds of the parser's mistakes.
+
+    The verb "left", which in these captions is always the side, never a form of "leave"; and captions without any
+    predicate ("A person is waving.", "A human walks fast forward."): 20 distinct ones, every one has a verb.
+    """
+    kept: list[Example] = []
+    for example in examples:
+        frames = tuple(f for f in example.frames if not example.words[f.predicate].lower().startswith("left"))
+        if frames:
+            kept.append(Example(example.words, frames))
+    return kept
 
 
 def distinct(examples: Sequence[Example]) -> list[Example]:

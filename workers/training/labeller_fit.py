@@ -113,7 +113,7 @@ def fit(
         for mean, weight in zip(average, network.parameters(), strict=True):
             mean.lerp_(weight.detach(), 1 - decay)
         if progress:
-            progress(step, float(loss))
+            progress(step, float(loss.detach()))
     with torch.no_grad():
         for weight, mean in zip(network.parameters(), average, strict=True):
             weight.copy_(mean)

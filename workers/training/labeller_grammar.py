@@ -188,6 +188,9 @@ def pick(key: str, rng: random.Random) -> str:
 def sentence(rng: random.Random) -> Example:
     """One sentence of the grammar, without capitals and final stop (the augmentation adds noise)."""
     builder = _Builder()
+    if rng.random() < 0.04:  # prompts without a verb: "a low kick with the left hand"
+        builder.add(" ".join((pick("noun", rng), *([pick("with_hand", rng)] if rng.random() < 0.3 else []))))
+        return Example(tuple(builder.words), ())
     style = rng.random()
     subject = None if style < 0.15 else _subject(builder, rng)
     form = 0 if subject is None else 2 if style < 0.4 else 3 if style < 0.45 else 1

@@ -1,0 +1,191 @@
+"""Training the role labeller: gold, augmentation, grammar, scores, and a fit of seconds."""
+
+from __future__ import annotations
+
+import json
+import random
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shared.bundles import Bundle
+from shared.errors import InvalidFile
+from shared.text.encoders import find_weights
+from shared.text.light import LightLabeller, WordStates
+from shared.text.light_network import LightConfig
+from shared.text.roles import Argument, Frame
+from workers.training.labeller import cross_validate, pack
+from workers.training.labeller_card import card
+from workers.training.labeller_data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
+from workers.training.labeller_fit import FitConfig, fit, tag_set
+from workers.training.labeller_grammar import Example, sentence
+from workers.training.labeller_score import Scores
+
+WALK = Example(
+    ("A", "person", "slowly", "walks", "forward."),
+    (Frame(3, (Argument("ARG0", 0, 2), Argument("ARGM-MNR", 2, 3), Argument("ARGM-DIR", 4, 5))),),
+)
+WAVE = Example(
+    ("someone", "waves", "his", "left", "hand"),
+    (Frame(1, (Argument("ARG0", 0, 1), Argument("ARG1", 2, 5))),),
+)
+
+
+def phrases(example: Example) -> set[tuple[str, str, str]]:
+    """Verb, role and phrase of every argument."""
+    return {
+        (example.words[f.predicate], a.role, " ".join(example.words[a.start : a.stop]))
+        for f in example.frames
+        for a in f.arguments
+    }
+
+
+def check(example: Example) -> None:
+    assert all(word and not any(c.isspace() for c in word) for word in example.words)
+    for frame in example.frames:
+        covered = [i for a in frame.arguments for i in a.words]
+        assert len(covered) == len(set(covered))
+        assert frame.predicate not in covered
+        assert all(0 <= i < len(example.words) for i in [frame.predicate, *covered])
+
+
+@given(st.integers(0, 2**32))
+def test_every_variant_is_well_formed(seed: int) -> None:
+    check(Augmenter([WALK, WAVE], random.Random(seed)).variant(random.Random(seed).choice([WALK, WAVE])))
+
+
+@given(st.integers(0, 2**32))
+def test_every_sentence_of_the_grammar_is_well_formed(seed: int) -> None:
+    check(sentence(random.Random(seed)))
+
+
+def test_joined_clauses_share_the_subject() -> None:
+    made = Augmenter([WAVE], random.Random(3)).coordinate(WALK)
+    assert ("waves", "ARG0", "A person") in phrases(made)
+    assert ("waves", "ARG1", "his left hand") in phrases(made)
+    assert ("walks", "ARGM-DIR") in {p[:2] for p in phrases(made)}
+
+
+def test_appended_sentences_share_nothing() -> None:
+    made = Augmenter([WAVE], random.Random(3)).append_sentence(WALK)
+    assert " ".join(made.words) == "A person slowly walks forward. someone waves his left hand"
+    assert phrases(made) == phrases(WALK) | phrases(WAVE)
+
+
+def test_a_longer_phrase_moves_what_follows() -> None:
+    made = replace(WALK, 0, 2, ["the", "very", "old", "man"])
+    assert made is not None
+    assert phrases(made) == {
+        ("walks", "ARG0", "the very old man"),
+        ("walks", "ARGM-MNR", "slowly"),
+        ("walks", "ARGM-DIR", "forward."),
+    }
+
+
+@pytest.mark.parametrize(("start", "stop"), [(1, 3), (3, 4), (2, 4)])
+def test_a_replacement_that_cuts_an_argument_or_a_predicate_is_not_made(start: int, stop: int) -> None:
+    assert replace(WALK, start, stop, ["x"]) is None
+
+
+@given(st.text("abcdefgh", min_size=1, max_size=9), st.integers(0, 99))
+def test_a_typo_is_small(word: str, seed: int) -> None:
+    slipped = typo(word, random.Random(seed))
+    assert abs(len(slipped) - len(word)) <= 1
+    assert slipped
+
+
+def test_captions_that_differ_in_case_and_stops_fall_into_one_fold() -> None:
+    assert group(("A", "person", "walks.")) == group(("a", "Person", "walks"))
+    assert fold_of(("A", "person", "walks."), 5) == fold_of(("a", "person", "walks"), 5)
+
+
+def test_gold_loses_auxiliaries_without_arguments_only(tmp_path: Path) -> None:
+    entry = {
+        "words": ["he", "is", "walking"],
+        "predicates": [{"word": 1, "text": "is"}, {"word": 2, "text": "walking"}],
+        "arguments": [{"predicate": 1, "role": "ARG0", "words": [0], "text": "he"}],
+    }
+    file = tmp_path / "gold.json"
+    file.write_text(json.dumps([entry]))
+    assert read_gold(file) == [Example(("he", "is", "walking"), (Frame(2, (Argument("ARG0", 0, 1),)),))]
+    entry["arguments"] = [{"predicate": 0, "role": "ARG1", "words": [0], "text": "he"}]
+    file.write_text(json.dumps([entry]))
+    assert [f.predicate for f in read_gold(file)[0].frames] == [1, 2]
+    file.write_text("[{}]")
+    with pytest.raises(InvalidFile):
+        read_gold(file)
+
+
+def test_training_leaves_out_the_parser_s_known_mistakes() -> None:
+    lost = Example(("A", "person", "waves."), ())
+    left = Example(("turns", "left"), (Frame(0, ()), Frame(1, ())))
+    assert corrected([WALK, lost, left]) == [WALK, Example(("turns", "left"), (Frame(0, ()),))]
+
+
+def test_scores_count_exact_span_and_role() -> None:
+    scores = Scores()
+    said = [Frame(3, (Argument("ARG0", 0, 2), Argument("ARGM-TMP", 2, 3), Argument("ARGM-DIR", 3, 5)))]
+    scores.add(said, WALK.frames)
+    assert scores.predicates.f1 == 1
+    assert scores.arguments.f1 == pytest.approx(1 / 3)
+    assert scores.spans.f1 == pytest.approx(2 / 3)
+    assert scores.by_role["ARG0"].f1 == 1
+    assert scores.by_role["ARGM-TMP"].f1 == 0
+
+
+@pytest.fixture(scope="module")
+def tiny() -> LightConfig:
+    return LightConfig(tags=tag_set([WALK, WAVE]), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
+
+
+@pytest.fixture(scope="module")
+def states(tiny: LightConfig) -> WordStates:
+    return WordStates(find_weights("minilm"), tiny.layers)
+
+
+def test_a_small_head_learns_two_sentences_and_survives_its_bundle(
+    tiny: LightConfig, states: WordStates, tmp_path: Path
+) -> None:
+    config = FitConfig(steps=120, batch=8, variants=0, grammar=0)
+    losses: list[float] = []
+    head = fit([WALK, WAVE], states, tiny, config, seed=0, progress=lambda _, loss: losses.append(loss))
+    assert losses[-1] < 0.3 * losses[0]
+    labeller = LightLabeller(head, states, "")
+    assert labeller.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
+
+    gold = tmp_path / "gold.json"
+    gold.write_text("[]")
+    bundle = pack(tmp_path / "srl-tiny", head, find_weights("minilm"), gold, config, 0, None)
+    again = LightLabeller.load(Bundle.open(bundle.path))
+    assert again.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
+    assert again.sha256 == bundle.weights_sha256
+
+
+def test_training_is_repeatable(tiny: LightConfig, states: WordStates) -> None:
+    config = FitConfig(steps=6, batch=4, variants=1, grammar=4)
+    gold = [WALK, WAVE]
+    roles = tag_set([*gold, *(sentence(random.Random(i)) for i in range(300))])
+    network = LightConfig(**{**tiny.__dict__, "tags": roles})
+    one, two = (fit(gold, states, network, config, seed=5) for _ in range(2))
+    assert all((a == b).all() for a, b in zip(one.parameters(), two.parameters(), strict=True))
+
+
+def test_cross_validation_never_scores_a_caption_it_trained_on(
+    tiny: LightConfig, states: WordStates, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gold = distinct([Example((*WAVE.words[:4], f"hand{i}"), WAVE.frames) for i in range(6)])
+    trained: list[set[tuple[str, ...]]] = []
+
+    def spy(examples: list[Example], *rest: object) -> object:
+        trained.append({example.words for example in examples})
+        return fit(examples, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("workers.training.labeller.fit", spy)
+    result = cross_validate(gold, states, tiny, FitConfig(steps=1, batch=2, variants=0, grammar=0), 2, 0)
+    everything = {example.words for example in gold}
+    assert result.scores.predicates.wanted == 6
+    assert trained[0] | trained[1] == everything
+    assert not trained[0] & trained[1]
+    assert "2-fold" in card(result)
