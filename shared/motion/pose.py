@@ -273,9 +273,12 @@ def measure_offsets(joints: Array, skeleton: Skeleton) -> Array:
         for place, k in zip(body, points, strict=True):
             if skeleton.parents[k] == j:
                 offsets[k] = place
-    offsets[0] = template[0]
     mirrored = offsets[list(skeleton.mirror)] * [-1.0, 1.0, 1.0]
-    return 0.5 * (offsets + mirrored)
+    offsets = 0.5 * (offsets + mirrored)
+    offsets[0] = template[0]
+    standing = skeleton.with_offsets(offsets).rest[:, 1].min()
+    offsets[0, 1] += skeleton.rest[:, 1].min() - standing  # longer legs stand the root higher over the floor
+    return offsets
 
 
 def _rest_vector(skeleton: Skeleton, offsets: Array, j: int, k: int) -> Array:

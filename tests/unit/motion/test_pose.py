@@ -99,6 +99,12 @@ def test_bones_keep_their_length_and_both_sides_are_equal():
     assert lengths[0, 4] == pytest.approx(1.1 * 0.39, rel=0.02)
 
 
+def test_the_t_pose_of_a_bigger_body_stands_on_the_floor_too():
+    pose = solve_pose(1.2 * joints_of(*dancer(6, 60)), HUMANML3D)
+    assert pose.skeleton.rest[:, 1].min() == pytest.approx(0, abs=1e-5)
+    assert pose.offsets[0, 1] == pytest.approx(1.2 * 0.94, abs=1e-5)
+
+
 def test_another_body_is_measured_in_its_own_frame():
     """Hips further back and apart than in our T-pose: what SMPL's pelvis looks like."""
     other = HUMANML3D.offsets.copy()
