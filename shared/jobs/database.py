@@ -21,6 +21,8 @@ EVENT_CHANNEL = "marey_event"
 CONNECT_TIMEOUT = 5  # seconds; libpq waits for ever by default
 # Beyond any statement of ours (100,000 items cancelled in one take 3 s), short of a hung process.
 STATEMENT_TIMEOUT = 60_000  # milliseconds
+# A client that was stopped or cut off in the middle must not hold a job's lock for ever.
+IDLE_TIMEOUT = 60_000  # milliseconds
 
 
 def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10) -> sa.Engine:
@@ -41,6 +43,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10) -> sa
     @event.listens_for(engine, "connect")
     def _set_up(connection: psycopg.Connection[tuple[object, ...]], _record: object) -> None:
         connection.execute("SELECT set_config('statement_timeout', %s, false)", (str(STATEMENT_TIMEOUT),))
+        connection.execute("SELECT set_config('idle_in_transaction_session_timeout', %s, false)", (str(IDLE_TIMEOUT),))
         connection.execute("SET timezone = 'UTC'")
         connection.commit()
 

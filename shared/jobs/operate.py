@@ -91,7 +91,8 @@ def retry(
         .returning(table.c.queue, table.c.batch_key)
     ).all()
     change_lanes(conn, job, returned((row.queue, row.batch_key, False) for row in rows))
-    control = JobControl.RUN if locked.control is JobControl.CANCELLED else None
+    # What was cancelled or had ended goes on now; a pause of what is still open holds.
+    control = JobControl.RUN if locked.state in ENDED else None
     record(conn, locked, [NewEvent("retried", reason, data={"items": len(rows)})], moved=moved, control=control)
     return get_job(conn, tenant, job)
 

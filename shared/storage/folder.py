@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,7 @@ from shared.storage.port import (
     read_chunks,
 )
 
+ABANDONED_SECONDS = 3600.0  # no writer takes so long
 INCOMING = ".incoming"
 """Folder of files being written; its name is no key's, so listings never show it."""
 
@@ -32,21 +35,26 @@ class FolderStore:
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
 
+    def prepare(self) -> None:
+        """See `AssetStore.prepare`."""
+        with _outages(self.root):
+            incoming = self.root / INCOMING
+            incoming.mkdir(parents=True, exist_ok=True)
+            for left in incoming.iterdir():
+                if left.stat().st_mtime < time.time() - ABANDONED_SECONDS:
+                    left.unlink(missing_ok=True)
+
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
         """See `AssetStore.put`. The media type is the caller's to keep."""
         path = self.path(key)
-        with _outages(self.root):
+        with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as content, _outages(self.root):
             incoming = self.root / INCOMING
             incoming.mkdir(parents=True, exist_ok=True)
             descriptor, name = tempfile.mkstemp(dir=incoming)
             temporary = Path(name)
             try:
                 with os.fdopen(descriptor, "wb") as file:
-                    if isinstance(source, bytes):
-                        file.write(source)
-                    else:
-                        with source.open("rb") as content:
-                            shutil.copyfileobj(content, file)
+                    shutil.copyfileobj(content, file)
                     file.flush()
                     os.fsync(file.fileno())
                 digest = asset_digest(temporary)  # of what was written, not of what was meant

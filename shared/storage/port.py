@@ -49,6 +49,10 @@ class AssetStore(Protocol):
     `InvalidInput` for a key that is not one.
     """
 
+    def prepare(self) -> None:
+        """Make what the store needs (folder, bucket) and remove what killed writers left. To be run again at will."""
+        ...
+
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
         """Store the bytes, or the content of a file, under `key`: wholly or not at all.
 

@@ -56,8 +56,8 @@ class S3Store:
         public = options.public_endpoint
         self._public = _client(options, public) if public and public != options.endpoint else self._client
 
-    def make_bucket(self) -> None:
-        """Make the bucket if there is none."""
+    def prepare(self) -> None:
+        """See `AssetStore.prepare`. Unfinished multipart uploads are the business of the bucket's lifecycle rules."""
         bucket = self.options.bucket
         with self._outages():
             if self._client.bucket_exists(bucket):
@@ -139,7 +139,7 @@ class S3Store:
         with self._outages():
             if not self._client.bucket_exists(self.options.bucket):
                 raise Unreachable(
-                    "the bucket does not exist", where=self._where(), hint="Make it, or run `marey admin init`."
+                    "the bucket does not exist", where=self._where(), hint="`marey admin migrate` makes it."
                 )
 
     def _chunks(self, key: str, start: int, length: int) -> Iterator[bytes]:

@@ -83,6 +83,19 @@ def test_retry_brings_back_failed_dead_and_cancelled_items(engine: sa.Engine) ->
     assert len(commit_all(engine, claim_some(engine))) == 4
 
 
+def test_retry_starts_an_ended_job_that_was_paused_and_keeps_an_open_one_paused(engine: sa.Engine) -> None:
+    ended = finish(engine, failed=1, left=1)
+    last = claim_some(engine)
+    open_still = finish(engine, failed=1, left=1)
+    with transaction(engine) as conn:
+        for job in (ended, open_still):
+            pause(conn, "default", job)
+        fail_items(conn, last.lease_token, [ItemFailure(last.items[0].id, PROBLEM, retryable=False)])
+        assert retry(conn, "default", ended).state is JobState.RUNNING
+        assert retry(conn, "default", open_still).state is JobState.PAUSED
+        assert audit(conn) == []
+
+
 def test_retry_of_a_job_without_such_items_is_a_conflict(engine: sa.Engine) -> None:
     job = finish(engine, succeeded=2)
     with transaction(engine) as conn, pytest.raises(Conflict, match="no item of this job can be retried"):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import threading
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -136,8 +138,11 @@ def test_sixteen_threads_put_at_once(store: AssetStore) -> None:
     assert list(store.keys()) == sorted({key_of(content) for content in contents})
 
 
-def test_a_store_that_works_passes_its_check(store: AssetStore) -> None:
+def test_a_store_that_works_passes_its_check_and_may_be_prepared_again(store: AssetStore) -> None:
+    store.put(key_of(b"walk"), b"walk")
+    store.prepare()
     store.check()
+    assert store.get(key_of(b"walk")) == b"walk"
 
 
 # --- the folder ---
@@ -155,6 +160,17 @@ def test_a_put_that_fails_leaves_nothing_behind(folder_store: FolderStore, tmp_p
     with pytest.raises(InvalidInput):
         folder_store.put(key_of(b"walk"), b"run")
     assert [path for path in folder_store.root.rglob("*") if path.is_file()] == []
+
+
+def test_preparing_removes_what_killed_writers_left_but_not_what_is_being_written(folder_store: FolderStore) -> None:
+    folder_store.prepare()
+    for name, age in (("old", 3700), ("new", 10)):
+        left = folder_store.root / ".incoming" / name
+        left.write_bytes(b"half")
+        os.utime(left, (time.time() - age, time.time() - age))
+    folder_store.prepare()
+    assert [path.name for path in (folder_store.root / ".incoming").iterdir()] == ["new"]
+    assert list(folder_store.keys()) == []
 
 
 def test_a_folder_has_no_urls(folder_store: FolderStore) -> None:

@@ -66,7 +66,7 @@ class Swift:
     def new_store(self) -> S3Store:
         """A store on a new, empty bucket."""
         store = S3Store(self.options(f"marey-{next(self._buckets)}"))
-        store.make_bucket()
+        store.prepare()
         return store
 
 
