@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -130,7 +131,12 @@ def make_random_bundle(path: Path) -> None:
 
 
 def prepare_data(
-    sources: Sequence[tuple[str, Path]], output: Path, *, processes: int, progress: Callable[[str, int, int], None]
+    sources: Sequence[tuple[str, Path]],
+    output: Path,
+    *,
+    extras: Mapping[str, Mapping[str, Path | None]],
+    processes: int,
+    progress: Callable[[str, int, int], None],
 ) -> str:
     """Prepare training data; a line that says what was made.
 
@@ -148,7 +154,7 @@ def prepare_data(
         if name not in readers:
             raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join(readers)}.")
     packs = [
-        readers[name](path, processes=processes, progress=lambda done, total, name=name: progress(name, done, total))
+        readers[name](path, **extras[name], processes=processes, progress=partial(progress, name))
         for name, path in sources
     ]
     manifest = build(packs, output, progress=lambda done, total: progress("building", done, total))

@@ -94,11 +94,12 @@ class Arm:
 
     @property
     def waves(self) -> bool:
-        """Swings: five and more (raised hands have up to three), or small ones within a lift that lasts: a wave from the
-        wrist moves the wrist joint by a centimetre or two."""
-        return (
-            self.swings >= 5 or (self.lifted >= 1.5 and self.flutter >= 4) or (self.lifted >= 4.5 and self.flutter >= 3)
-        )
+        """Swings: five and more (raised hands have up to three), or small ones within a lift that lasts.
+
+        A wave from the wrist moves the wrist joint by a centimetre or two.
+        """
+        small = (self.lifted >= 1.5 and self.flutter >= 4) or (self.lifted >= 4.5 and self.flutter >= 3)
+        return self.swings >= 5 or small
 
 
 class Stretch:

@@ -29,7 +29,7 @@ def smooth(values: Array, seconds: float, fps: float) -> Array:
     flat = np.asarray(values, np.float64).reshape(len(values), -1)
     padded = np.pad(flat, ((radius, radius), (0, 0)), mode="edge")
     columns = [np.convolve(padded[:, c], kernel, mode="valid") for c in range(flat.shape[1])]
-    return np.stack(columns, axis=1).reshape(np.shape(values))
+    return np.stack(columns, axis=1).reshape(np.shape(values)).astype(np.float64)
 
 
 def velocity(points: Array, fps: float) -> Array:

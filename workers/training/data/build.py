@@ -87,6 +87,7 @@ def _facts(clip: PackClip, content: str, joints: NDArray[np.float32]) -> Facts |
     return describe(content, clip.style, joints, FPS)
 
 
+_LEAST_STD = 1e-4  # a group that never changes must not become infinite
 _LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a second
 
 
@@ -110,6 +111,15 @@ class FolderWriter:
         self._features = (self.work / "features.raw").open("wb")
         self._local = (self.work / "joints.raw").open("wb")
         self._roots = (self.work / "roots.raw").open("wb")
+
+    def __enter__(self) -> FolderWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """What is not finished is removed."""
+        for file in (self._features, self._local, self._roots):
+            file.close()
+        shutil.rmtree(self.work, ignore_errors=True)
 
     def add(
         self, part: Part, joints: NDArray[np.floating], acts: Sequence[Facts], *, name: str, spliced: tuple[str, ...]
@@ -186,7 +196,7 @@ class FolderWriter:
         deviation = np.sqrt(np.maximum(squares / count - mean**2, 0.0))
         std = np.empty_like(deviation)
         for group in LAYOUT.slices.values():
-            std[group] = deviation[group].mean()
+            std[group] = max(float(deviation[group].mean()), _LEAST_STD)
         return mean.astype(np.float32), std.astype(np.float32)
 
     def _manifest(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
@@ -245,19 +255,19 @@ def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None =
         Conflict: the folder is not empty.
         InvalidInput: no training clip is left.
     """
-    writer = FolderWriter(out)
     left_out: dict[str, str] = {}
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
     total = 2 * sum(len(pack.clips) for pack in packs) + sum(c.pairs + c.triples + c.retimed for c in COUNTS.values())
-    for part in parts_of(packs, left_out):
-        by_split[part.source.split].append(part)
-        writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
-        if progress:
-            progress(len(writer.clips), total)
-    for split, parts in by_split.items():
-        for made in compose(parts, split):
-            ids = tuple(part.id for part in made.parts)
-            writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids)
+    with FolderWriter(out) as writer:
+        for part in parts_of(packs, left_out):
+            by_split[part.source.split].append(part)
+            writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
             if progress:
                 progress(len(writer.clips), total)
-    return writer.finish(packs, left_out)
+        for split, parts in by_split.items():
+            for made in compose(parts, split):
+                ids = tuple(part.id for part in made.parts)
+                writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids)
+                if progress:
+                    progress(len(writer.clips), total)
+        return writer.finish(packs, left_out)

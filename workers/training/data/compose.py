@@ -12,11 +12,12 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.checks.judge import straightness
+from workers.training.checks.judge import Act, Expectation, Side, judge
 from workers.training.checks.kinematics import heading, lean, smooth, trunk_up
 from workers.training.data.captions import seeded
 from workers.training.data.describe import CYCLIC, Facts, describe
@@ -45,7 +46,7 @@ SEQUENCE_WEIGHTS: dict[str, float] = {
     "call": 0.2,
     "dance": 0.2,
 }
-_STRAIGHT = ("walk", "run", "dash", "walk_back")  # a loop must not bend the way
+_STRAIGHT = ("walk", "run", "walk_back")
 _CANDIDATES = 8  # clips among which the best seam is taken
 _WORST_SEAM = 0.6  # mean squared metres, see splice.seam_costs; a bow into a run has 0.4 and looks well
 _ARMS = {"left": (0,), "right": (1,), "both": (0, 1)}
@@ -221,9 +222,9 @@ class Composer:
             return None
         joints, used, repeats = made
         facts = _measured(part, joints)
-        if act in _STRAIGHT and not straightness(joints, FPS).straight:
+        if facts is None or not _still_does(facts, joints, repeats):
             return None
-        return None if facts is None else Composed(name, used, joints, (replace(facts, repeats=repeats),))
+        return Composed(name, used, joints, (replace(facts, repeats=repeats),))
 
     def _with_run_up(self, rng: random.Random, part: Part, target: int) -> tuple[Array, tuple[Part, ...], int] | None:
         """A turn after a longer straight walk in the same style."""
@@ -240,6 +241,17 @@ class Composer:
             return None
         joints = join_clips(walk.joints[: i + 1].astype(np.float64), part.joints[j:].astype(np.float64), FPS)
         return joints[:LIMIT], (walk, part), 1
+
+
+def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
+    """Whether the act can still be told from others: a hand held by loops must not seem to wave, a loop not bend the
+    way."""
+    act = "run" if facts.act == "dash" else facts.act
+    if repeats > 1 or act not in get_args(Act):
+        return True
+    side = facts.side if act in ("turn", "wave", "raise") else ""
+    expected = Expectation(cast("Act", act), cast("Side", side), straight=act in _STRAIGHT)
+    return judge(joints, FPS, [expected]).passed
 
 
 def _crop(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[Part, ...], int]:

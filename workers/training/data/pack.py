@@ -7,6 +7,8 @@ every time. Joints are stored relative to the root, where float16 is off by at m
 from __future__ import annotations
 
 import json
+import zipfile
+import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -88,13 +90,13 @@ class JointsPack:
         if not path.is_file():
             raise NotFound("no joints pack", where=str(path))
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 table = json.loads(str(file["table"]))
                 local, root = file["local"], file["root"]
             if table.get("format") != FORMAT:
                 raise InvalidFile(f"not a joints pack of format {FORMAT}", where=str(path))
             clips = tuple(PackClip(**row) for row in table["clips"])
-        except (ValueError, KeyError, TypeError, OSError, EOFError) as error:
+        except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise InvalidFile(f"not a joints pack: {error}", where=str(path)) from error
         rows = sum(clip.frames for clip in clips)
         if local.shape != (rows, 21, 3) or root.shape != (rows, 3):
