@@ -46,6 +46,7 @@ class TransformerConfig:
     width: int = 384
     feedforward: int = 1024
     dropout: float = 0.2
+    attention_dropout: float = 0.2
     norm_first: bool = False  # MoMask's encoders normalise after the residual
 
 
@@ -176,9 +177,15 @@ STARTER = HGM3Config(
     tokenizer=TokenizerConfig(width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
     compact=True,
-    masked=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.1, norm_first=True),
-    predictor=TransformerConfig(layers=2, heads=4, width=192, feedforward=256, dropout=0.1, norm_first=True),
-    residual=TransformerConfig(layers=4, heads=4, width=192, feedforward=384, dropout=0.1, norm_first=True),
+    masked=TransformerConfig(
+        layers=4, heads=4, width=256, feedforward=512, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
+    predictor=TransformerConfig(
+        layers=2, heads=4, width=192, feedforward=256, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
+    residual=TransformerConfig(
+        layers=4, heads=4, width=192, feedforward=384, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
     length_hidden=(128,),
     mining=MiningConfig(levels_per_step=1),
     windows=(64, 64, 128),
@@ -193,9 +200,15 @@ TINY = HGM3Config(
     tokenizer=TokenizerConfig(width=32, depth=1, levels=3, codes=32, code_width=16, dropout=0.0),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16),
     compact=True,
-    masked=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),
-    predictor=TransformerConfig(layers=1, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),
-    residual=TransformerConfig(layers=1, heads=2, width=32, feedforward=64, dropout=0.1, norm_first=True),
+    masked=TransformerConfig(
+        layers=2, heads=2, width=32, feedforward=64, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
+    predictor=TransformerConfig(
+        layers=1, heads=2, width=32, feedforward=64, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
+    residual=TransformerConfig(
+        layers=1, heads=2, width=32, feedforward=64, dropout=0.1, attention_dropout=0.0, norm_first=True
+    ),
     length_hidden=(32,),
     windows=(32,),
     train_tokenizer=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),

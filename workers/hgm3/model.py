@@ -150,7 +150,9 @@ class SequenceModel(nn.Module):
         super().__init__()
         self.slots = slots
         c = config
-        self.transformer = Transformer(c.layers, c.width, c.heads, c.feedforward, c.dropout, norm_first=c.norm_first)
+        self.transformer = Transformer(
+            c.layers, c.width, c.heads, c.feedforward, c.dropout, c.attention_dropout, norm_first=c.norm_first
+        )
         # a bucket is a multiple of 8 tokens
         table = sinusoidal_positions(slots + max_tokens + 8, c.width)
         self.register_buffer("positions", table, persistent=False)

@@ -9,7 +9,7 @@ import torch
 from torch import nn
 
 from shared.nn.ema import WeightAverage, update_average, warm_momentum
-from shared.nn.transformer import Transformer, pad_length, sinusoidal_positions
+from shared.nn.transformer import Transformer, dropout, pad_length, sinusoidal_positions
 
 
 def transformer(*, norm_first: bool = True) -> Transformer:
@@ -60,6 +60,23 @@ def test_post_norm_equals_the_reference_encoder_layer_of_torch() -> None:
     found = model(x, valid)
     torch.testing.assert_close(found[0], expected[0], atol=1e-5, rtol=1e-5)
     torch.testing.assert_close(found[1, :6], expected[1, :6], atol=1e-5, rtol=1e-5)
+
+
+def test_attention_in_training_equals_that_of_inference() -> None:
+    model = Transformer(2, 32, 4, 64, 0.0, norm_first=True)
+    x, valid = torch.randn(2, 16, 32), torch.arange(16)[None] < torch.tensor([[5], [16]])
+    for row, size in enumerate((5, 16)):
+        torch.testing.assert_close(model.train()(x, valid)[row, :size], model.eval()(x, valid)[row, :size])
+
+
+def test_dropout_zeroes_its_share_and_keeps_the_mean() -> None:
+    torch.manual_seed(0)
+    x = torch.ones(1000, 103)
+    dropped = dropout(x, 0.25, training=True)
+    assert float((dropped == 0).float().mean()) == pytest.approx(0.25, abs=0.005)
+    assert float(dropped.mean()) == pytest.approx(1.0, abs=0.01)
+    assert dropped.unique().tolist() == pytest.approx([0.0, 4 / 3])
+    assert dropout(x, 0.25, training=False) is x
 
 
 def test_positions_are_sines_and_cosines() -> None:
