@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput, NotFound
+from shared.motion.filters import smooth
 from shared.motion.kinematics import across, facing
 from shared.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
 from shared.motion.skeleton import HUMANML3D, KIT, Skeleton
@@ -98,16 +99,6 @@ def mirror_joints(joints: Array, skeleton: Skeleton) -> Array:
     return joints[..., list(skeleton.mirror), :] * np.array([-1, 1, 1], joints.dtype)
 
 
-def gaussian_smooth(values: Array, sigma: float) -> Array:
-    """Gaussian filter over axis 0 of (T, C), ends repeated, cut at four sigma."""
-    if sigma <= 0:
-        return values
-    radius = int(4 * sigma + 0.5)
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0) @ (kernel / kernel.sum())
-
-
 @dataclass(frozen=True, eq=False)
 class HeadingLayout:
     """HumanML3D's layout for any skeleton: 1 + 2 + 1 + 3 (J - 1) + 6 (J - 1) + 3 J + 4 numbers a frame.
@@ -171,7 +162,7 @@ class HeadingLayout:
         zero in frame 0."""
         places = canonicalize(joints, self.skeleton)
         right = across(places, self.skeleton, hips=self.facing_hips)
-        right = gaussian_smooth(right[:, [0, 2]], self.facing_sigma)  # a shorter vector in the plane weighs less
+        right = smooth(right[:, [0, 2]], self.facing_sigma, cut=4.0)  # a shorter vector in the plane weighs less
         half_yaw = -0.5 * np.unwrap(np.arctan2(right[:, 1], -right[:, 0]))  # forward = up x right
         if self.facing_start == "smoothed":
             places = rotate(about("Y", 2 * half_yaw[0]), places)

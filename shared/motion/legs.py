@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.motion.filters import smooth, smooth_above
 from shared.motion.kinematics import facing
-from shared.motion.pose import smooth
 from shared.motion.rotations import Array, between, normalize, rotate
 from shared.motion.skeleton import Skeleton
 
@@ -112,16 +112,6 @@ def _draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
     across = foot[:, -1] - hip
     over = np.linalg.norm(across, axis=1) - wanted
     return foot - (over[:, None] * normalize(across))[:, None]
-
-
-def smooth_above(values: Array, sigma: float) -> Array:
-    """A smooth curve (T,) that is nowhere below the values: their running maximum over three sigma, smoothed."""
-    radius = min(int(3 * sigma + 0.5), len(values) - 1)
-    if radius < 1 or not values.any():
-        return values
-    padded = np.pad(values, radius, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1).max(axis=1)
-    return smooth(highest[:, None], sigma)[:, 0]
 
 
 def _bend(distance: Array, l1: Array, l2: Array) -> tuple[Array, Array]:

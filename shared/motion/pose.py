@@ -22,6 +22,7 @@ from itertools import pairwise
 import numpy as np
 
 from shared.errors import InvalidInput
+from shared.motion.filters import smooth
 from shared.motion.kinematics import bone_lengths
 from shared.motion.rotations import (
     Array,
@@ -121,18 +122,21 @@ class _Solver:
         limbs = {limb.upper: limb for limb in _limbs(skeleton.parents, skeleton.facing)}
         bodies = _bodies(skeleton)
         spines = _spines(skeleton.parents, frozenset(bodies))
+        in_spines = {j for chain in spines.values() for j in chain}
         for j in range(len(skeleton)):
             if j:
                 self.places[:, j] = self.places[:, skeleton.parents[j]] + rotate(
                     self.world[:, skeleton.parents[j]], self.offsets[j]
                 )
             if j in spines:
-                self._spine(spines[j], bodies)
-            elif j in bodies and not any(j == chain[-1] for chain in spines.values()):
+                self._spine(spines[j], bodies)  # all of the chain at once
+            elif j in in_spines:
+                continue
+            elif j in bodies:
                 self.world[:, j] = self._body(j, bodies[j])
             elif j in limbs:
                 self._limb(limbs[j])
-            elif not any(j in chain for chain in spines.values()):
+            else:
                 self._swing(j)
 
     def _parent(self, j: int) -> Array:
@@ -200,16 +204,6 @@ class _Solver:
         seen = smooth(np.stack([weight * along / length, weight * beside / length], axis=1), PLANE_SECONDS * self.fps)
         twist = _unwrap(np.arctan2(seen[:, 1], seen[:, 0] + PLANE_PRIOR))
         return smooth(twist[:, None], 0.5 * PLANE_SECONDS * self.fps)[:, 0]
-
-
-def smooth(values: Array, sigma: float) -> Array:
-    """Gaussian filter over axis 0 of (T, C), the ends reflected at their own values; cut at three sigma."""
-    radius = min(int(3 * sigma + 0.5), len(values) - 1)
-    if radius < 1:
-        return values
-    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0) @ (kernel / kernel.sum())
 
 
 def _unwrap(angles: Array) -> Array:

@@ -14,10 +14,10 @@ from shared.motion.features import (
     LAYOUTS,
     FeatureLayout,
     canonicalize,
-    gaussian_smooth,
     layout,
     mirror_joints,
 )
+from shared.motion.filters import smooth
 from shared.motion.kinematics import facing, forward_kinematics
 from shared.motion.rotations import about, angle_between, from_6d, from_rotvec, multiply, rotate
 from shared.motion.skeleton import HUMANML3D, Skeleton
@@ -207,6 +207,6 @@ def test_features_of_another_shape_are_refused(shape):
 
 
 def test_smoothing_keeps_constants_and_narrows_noise():
-    assert gaussian_smooth(np.full((30, 2), 3.0), 5) == pytest.approx(3.0)
+    assert smooth(np.full((30, 2), 3.0), 5) == pytest.approx(3.0)
     noise = np.random.default_rng(0).normal(size=(500, 1))
-    assert gaussian_smooth(noise, 4).std() == pytest.approx((2 * 4 * np.pi**0.5) ** -0.5, rel=0.2)
+    assert smooth(noise, 4).std() == pytest.approx((2 * 4 * np.pi**0.5) ** -0.5, rel=0.2)

@@ -5,8 +5,9 @@ import pytest
 
 from shared.errors import InvalidInput
 from shared.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
+from shared.motion.filters import smooth_above
 from shared.motion.kinematics import bone_lengths
-from shared.motion.legs import smooth_above, two_bone_knee
+from shared.motion.legs import two_bone_knee
 from shared.motion.pose import solve_pose
 from shared.motion.resample import frame_times, interpolate, interpolate_rotations
 from shared.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton
