@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
@@ -36,11 +36,14 @@ CONNECTIONS = 10
 """Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams end at once."""
+ROUTERS = (health_router, jobs_router, motions_router, models_router, texts_router)
+TEXT_ROUTERS = (health_router, texts_router)
+"""For `marey text serve`: parsing alone, which can be given machines of its own."""
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."
 
 
-def create_app(config: Settings) -> FastAPI:
-    """The application; connects to nothing before it starts."""
+def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> FastAPI:
+    """The application, of these nouns; connects to nothing before it starts."""
     app = FastAPI(
         title="Marey",
         version=version("marey"),
@@ -51,7 +54,7 @@ def create_app(config: Settings) -> FastAPI:
         redoc_url=None,
     )
     problems.install(app)
-    for router in (health_router, jobs_router, motions_router, models_router, texts_router):
+    for router in routers:
         app.include_router(router)
     app.add_middleware(BodyGuard)
     app.add_middleware(HostGuard, allowed=config.allowed_hosts)
@@ -114,12 +117,12 @@ def write_openapi(path: Path) -> None:
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def serve() -> None:
+def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
     config = settings()
     configure_logging("api", level=config.log_level, json=config.log_json)
     uvicorn.run(
-        create_app(config),
+        create_app(config, routers),
         host=config.host,
         port=config.port,
         log_config=None,

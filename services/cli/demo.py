@@ -57,7 +57,7 @@ def main() -> int:
         console.say(f"make demo: {error}")
         return error.exit_code
     failed = sum(line["state"] != "succeeded" for line in lines)
-    console.say(f"{len(lines) - failed} motions in {OUT}/ after {time.monotonic() - began:.0f} s.")
+    console.say(f"{len(lines) - failed} motions (.bvh, .npz, .png) in {OUT}/ after {time.monotonic() - began:.0f} s.")
     console.say("Open a .bvh in Blender (File, Import, Motion Capture), or a .png in any viewer.")
     return 6 if failed else 0
 
@@ -154,9 +154,7 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
         took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""
-        npz = line["files"].get("npz")
-        endings = [*line["files"], "png"] if npz else list(line["files"])
-        files = f"{line['name']}.{{{','.join(sorted(endings))}}}"
+        files = f"{line['name']}.*" if line["files"] else ""
         weights = "random" if random else "trained"
         table.add_row(line["prompt"], weights, line["state"], length, str(line["seed"]), took, files)
     Console().print(table)

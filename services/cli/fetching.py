@@ -83,7 +83,7 @@ def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] |
 def naming(item: dict[str, Any]) -> Naming:
     """What a name template may use of an item of the API."""
     return Naming(
-        index=item["index"] + 1,
+        index=item["index"],
         name=item["name"] or slug(item["prompt"]),
         seed=item["seed"],
         variant=item["variant"],

@@ -17,7 +17,7 @@ FIELDS = ("index", "name", "seed", "variant", "model", "job")
 
 @dataclass(frozen=True)
 class Naming:
-    """What a template may speak of. `index` counts prompts from 1; `name` is the item's name, else a slug."""
+    """What a template may speak of. `index` counts prompts from 0; `name` is the item's name, else a slug."""
 
     index: int
     name: str

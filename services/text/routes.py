@@ -12,8 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from services.api.auth import requires
 from services.api.problems import RESPONSES
 from shared.bundles import TextSpec, choose_bundle
-from shared.errors import InvalidInput
+from shared.errors import InvalidInput, Unreachable
+from shared.items import MODEL
 from shared.jobs import ApiKey
+from shared.text.prompts import check_prompt
 
 if TYPE_CHECKING:
     from shared.text.pipeline import TextPipeline
@@ -31,7 +33,7 @@ class ParseBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     prompts: list[str] = Field(min_length=1, max_length=MAX_PROMPTS)
-    model: str = Field("hgm3", max_length=200, description="Model or bundle whose labeller and rewriter to use.")
+    model: str = Field("hgm3", pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use.")
 
 
 class NodeView(BaseModel):
@@ -73,7 +75,8 @@ class GraphsView(BaseModel):
 @router.post("/parse")
 def parse_texts(body: ParseBody, key: Annotated[ApiKey, Depends(requires("read"))]) -> GraphsView:
     """The semantic graph of each prompt."""
-    graphs = pipeline_of(body.model).parse(body.prompts)
+    prompts = [check_prompt(prompt, where=f"prompts.{index}") for index, prompt in enumerate(body.prompts)]
+    graphs = pipeline_of(body.model).parse(prompts)
     return GraphsView(items=[GraphView.model_validate(graph.to_json()) for graph in graphs])
 
 
@@ -83,6 +86,7 @@ def pipeline_of(model: str) -> TextPipeline:
     Raises:
         InvalidInput: it reads none.
         NotFound, InvalidBundle: as `choose_bundle` and `TextPipeline.load`.
+        Unreachable: this server was installed without what parsing needs.
     """
     bundle = choose_bundle(model, verify=False)
     if bundle.manifest.text is None:
@@ -93,6 +97,12 @@ def pipeline_of(model: str) -> TextPipeline:
 
 @lru_cache(maxsize=4)
 def _loaded(spec: str) -> TextPipeline:
-    from shared.text.pipeline import TextPipeline  # brings torch: not before somebody asks
+    try:
+        import torch  # noqa: F401  # not before somebody asks
+    except ImportError as error:
+        raise Unreachable(
+            "this server cannot parse texts: torch is not installed beside it", hint="Install marey[worker] there."
+        ) from error
+    from shared.text.pipeline import TextPipeline
 
     return TextPipeline.load(TextSpec.model_validate_json(spec))

@@ -38,8 +38,8 @@ def test_every_item_has_its_line_in_input_order(fetched: list[dict[str, object]]
 
 def test_files_are_named_by_index_name_and_seed(fetched: list[dict[str, object]]) -> None:
     names = [Path(line["files"]["bvh"]).name for line in fetched]
-    assert names[:2] == ["00001_walk_7.bvh", "00001_walk_8.bvh"]
-    assert names[2] == f"00002_someone-waves_{fetched[2]['seed']}.bvh"
+    assert names[:2] == ["00000_walk_7.bvh", "00000_walk_8.bvh"]
+    assert names[2] == f"00001_someone-waves_{fetched[2]['seed']}.bvh"
 
 
 def test_the_npz_and_the_bvh_hold_the_same_motion(fetched: list[dict[str, object]]) -> None:

@@ -20,7 +20,7 @@ COUNT = 40
 
 
 def slow_items() -> list[dict[str, object]]:
-    """Items that are made four at a time, for the settings of a batch are the same: enough batches to kill in between."""
+    """Items that are made four at a time, for the settings of a batch are the same: batches to kill in between."""
     return [
         {"prompt": f"a person walks {n} steps", "seconds": 9, "settings": {"steps": 20, "guidance": 1 + n // 4}}
         for n in range(COUNT)

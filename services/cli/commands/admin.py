@@ -24,14 +24,19 @@ Scopes = Annotated[list[str] | None, typer.Option("--scope", help="read, submit,
 
 @app.command()
 def migrate() -> None:
-    """Bring the database to the newest revision, and make the folder or bucket of the asset store."""
+    """Bring the database to the newest revision, and make the bucket of an S3 store where there is none."""
     config = _settings()
     from shared.jobs import upgrade
     from shared.storage import open_store
 
     upgrade(_engine(config))
-    open_store(config).prepare()
-    console.say("the database is at the newest revision, the asset store is there")
+    console.say("the database is at the newest revision")
+    store = open_store(config)
+    make_bucket = getattr(store, "make_bucket", None)
+    if make_bucket is not None:
+        make_bucket()
+    store.check()
+    console.say("the asset store takes files")
 
 
 @app.command()

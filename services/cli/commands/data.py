@@ -21,6 +21,12 @@ def prepare(
         list[str], typer.Argument(metavar="SOURCE PATH …", help="bandai-namco or cmu, and its archive or folder.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write; must be empty or new.")],
+    splits: Annotated[
+        Path | None, typer.Option("--splits", help="Of bandai-namco; else bandai-namco-splits.json beside it.")
+    ] = None,
+    captions: Annotated[
+        Path | None, typer.Option("--captions", help="Of cmu; else cmu-captions.json beside it.")
+    ] = None,
     processes: Annotated[int, typer.Option("--processes", min=1, help="How many retarget at once.")] = 2,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
@@ -34,6 +40,7 @@ def prepare(
         manifest = roles.prepare_data(
             sources,
             output,
+            extras={"bandai-namco": {"splits": splits}, "cmu": {"captions": captions}},
             processes=processes,
             progress=lambda what, done, total: bar.update(task, description=what, completed=done, total=total or None),
         )

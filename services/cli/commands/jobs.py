@@ -152,7 +152,7 @@ def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:
     page = client.get(f"/v1/jobs/{job}/items", state=state, limit=limit)
     for item in page["items"]:
         error = item["error"] or {"message": item["reason"], "hint": None}
-        console.result(f"{state:<10} {item['index'] + 1}: {item['prompt'][:60]!r}: {error['message']}")
+        console.result(f"{state:<10} {item['index']}: {item['prompt'][:60]!r}: {error['message']}")
         if error.get("hint"):
             console.result(f"{'':<10} {error['hint']}")
     if page.get("next"):

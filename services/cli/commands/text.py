@@ -39,6 +39,19 @@ def parse(
         raise needs_extra("worker", error) from error
 
 
+@app.command()
+def serve() -> None:
+    """Serve `POST /v1/texts/parse` alone; MAREY_HOST and MAREY_PORT say where."""
+    from services.cli.roles import needs_extra
+
+    try:
+        from services.api.app import TEXT_ROUTERS
+        from services.api.app import serve as serve_api
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    serve_api(TEXT_ROUTERS)
+
+
 def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
     from shared.bundles import choose_bundle
     from shared.errors import InvalidInput

@@ -1,0 +1,125 @@
+"""The client against a server that fails on purpose."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from services.cli import client as client_module
+from services.cli.client import Client
+from services.cli.place import Server
+from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unreachable
+from shared.items import InvalidItems
+
+
+@dataclass
+class Script:
+    """What the server answers, one after the other, and what it was asked."""
+
+    answers: list[tuple[int, bytes]]
+    asked: list[tuple[str, str | None, bytes]] = field(default_factory=list)
+
+
+Scripted = Callable[..., tuple[Client, Script]]
+
+
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
+    monkeypatch.setattr(client_module, "FIRST_PAUSE", 0.001)
+    servers: list[ThreadingHTTPServer] = []
+
+    def start(*answers: tuple[int, object]) -> tuple[Client, Script]:
+        script = Script([(code, json.dumps(body).encode()) for code, body in answers])
+
+        class Handler(BaseHTTPRequestHandler):
+            def answer(self) -> None:
+                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+                script.asked.append((self.command, self.headers.get("Idempotency-Key"), body))
+                code, content = script.answers.pop(0)
+                if code == 0:  # the answer is lost on the way
+                    self.close_connection = True
+                    return
+                self.send_response(code)
+                self.send_header("Content-Length", str(len(content)))
+                self.end_headers()
+                self.wfile.write(content)
+
+            do_GET = do_POST = answer
+
+            def log_message(self, *_: object) -> None:
+                pass
+
+        server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        servers.append(server)
+        return Client(Server(f"http://127.0.0.1:{server.server_port}", "key")), script
+
+    yield start
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+def problem(kind: str, **more: object) -> dict[str, object]:
+    return {"type": f"urn:marey:problem:{kind}", "detail": "no", **more}
+
+
+def test_a_submit_whose_answer_is_lost_is_sent_again_with_the_same_key(
+    scripted: Scripted,
+) -> None:
+    client, script = scripted((0, None), (503, problem("unreachable")), (202, {"id": "j"}))
+    with client:
+        assert client.submit([{"prompt": "a person walks"}])["id"] == "j"
+        assert len(script.asked) == 3
+        assert len(set(script.asked)) == 1
+        assert script.asked[0][1]
+        script.answers.append((202, b"{}"))
+        client.submit([{"prompt": "a person walks"}])
+        assert script.asked[-1][1] != script.asked[0][1]
+
+
+def test_a_server_that_stays_away_is_unreachable_after_five_attempts(
+    scripted: Scripted,
+) -> None:
+    client, script = scripted(*[(503, problem("unreachable"))] * 9)
+    with client, pytest.raises(Unreachable):
+        client.get("/v1/jobs")
+    assert len(script.asked) == client_module.ATTEMPTS
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "error", "exit_code"),
+    [
+        (404, "not-found", NotFound, 3),
+        (409, "conflict", Conflict, 2),
+        (403, "refused", Refused, 5),
+        (422, "invalid-input", InvalidInput, 2),
+        (422, "idempotency-mismatch", InvalidInput, 2),
+    ],
+)
+def test_a_problem_becomes_the_error_it_was(
+    scripted: Scripted, code: int, kind: str, error: type, exit_code: int
+) -> None:
+    client, script = scripted((code, problem(kind, where="job x", hint="Look.")))
+    with client, pytest.raises(error, match=r"job x: no\n  Look\.") as caught:
+        client.get("/v1/jobs/x")
+    assert caught.value.exit_code == exit_code
+    assert len(script.asked) == 1
+
+
+def test_the_problems_of_lines_come_back_as_they_were(scripted: Scripted) -> None:
+    listed = [{"line": 7, "field": "seed", "message": "is low"}]
+    client, _ = scripted((422, problem("invalid-items", problems=listed, total=3)))
+    with client, pytest.raises(InvalidItems, match=r"3 problems.*\n  line 7: seed: is low\n  … and 2 more"):
+        client.submit([{"prompt": "a person walks"}])
+
+
+def test_an_answer_of_something_else_is_told_as_such(scripted: Scripted) -> None:
+    client, _ = scripted((404, "<html>"))
+    with client, pytest.raises(InvalidInput, match="MAREY_SERVER"):
+        client.get("/v1/jobs")
