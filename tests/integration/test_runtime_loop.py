@@ -16,6 +16,7 @@ from shared.jobs.schema import item, motion
 from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime import committer as committer_module
 from shared.runtime import loop as loop_module
+from shared.runtime.handler import Batch, BatchControl, Outcome
 from shared.storage import Digest, FolderStore
 from tests.support.runtime import Loop
 from tests.support.toy import FITS, ToyHandler
@@ -68,6 +69,27 @@ def test_a_bundle_is_loaded_once_for_many_batches(engine: sa.Engine, loop: Loop,
     submit_toys(engine, ["walk"] * 40)
     loop.run()
     assert toy.loaded == ["toy@0123456789ab"]
+
+
+def test_queues_are_served_in_turns(
+    engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
+) -> None:
+    """A long job of one queue holds up no other queue of the same child."""
+    served: list[str] = []
+
+    class Named(ToyHandler):
+        def __init__(self, queue: str) -> None:
+            super().__init__()
+            self.queue = queue
+
+        def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+            served.append(self.queue)
+            return super().run(batch, control)
+
+    submit_toys(engine, ["walk"] * 128, queue="one")
+    submit_toys(engine, ["walk"] * 64, queue="two")
+    make_loop(folder_store, Named("one"), Named("two")).run()
+    assert served == ["one", "two", "one", "two", "one", "one"]
 
 
 def test_a_permanent_error_fails_its_item_alone(engine: sa.Engine, loop: Loop, folder_store: FolderStore) -> None:
@@ -133,6 +155,29 @@ def test_out_of_memory_halves_the_batch_in_place(engine: sa.Engine, loop: Loop, 
     assert toy.batches == [16, 8, FITS, FITS, 8, FITS, FITS]
     with transaction(engine) as conn:
         assert set(conn.execute(sa.select(item.c.attempts)).scalars()) == {0}
+
+
+def test_a_lost_accelerator_ends_the_child_as_a_crash_would(
+    engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Halving would fail every item in turn, and so would every later batch of the process."""
+    torch = pytest.importorskip("torch")
+
+    class Crash(BaseException):
+        pass
+
+    def crash() -> None:
+        raise Crash
+
+    class Broken(ToyHandler):
+        def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+            raise torch.AcceleratorError("CUDA error: device-side assert triggered", 710)
+            yield
+
+    monkeypatch.setattr(loop_module, "end_child", crash)
+    submit_toys(engine, ["walk"] * 8)
+    with pytest.raises(Crash):
+        make_loop(folder_store, Broken()).run()
 
 
 def test_a_bundle_that_is_not_here_fails_the_items_with_its_message(engine: sa.Engine, loop: Loop) -> None:

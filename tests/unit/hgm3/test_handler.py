@@ -118,6 +118,14 @@ def test_the_files_hold_the_motion_and_where_it_comes_from(handler: Hgm3Handler,
     assert manifest == export.manifest
 
 
+def test_the_frame_rate_of_the_files_is_the_items(handler: Hgm3Handler) -> None:
+    item = make_item("a person waves", 7, 2.5, {"fps": 60.0})
+    clip = clip_of(run(handler, make_batch(handler, item))[item.id])
+    assert clip.fps == 60.0
+    assert clip.features_fps == 20.0
+    assert clip.frames == 148  # as long as 50 frames at 20 a second: 2.45 s and one frame
+
+
 def test_an_items_motion_does_not_depend_on_its_batch(handler: Hgm3Handler) -> None:
     items = [make_item(f"person number {n}", n, 2.0 + n % 3) for n in range(7)]
     batches = [items, items[4:5], items[::-1]]
