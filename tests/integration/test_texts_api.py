@@ -1,0 +1,80 @@
+"""`POST /v1/texts/parse` through a real uvicorn, with the shipped labeller."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx2
+import numpy as np
+import pytest
+
+from shared.bundles import BundleWriter, TextSpec
+from shared.jobs import create_engine, create_key, transaction
+from shared.runtime.embedded import EmbeddedServer
+from shared.settings import settings
+from tests.support.live_api import ApiThread, settings_of
+
+PATH = "/v1/texts/parse"
+READER = "hgm3-reader"
+
+
+@pytest.fixture(scope="module")
+def http(
+    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[httpx2.Client]:
+    config = settings_of(tmp_path_factory.mktemp("texts"), module_database_url, valkey.url)
+    with pytest.MonkeyPatch.context() as patch:
+        # bundles are found by the process's own settings, the shipped labeller among them
+        patch.setattr(settings(), "home", config.home)
+        with BundleWriter(config.home / "models" / READER) as writer:
+            writer.add_part("masked", {"w": np.zeros(3, np.float32)})
+            writer.finish(
+                name=READER, version="1", kind="generator", model="hgm3", config="tiny", licence="MIT", fps=20.0,
+                parameters={"min_frames": 16, "max_frames": 196}, text=TextSpec(),
+            )  # fmt: skip
+        engine = create_engine(module_database_url)
+        with transaction(engine) as conn:
+            key = create_key(conn, "reader", ["read"]).secret
+        with ApiThread(config) as url, httpx2.Client(base_url=url, timeout=60) as client:
+            client.headers["Authorization"] = f"Bearer {key}"
+            yield client
+        engine.dispose()
+
+
+def parse(http: httpx2.Client, *prompts: str) -> httpx2.Response:
+    return http.post(PATH, json={"prompts": prompts, "model": READER})
+
+
+def test_prompts_become_graphs_in_their_order(http: httpx2.Client) -> None:
+    response = parse(http, "a person walks forward", "someone kicks")
+    assert response.status_code == 200, response.text
+    one, two = response.json()["items"]
+    assert [node["text"] for node in one["nodes"]] == ["a person walks forward", "walks", "a person", "forward"]
+    assert {"from": 1, "to": 3, "type": "ARGM-DIR", "role": "ARGM-DIR"} in one["edges"]
+    assert two["text"] == "someone kicks"
+
+
+@pytest.mark.parametrize("prompt", ["", "\x00", "🕺", "walk " * 10_000, "一个人向前走"])
+def test_a_bad_prompt_is_named(http: httpx2.Client, prompt: str) -> None:
+    response = parse(http, "a person walks", prompt)
+    assert response.status_code == 422
+    problem = response.json()
+    assert problem["type"].endswith("invalid-input")
+    assert "prompts.1" in response.text
+
+
+@pytest.mark.parametrize("model", ["../../secret", "/etc", "a b", ""])
+def test_a_path_is_no_model(http: httpx2.Client, model: str) -> None:
+    assert http.post(PATH, json={"prompts": ["a person walks"], "model": model}).status_code == 422
+
+
+def test_an_unknown_model_is_not_found(http: httpx2.Client) -> None:
+    assert http.post(PATH, json={"prompts": ["a person walks"], "model": "nobody"}).status_code == 404
+
+
+def test_too_many_prompts_are_refused(http: httpx2.Client) -> None:
+    assert parse(http, *["a person walks"] * 65).status_code == 422
+
+
+def test_a_key_is_needed(http: httpx2.Client) -> None:
+    assert httpx2.post(f"{http.base_url}{PATH}", json={"prompts": ["a person walks"]}).status_code == 401
