@@ -32,6 +32,13 @@ from workers.training.parts import Part, load_part, save_part
 from workers.training.texts import CaptionTexts
 
 STAGES = ("tokenizer", "masked", "residual", "length")
+BUILT_FROM = {
+    "tokenizer": ("layout", "features", "joints", "tokenizer"),
+    "masked": ("tokenizer", "condition", "compact", "max_frames", "masked", "predictor"),
+    "residual": ("tokenizer", "condition", "compact", "max_frames", "residual"),
+    "length": ("condition", "max_frames", "length_hidden"),
+}
+"""Fields of the configuration that each stage's networks are built from; how stages were optimised may differ."""
 TOKENS = "tokens.safetensors"
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -116,7 +123,7 @@ def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
         InvalidInput: trained with another configuration.
     """
     part = load_part(options.run / "tokenizer" / "part")
-    _same_config(part, options.config, options.run / "tokenizer")
+    _same_config(part, "tokenizer", options.config, options.run / "tokenizer")
     tokenizer = Tokenizer(options.config).to(data.features.device)
     tokenizer.load_state_dict(part.state)
     return tokenizer.eval().requires_grad_(False)
@@ -156,7 +163,7 @@ def assemble(
     data = PreparedData.open(prepared)
     parts = {name: load_part(run / name / "part") for name in STAGES}
     for name, part in parts.items():
-        _same_config(part, config, run / name)
+        _same_config(part, name, config, run / name)
     masked = parts["masked"].state
     states = {
         "tokenizer": dict(parts["tokenizer"].state),
@@ -199,11 +206,10 @@ def _finish(module: nn.Module, options: TrainOptions, name: str, metrics: dict[s
         save_part(options.run / name / "part", part)
 
 
-def _same_config(part: Part, config: HGM3Config, where: Path) -> None:
-    """Refuse a part whose networks have other shapes; how stages were optimised may differ."""
-    shapes = ("layout", "features", "joints", "compact", "tokenizer", "condition", "masked", "predictor", "residual")
+def _same_config(part: Part, name: str, config: HGM3Config, where: Path) -> None:
+    """Refuse a part of stage `name` whose networks were built from other values than `config`'s."""
     theirs = HGM3Config.from_dict(part.config)
-    differ = [name for name in shapes if getattr(theirs, name) != getattr(config, name)]
+    differ = [field for field in BUILT_FROM[name] if getattr(theirs, field) != getattr(config, field)]
     if differ:
         raise InvalidInput(
             f"was trained with another {differ[0]}", where=str(where), hint="Use one configuration for all stages."
