@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from shared.errors import InvalidFile, NotFound, TooLarge
-from shared.motion.bvh_header import Header, Joint
+from shared.motion.bvh_header import LARGEST, Header, Joint
 from shared.motion.bvh_write import format_bvh, write_bvh
 from shared.motion.kinematics import forward_kinematics
 from shared.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
@@ -209,7 +209,7 @@ def _numbers(data: bytes, header: Header, where: str) -> Array:
     width = header.channels
     if not width:
         raise header.fail("no joint has channels: there is no motion")
-    if values is None or values.size % width or not np.isfinite(values).all():
+    if values is None or values.size % width or not (np.abs(values) <= LARGEST).all():
         raise _first_fault(data, header, where)
     if values.size // width > MAX_FRAMES:
         raise TooLarge(f"{values.size // width} frames, over the limit of {MAX_FRAMES}", where=where)
@@ -225,11 +225,13 @@ def _first_fault(data: bytes, header: Header, where: str) -> InvalidFile:
         words = text.split()
         for word in words:
             try:
-                good = bool(np.isfinite(float(word)))
+                good = abs(float(word)) <= LARGEST
             except ValueError:
                 good = False
             if not good:
-                return InvalidFile(f"`{word[:40]}` is no finite number", where=f"{where}, line {number}")
+                return InvalidFile(
+                    f"`{word[:40]}` is no number, or not finite, or far too large", where=f"{where}, line {number}"
+                )
         if words and len(words) != header.channels:
             last = not any(later.strip() for later in lines[number - header.motion_line + 1 :])
             return InvalidFile(
