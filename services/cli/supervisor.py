@@ -27,6 +27,7 @@ from shared.jobs import create_engine, create_key, list_keys, revoke_key, transa
 from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
 from shared.settings import Settings
+from shared.storage import open_store
 
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "operate", "read", "submit")
@@ -150,6 +151,7 @@ class Supervisor:
         database_url, queue_url = self._start_backings()
         engine = create_engine(database_url)
         upgrade(engine)
+        open_store(self.config).prepare()
         with transaction(engine) as conn:
             for old in list_keys(conn, DEFAULT_TENANT):
                 if old.name == KEY_NAME and old.revoked is None:

@@ -32,9 +32,7 @@ def migrate() -> None:
     upgrade(_engine(config))
     console.say("the database is at the newest revision")
     store = open_store(config)
-    make_bucket = getattr(store, "make_bucket", None)
-    if make_bucket is not None:
-        make_bucket()
+    store.prepare()
     store.check()
     console.say("the asset store takes files")
 
