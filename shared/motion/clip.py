@@ -149,6 +149,8 @@ def load_npz(path: Path | str) -> MotionClip:
     """
     path = Path(path)
     try:
+        if path.stat().st_size > MAX_UNPACKED:
+            raise TooLarge(f"{path.stat().st_size / 2**30:.1f} GiB, over the limit of 1 GiB", where=str(path))
         return parse_npz(path.read_bytes(), str(path))
     except FileNotFoundError:
         raise NotFound("no such file", where=str(path)) from None

@@ -130,8 +130,11 @@ def test_a_missing_file_is_not_found_and_a_folder_no_file(tmp_path):
         load_npz(tmp_path)
 
 
-def test_a_file_that_unpacks_to_too_much_is_not_unpacked(monkeypatch):
+def test_a_file_that_is_or_unpacks_to_too_much_is_not_read(monkeypatch, tmp_path):
+    walker().save_npz(tmp_path / "a.npz")
     monkeypatch.setattr(clips, "MAX_UNPACKED", 1000)
+    with pytest.raises(TooLarge):
+        load_npz(tmp_path / "a.npz")
     with pytest.raises(TooLarge):
         parse_npz(walker().to_npz())
 
