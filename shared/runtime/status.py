@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import sys
 import threading
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+
+import psutil
 
 from shared.settings import settings
 
@@ -30,6 +34,7 @@ class WorkerStatus:
     """Seconds since the last claim or step of progress. Idle workers tick too: the relay sends each a hint."""
     written: float
     """Wall clock."""
+    host: str = field(default_factory=socket.gethostname)
     error: str | None = None
     """Why the child could not start; its parent ends then."""
 
@@ -60,8 +65,24 @@ def write_status(home: Path, name: str, status: WorkerStatus) -> None:
 def probe(home: Path, *, ready: bool = False, now: float | None = None) -> bool:
     """Whether this machine's workers live (and, with `ready`, serve): at least one is there, and none is stuck."""
     now = time.time() if now is None else now
-    found = [status for path in (home / "run").glob("worker-*.json") if (status := _read(path)) is not None]
+    found = [status for _, status in _of_this_host(home)]
     return bool(found) and all(status.alive(now) and (status.ready or not ready) for status in found)
+
+
+def forget_dead(home: Path) -> None:
+    """Remove what killed workers of this machine left behind."""
+    for path, status in _of_this_host(home):
+        if not psutil.pid_exists(status.pid):
+            path.unlink(missing_ok=True)
+
+
+def _of_this_host(home: Path) -> Iterator[tuple[Path, WorkerStatus]]:
+    """Containers may share a home; each looks after its own."""
+    host = socket.gethostname()
+    for path in (home / "run").glob("worker-*.json"):
+        status = _read(path)
+        if status is not None and status.host == host:
+            yield path, status
 
 
 def _read(path: Path) -> WorkerStatus | None:

@@ -25,7 +25,7 @@ from shared.runtime.app import create_app
 from shared.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, wait_for_database
 from shared.runtime.handler import Role
 from shared.runtime.logs import configure_logging, logger
-from shared.runtime.status import read_status, status_file
+from shared.runtime.status import forget_dead, read_status, status_file
 from shared.settings import Settings
 
 log = logger(__name__)
@@ -57,6 +57,7 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
         )
     configure_logging(f"worker-{role.name}", level=chosen.log_level, json=chosen.log_json)
     wait_for_database(chosen)
+    forget_dead(chosen.home)
     name = name or f"{role.name}-{socket.gethostname()}-{os.getpid()}"
     os.environ[ROLE_VARIABLE] = json.dumps(asdict(role))
     os.environ[NAME_VARIABLE] = name

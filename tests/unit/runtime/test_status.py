@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-from shared.runtime.status import FRESH, TICK_LIMIT, WorkerStatus, probe, read_status, write_status
+from shared.runtime.status import FRESH, TICK_LIMIT, WorkerStatus, forget_dead, probe, read_status, write_status
 
 
 def test_a_living_worker_beats_and_ticks() -> None:
@@ -36,6 +36,22 @@ def test_a_probe_wants_every_worker_of_the_machine(tmp_path: Path) -> None:
     assert not probe(tmp_path, ready=True, now=1000.0), "two still loads"
     write_status(tmp_path, "two", WorkerStatus(8, True, TICK_LIMIT + 1, 1000.0))
     assert not probe(tmp_path, now=1000.0), "two is stuck"
+
+
+def test_workers_of_other_machines_on_the_same_home_are_theirs_to_probe(tmp_path: Path) -> None:
+    write_status(tmp_path, "mine", WorkerStatus(7, True, 3.0, 1000.0))
+    write_status(tmp_path, "theirs", WorkerStatus(7, True, 3.0, 0.0, host="elsewhere"))
+    assert probe(tmp_path, now=1000.0)
+
+
+def test_what_killed_workers_left_is_forgotten(tmp_path: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    write_status(tmp_path, "dead", WorkerStatus(ended.pid, True, 3.0, 1000.0))
+    write_status(tmp_path, "alive", WorkerStatus(os.getpid(), True, 3.0, 1000.0))
+    write_status(tmp_path, "theirs", WorkerStatus(ended.pid, True, 3.0, 1000.0, host="elsewhere"))
+    forget_dead(tmp_path)
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["worker-alive.json", "worker-theirs.json"]
 
 
 def test_the_probe_is_a_command(tmp_path: Path) -> None:
