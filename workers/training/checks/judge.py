@@ -147,16 +147,25 @@ class Stretch:
         standing = np.abs(smooth(self.along, 0.1, self.fps)) < 0.35
         return float(angle[standing].max() - np.percentile(angle, 20)) if standing.any() else 0.0
 
+    def over(self, side: int) -> Array:
+        """(T,) height of a wrist over the shoulder line along the trunk, metres."""
+        return wrist_height(self.joints, self.fps, side)
+
     def part(self, first: int, last: int) -> Stretch:
         """Frames `first` to `last` (exclusive)."""
         return Stretch(self.joints[first:last], self.fps)
 
 
+def wrist_height(joints: Array, fps: float, side: int) -> Array:
+    """(T,) height of a wrist over the middle of the shoulders along the trunk, metres."""
+    middle = (joints[:, SHOULDERS[0]] + joints[:, SHOULDERS[1]]) / 2
+    return smooth(np.einsum("ti,ti->t", joints[:, WRISTS[side]] - middle, trunk_up(joints)), 0.05, fps)
+
+
 def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
     """Measure a hand; side 0 is the left one."""
     wrist = joints[:, WRISTS[side]]
-    middle = (joints[:, SHOULDERS[0]] + joints[:, SHOULDERS[1]]) / 2
-    over = smooth(np.einsum("ti,ti->t", wrist - middle, trunk_up(joints)), 0.05, fps)
+    over = wrist_height(joints, fps, side)
     lifted = over > -0.16
     high = lifted & (over > over.max() - max(0.4 * float(np.ptp(over)), 0.25))
     hold = np.zeros_like(high)
@@ -166,7 +175,7 @@ def arm(joints: Array, angle: Array, fps: float, side: int) -> Arm:
     swings = flutter = 0
     for a, b in runs(hold):
         moved = local - smooth(local, 0.5, fps)
-        swings = max(swings, _swings(moved[a:b], 0.15, 0.03, fps))
+        swings = max(swings, _swings(moved[a:b], 0.3, 0.03, fps))
         flutter = max(flutter, _swings(moved[a:b], 0.4, 0.01, fps))
     return Arm(float(over.max()), float(np.ptp(over)), float(lifted.sum() / fps), swings, flutter)
 
@@ -383,12 +392,25 @@ def _in_order(motion: Stretch, expected: list[Expectation]) -> str:
             reason = f"then: the {second.act} comes before or together with the {first.act}"
             continue
         after = motion.part(at, frames)
+        if _hand_is_up_already(before, first, after, second):
+            reason = f"then: the hand is up before or together with the {first.act}"
+            continue
         last = len(expected) == 2
         reason_after = _CHECKS[second.act](after, second) if last else _in_order(after, expected[1:])
         if not reason_after:
             return ""
         reason = f"then ({second.act}): {reason_after}"
     return reason
+
+
+def _hand_is_up_already(before: Stretch, first: Expectation, after: Stretch, second: Expectation) -> bool:
+    """Whether the hand of a wave or a raise is up for half of what comes before it: then both are done together."""
+    hands = ("wave", "raise")
+    if second.act not in hands or first.act in hands:
+        return False
+    wanted = [k for k, name in enumerate(("left", "right")) if second.side in (name, "both", "")]
+    shares = [np.mean(before.over(k) > after.over(k).max() - 0.25) for k in wanted]
+    return bool(min(shares) >= 0.5)
 
 
 @dataclass(frozen=True)
