@@ -22,8 +22,14 @@ from workers.training.data.manifest import Clip
 from workers.training.data.sampling import sampling_weights
 from workers.training.loop import StepContext
 
-CHUNKS = 4
-"""A batch is sorted by length and run in this many pieces, each padded to its own longest: same sum, less padding."""
+
+def pieces_of(lengths: Tensor) -> list[Tensor]:
+    """Rows (B,) of a batch in four pieces of alike length, each padded to its own longest: same sum, less padding.
+
+    One piece on an accelerator, which waits for launches rather than for padding.
+    """
+    order = torch.argsort(lengths, stable=True)
+    return list(order.chunk(min(4, len(order)))) if lengths.device.type == "cpu" else [order]
 
 
 @dataclass(frozen=True)
@@ -228,7 +234,5 @@ class Pairs:
 
 
 def _pieces(sample: Sample) -> Iterator[Sample]:
-    """Cut a batch into CHUNKS pieces of alike length."""
-    order = torch.argsort(sample.lengths, stable=True)
-    for rows in order.chunk(min(CHUNKS, len(order))):
+    for rows in pieces_of(sample.lengths):
         yield sample.select(rows)

@@ -14,7 +14,7 @@ from shared.nn.losses import token_losses
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import PHASES, CaptionData, TokenData
 from workers.hgm3.model import LengthEstimator, ResidualTransformer
-from workers.hgm3.stage_masked import CHUNKS, Pairs
+from workers.hgm3.stage_masked import Pairs, pieces_of
 from workers.hgm3.tokenizer import frame_mask
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
@@ -83,7 +83,7 @@ class ResidualStage:
         levels = torch.from_numpy(drawn).to(device) if level is None else torch.full_like(lengths, level)
         dropped = torch.from_numpy(rng.random(len(clips)) < self.config.residual_drop).to(device)
         pieces = []
-        for rows in torch.argsort(lengths, stable=True).chunk(min(CHUNKS, len(clips))):
+        for rows in pieces_of(lengths):
             size = int(lengths[rows].max())
             pieces.append(self._piece(tokens[rows, :size], lengths[rows], sentences[rows], levels[rows], dropped[rows]))
         losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))

@@ -101,6 +101,32 @@ def train_stage(name: str, options: TrainOptions) -> dict[str, float]:
     return metrics
 
 
+SHARES = {"tokenizer": 0.42, "masked": 0.38, "residual": 0.18, "length": 0.02}
+"""How the minutes of a whole training are dealt out."""
+
+
+def train_all(options: TrainOptions) -> dict[str, float]:
+    """Train every stage that has not finished, one after another; `options.budget` is for all of them together.
+
+    Called again after a kill it goes on where it stopped. Only minutes are dealt out: steps count for each stage.
+
+    Raises:
+        InvalidInput: no minutes are given.
+    """
+    minutes = options.budget.minutes
+    if minutes is None:
+        raise InvalidInput("training all stages needs minutes to deal out", hint="Give --max-minutes.")
+    metrics: dict[str, float] = {}
+    for name in STAGES:
+        if (options.run / name / "part" / "part.json").is_file():
+            continue
+        budget = Budget(options.budget.steps, minutes * SHARES[name])
+        started = (options.run / name / "checkpoint" / "state.json").is_file()
+        found = train_stage(name, dataclasses.replace(options, budget=budget, resume=started))
+        metrics |= {f"{name}/{metric}": value for metric, value in found.items()}
+    return metrics
+
+
 def _train_tokenizer(options: TrainOptions, data: MotionData) -> dict[str, float]:
     stage = TokenizerStage(options.config, data)
     metrics = _run(stage, options)

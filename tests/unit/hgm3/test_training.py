@@ -17,7 +17,7 @@ from workers.hgm3.generate import Generator, Request
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_tokenizer import TokenizerStage
 from workers.hgm3.tokenizer import Tokenizer
-from workers.hgm3.train import TrainOptions, assemble, train_stage
+from workers.hgm3.train import TrainOptions, assemble, train_all, train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, StepContext, train
@@ -64,6 +64,16 @@ def test_all_stages_end_in_a_bundle_that_generates(prepared: PreparedData, run: 
     (made,) = generator.generate([Request(text_features(0), 1, 40)])
     assert made is not None
     assert made.features.shape == (40, 263)
+
+
+def test_training_all_stages_again_after_a_kill_does_only_what_is_left(prepared: PreparedData, tmp_path: Path) -> None:
+    whole = replace(options(prepared, tmp_path, 2), budget=Budget(steps=2, minutes=60))
+    metrics = train_all(whole)
+    assert {name.split("/")[0] for name in metrics} == {"tokenizer", "masked", "residual", "length"}
+    (tmp_path / "length" / "part" / "part.json").unlink()
+    assert {name.split("/")[0] for name in train_all(whole)} == {"length"}
+    with pytest.raises(InvalidInput, match="minutes"):
+        train_all(options(prepared, tmp_path, 2))
 
 
 def test_a_bundle_of_another_configuration_is_refused(prepared: PreparedData, run: Path, tmp_path: Path) -> None:
