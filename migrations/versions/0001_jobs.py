@@ -111,8 +111,7 @@ TABLES = (
             AND ready + leased + succeeded + failed + dead + cancelled = total
         ),
         CONSTRAINT fk_job_tenant_id FOREIGN KEY (tenant_id) REFERENCES tenant (id)
-    );
-    CREATE INDEX ix_job_running ON job (tenant_id) WHERE leased > 0;
+    ) WITH (fillfactor = 50);
     CREATE INDEX ix_job_tenant_id_id ON job (tenant_id, id);
     """,
     """
@@ -154,8 +153,8 @@ TABLES = (
         CONSTRAINT pk_lane PRIMARY KEY (job_id, queue, batch_key),
         CONSTRAINT ck_lane_counters CHECK (ready >= 0 AND solo >= 0),
         CONSTRAINT fk_lane_job_id FOREIGN KEY (job_id) REFERENCES job (id) ON DELETE CASCADE
-    );
-    CREATE INDEX ix_lane_waiting ON lane (queue) WHERE ready + solo > 0;
+    ) WITH (fillfactor = 50);
+    CREATE INDEX ix_lane_queue ON lane (queue);
     """,
     """
     CREATE TABLE lease (

@@ -21,7 +21,7 @@ LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 # worker has loaded.
 LANES = sa.text("""
     WITH share AS (
-        SELECT tenant_id, sum(leased) AS running FROM job WHERE leased > 0 GROUP BY tenant_id
+        SELECT tenant_id, sum(leased) AS running FROM job WHERE id IN (SELECT job_id FROM lease) GROUP BY tenant_id
     ), ordered AS (
         SELECT lane.job_id, lane.batch_key,
                extract(epoch FROM clock_timestamp() - lane.waiting_since)::float8 AS waited,

@@ -153,6 +153,8 @@ def record(
         )
         .returning(table.c.event_seq)
     ).scalar_one()
+    if ended:
+        conn.execute(sa.delete(schema.lane).where(schema.lane.c.job_id == job.id))  # all empty; a retry makes them anew
     if events:
         _write_events(conn, after, events, first=last - len(events) + 1)
     return after

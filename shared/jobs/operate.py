@@ -156,7 +156,6 @@ def cancel_open_items(
             reason=f"{cause}: {reason}",
         )
     )
-    conn.execute(sa.delete(schema.lane).where(schema.lane.c.job_id == job.id))
     conn.execute(sa.delete(schema.lease).where(schema.lease.c.job_id == job.id))
     moved = {(ItemState.READY, ItemState.CANCELLED): job.ready, (ItemState.LEASED, ItemState.CANCELLED): job.leased}
     event = NewEvent("cancelled", reason, data={"items": job.ready + job.leased, "cause": cause})
