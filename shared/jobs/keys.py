@@ -68,7 +68,7 @@ def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
     ).one_or_none()
     if stored is None or not hmac.compare_digest(stored.secret_sha256, _digest(form[2])):
         raise Unauthenticated(
-            "this API key is unknown or revoked", where=f"marey_{form[1]}_…", hint="Make one: `marey admin key create`."
+            "this API key is unknown or revoked", where=f"marey_{form[1]}_…", hint="Make one: `marey admin keys create`."
         )
     unused = table.last_used_at.is_(None) | (table.last_used_at < CLOCK - interval(NOTE_USE_EVERY))
     conn.execute(sa.update(schema.api_key).where(table.id == stored.id, unused).values(last_used_at=CLOCK))
@@ -93,7 +93,7 @@ def revoke_key(conn: sa.Connection, tenant: str, key: UUID) -> ApiKey:
     conn.execute(sa.update(schema.api_key).where(ours, table.revoked_at.is_(None)).values(revoked_at=CLOCK))
     row = conn.execute(_keys().where(ours)).mappings().one_or_none()
     if row is None:
-        raise NotFound("there is no such key", where=f"key {key}", hint="`marey admin key list` shows them.")
+        raise NotFound("there is no such key", where=f"key {key}", hint="`marey admin keys list` shows them.")
     return _key(row)
 
 
