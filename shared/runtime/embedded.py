@@ -30,7 +30,7 @@ import psutil
 import psycopg
 from psycopg import sql
 
-from shared.errors import Conflict, MareyError
+from shared.errors import Conflict, InvalidInput, MareyError
 
 POSTGRES_MAJOR = 18
 DATABASE = "marey"
@@ -134,6 +134,7 @@ def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
         durable: False turns fsync off, for tests.
 
     Raises:
+        InvalidInput: `home` cannot be written.
         Conflict: another process runs it.
         StartFailed: it did not start; the message holds the end of its log.
     """
@@ -171,6 +172,7 @@ def start_valkey(home: Path) -> EmbeddedServer:
     One that a killed owner left running is stopped first. The same rule for threads as `start_postgres`.
 
     Raises:
+        InvalidInput: `home` cannot be written.
         Conflict: another process runs it.
         StartFailed: it did not start; the message holds the end of its log.
     """
@@ -331,7 +333,21 @@ def _need(package: str) -> Path:
 
 
 def _make_private(home: Path) -> None:
-    home.mkdir(mode=0o700, parents=True, exist_ok=True)
+    """Make the home, ours alone.
+
+    Raises:
+        InvalidInput: it cannot be made, or not be written.
+    """
+    try:
+        home.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=home):
+            pass
+    except OSError as error:
+        raise InvalidInput(
+            f"the folder of the embedded servers cannot be written ({error.strerror or error})",
+            where=str(home),
+            hint="Make it writable for this user, free some space, or set MAREY_HOME to another folder.",
+        ) from error
 
 
 def _make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:

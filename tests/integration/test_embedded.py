@@ -18,7 +18,7 @@ import psycopg
 import pytest
 import redis
 
-from shared.errors import Conflict
+from shared.errors import Conflict, InvalidInput
 from shared.runtime import embedded
 from shared.runtime.embedded import (
     SOCKET_LIMIT,
@@ -166,6 +166,13 @@ def test_a_folder_laid_as_a_trap_is_refused(short_home: Path) -> None:
     socket_folder(short_home).symlink_to(short_home / "elsewhere")
     with pytest.raises(Conflict, match="belongs to somebody else"):
         start_valkey(short_home)
+
+
+@pytest.mark.parametrize("start", [start_postgres, start_valkey])
+def test_a_home_that_cannot_be_written_is_told(short_home: Path, start: Callable[[Path], EmbeddedServer]) -> None:
+    (short_home / "file").write_text("not a folder")
+    with pytest.raises(InvalidInput, match="MAREY_HOME"):
+        start(short_home / "file" / "home")
 
 
 def test_a_cluster_of_another_version_is_refused_with_a_way_out(short_home: Path) -> None:
