@@ -60,8 +60,10 @@ class Relay(threading.Thread):
                 with Listener(self._database_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
                         self.round()
-                        self._stopping.wait(LEAST_PAUSE)
-                        listener.wait(self._interval)
+                        if listener.wait(self._interval):
+                            self._stopping.wait(LEAST_PAUSE)
+                            while listener.wait(0.0):  # a burst of submits is one round
+                                pass
             except Unreachable as error:
                 log.warning("relay_waits", error=error.message)
             except Exception:

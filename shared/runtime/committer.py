@@ -42,7 +42,6 @@ GROUP_SECONDS = 2.0  # but what a killed child would lose is kept small
 PUTS_AT_ONCE = 8
 STORE_PATIENCE = 60.0  # seconds; rides out a restart of the store, after that the items are given back
 DATABASE_PATIENCE = 120.0
-STOP_PATIENCE = 15.0  # of the 25 s a worker has to stop
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,8 @@ class _Exported:
 
 class Committer(threading.Thread):
     """Takes outcomes in, writes them down. Every write is fenced; what is not ours any more is thrown away.
+
+    A worker told to stop waits for nobody: what it cannot write at the next try goes back.
 
     At most two leases are under way, one running and one being stored; `admit` waits until that holds.
     """
@@ -199,13 +200,12 @@ class Committer(threading.Thread):
             with transaction(self._engine) as conn:
                 return begin_assets(conn, token, digests)
 
-        if not patiently(announce, seconds=DATABASE_PATIENCE):
+        if not patiently(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
             lease.settle(motion.item for motion in motions)
             log.info("results_thrown_away", job=str(lease.claim.job), items=len(motions))
             return
         try:
-            patience = STOP_PATIENCE if self._stopping.is_set() else STORE_PATIENCE
-            self._put_files(lease, motions, patience)
+            self._put_files(lease, motions)
         except Unreachable as error:
             log.error("store_away", job=str(lease.claim.job), error=error.message)
             self._give_back(lease, [motion.item for motion in motions], "the asset store does not answer")
@@ -224,8 +224,8 @@ class Committer(threading.Thread):
         ]
         self._commit(lease, "motions", lambda conn, token: commit_motions(conn, token, rows))
 
-    def _put_files(self, lease: HeldLease, motions: Sequence[_Exported], patience: float) -> None:
-        until = time.monotonic() + patience
+    def _put_files(self, lease: HeldLease, motions: Sequence[_Exported]) -> None:
+        until = time.monotonic() + STORE_PATIENCE
         contents = {digest.sha256: file for motion in motions for file, digest in motion.files}
 
         def put(sha256: str, file: ExportedFile) -> None:
@@ -233,6 +233,7 @@ class Committer(threading.Thread):
             patiently(
                 lambda: self._store.put(key, file.content, media_type=file.media_type),
                 seconds=max(0.0, until - time.monotonic()),
+                stopping=self._stopping,
             )
             lease.progress(0, 0)
 
@@ -247,7 +248,7 @@ class Committer(threading.Thread):
                 return write(conn, lease.claim.lease_token)
 
         # A commit whose answer got lost is repeated: its items then count as `lost`, their rows stand.
-        committed = patiently(attempt, seconds=DATABASE_PATIENCE)
+        committed = patiently(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
         lease.settle([*committed.items, *committed.lost])
         log.info(
             "committed",

@@ -153,7 +153,7 @@ def test_every_item_ends_once_whatever_is_killed(stage: Stage, tmp_path: Path) -
     cluster.restart_postgres(seconds_away=1.0)
     with disk.away():
         time.sleep(3.0)
-    finish(cluster, disk.store, job, seconds=120.0)
+    finish(cluster, disk.store, job, seconds=240.0)
     found = states(cluster.engine, job)
     assert found.pop("dead") == ["kill the worker"]
     assert len(found.pop("succeeded")) == 39

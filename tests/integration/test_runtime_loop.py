@@ -237,19 +237,37 @@ def test_a_stop_releases_what_is_not_done_and_counts_nothing(
     assert {(row.state, row.attempts, row.solo) for row in rows} == {("ready", 0, False)}
 
 
+DRAIN_SECONDS = 0.5
+
+
+class Held(ToyHandler):
+    """Hangs, without progress or a look around, until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.go_on = threading.Event()
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        assert self.go_on.wait(60.0)
+        yield from super().run(batch, control)
+
+
 def test_results_of_a_lost_lease_are_thrown_away(
     engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
 ) -> None:
     """A worker that slept through its lease (a suspended laptop) must not write over who took over."""
-    sleeper = make_loop(folder_store, ToyHandler(), interval=3600.0)
-    job = submit_toys(engine, ["walk"] * 3, steps=20, step_seconds=0.05)
-    thread = threading.Thread(target=sleeper.run, args=(0.1,))
+    toy = Held()
+    sleeper = make_loop(folder_store, toy, interval=3600.0)
+    job = submit_toys(engine, ["walk"] * 3)
+    thread = threading.Thread(target=sleeper.run, args=(DRAIN_SECONDS,))
     thread.start()
     wait(lambda: job_row(engine, job).leased == 3)
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE lease SET expires_at = now() - interval '1 second'"))
     sweep(engine)
     assert job_row(engine, job).ready == 3
+    time.sleep(DRAIN_SECONDS)  # it must not claim them again
+    toy.go_on.set()
     thread.join(20.0)
     assert job_row(engine, job).succeeded == 0
     make_loop(folder_store, ToyHandler()).run()
@@ -263,16 +281,20 @@ def test_results_of_a_lost_lease_are_thrown_away(
 def test_a_hung_decode_loop_loses_its_lease(
     engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
 ) -> None:
-    loop = make_loop(folder_store, ToyHandler(), rules=Policy(lease=0.4, stall=0.4))
+    toy = Held()
+    loop = make_loop(folder_store, toy, rules=Policy(lease=0.4, stall=0.4))
+    toy.go_on.set()
     submit_toys(engine, ["walk"])
     loop.run()  # the first batch after loading may be silent for long: it compiles
-    job = submit_toys(engine, ["walk"] * 3, silent_seconds=4.0)
-    thread = threading.Thread(target=loop.run, args=(0.1,))
+    toy.go_on.clear()
+    job = submit_toys(engine, ["walk"] * 3)
+    thread = threading.Thread(target=loop.run, args=(DRAIN_SECONDS,))
     thread.start()
     wait(lambda: job_row(engine, job).leased == 3)
-    wait(lambda: sweep(engine).leases_lost == 1, seconds=3.5)
-    assert thread.is_alive()
+    wait(lambda: sweep(engine).leases_lost == 1)
     assert job_row(engine, job).ready == 3
+    time.sleep(DRAIN_SECONDS)  # it must not claim them again
+    toy.go_on.set()
     thread.join(20.0)
     assert job_row(engine, job).succeeded == 0
 
@@ -337,6 +359,21 @@ def test_a_long_outage_of_the_store_gives_the_items_back_uncounted(
     store.failures = 0
     loop.run()
     assert audit(engine, store) == []
+
+
+def test_a_stop_does_not_wait_for_a_store_that_is_away(
+    engine: sa.Engine, make_loop: Callable[..., Loop], tmp_path: Path
+) -> None:
+    store = Flaky(tmp_path / "flaky", failures=10**9)
+    job = submit_toys(engine, ["walk"] * 3)
+    loop = make_loop(store, ToyHandler())
+    thread = threading.Thread(target=loop.run)
+    thread.start()
+    wait(lambda: store.failures < 10**9 - 10)
+    loop.stopping.set()
+    thread.join(15.0)  # the store's patience is a minute
+    assert not thread.is_alive()
+    assert job_row(engine, job).ready == 3
 
 
 def test_a_drain_claims_nothing_after_its_time(engine: sa.Engine, loop: Loop) -> None:

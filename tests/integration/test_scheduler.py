@@ -17,7 +17,7 @@ from services.scheduler.main import scheduler_main
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from shared.errors import InvalidInput, Unreachable
-from shared.jobs import WorkerBeat, beat, claim, pause, retire, transaction
+from shared.jobs import QUEUE_CHANNEL, WorkerBeat, beat, claim, pause, retire, transaction
 from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.app import DRAIN, create_app
 from shared.runtime.queue import redis_client
@@ -153,6 +153,37 @@ def test_a_submit_wakes_the_relay_at_once(
         stopping.set()
         submit_toys(engine, ["walk"])  # wakes it up to see that
         slow.join(10.0)
+
+
+def test_a_burst_of_submits_is_few_rounds(
+    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
+) -> None:
+    stopping = threading.Event()
+    rounds: list[float] = []
+
+    class Counting(Relay):
+        def round(self) -> dict[str, int]:
+            rounds.append(time.monotonic())
+            return super().round()
+
+    relay = Counting(engine, database_url, lists, publisher(create_app(queue_url)), interval=600.0, stopping=stopping)
+    relay.start()
+    try:
+        wait(lambda: bool(rounds))
+        time.sleep(0.3)
+        live(engine, "a", "b")
+        with engine.connect() as conn:
+            for _ in range(200):
+                conn.execute(sa.text(f"SELECT pg_notify('{QUEUE_CHANNEL}', 'toy')"))
+                conn.commit()
+        submit_toys(engine, ["walk"] * 64)
+        wait(lambda: lists.llen(QUEUE) == 2)
+        assert len(rounds) < 100
+    finally:
+        stopping.set()
+        submit_toys(engine, ["walk"])
+        relay.join(10.0)
+    assert not relay.is_alive()
 
 
 def test_a_relay_goes_on_after_its_connection_was_killed(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:

@@ -1,7 +1,6 @@
 """A model that does nothing, for tests of the loop, chaos and the overhead benchmark: a real `Handler` of queue `toy`.
 
-What it does to an item stands in the item's prompt (a word of `Deed`) and settings (`steps`,
-`step_seconds`, `silent_seconds`).
+What it does to an item stands in the item's prompt (a word of `Deed`) and settings (`steps`, `step_seconds`).
 """
 
 from __future__ import annotations
@@ -66,7 +65,6 @@ class ToyHandler:
         started = time.monotonic()
         settings = batch.items[0].settings
         steps, pause = int(str(settings.get("steps", 1))), float(str(settings.get("step_seconds", 0.0)))
-        time.sleep(float(str(settings.get("silent_seconds", 0.0))))  # a hung decode loop: no progress, no look around
         for step in range(steps):
             if len(control.dropped() & {item.id for item in batch.items}) == len(batch.items):
                 return
