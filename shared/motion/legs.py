@@ -52,9 +52,10 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
     ahead = smooth(facing(before, skeleton), 0.2 * fps)
     for leg, chain, hold in zip(legs, chains, held, strict=True):
         hip, ankle = joints[:, leg[0]], joints[:, leg[2]]
-        wanted = _soft_distance(before[:, leg], np.linalg.norm(ankle - hip, axis=1), fps)
+        was = _without_backward_bend(before[:, leg], ahead, fps)
+        wanted = _soft_distance(was, np.linalg.norm(ankle - hip, axis=1), fps)
         joints[:, chain] = _draw_foot(joints[:, chain], hip, wanted, hold)
-        joints[:, leg[1]] = two_bone_knee(before[:, leg], hip, joints[:, leg[2]], ahead)
+        joints[:, leg[1]] = two_bone_knee(was, hip, joints[:, leg[2]], ahead)
 
 
 def _lengths(leg: Array) -> tuple[Array, Array]:
@@ -69,6 +70,29 @@ def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
     reach = 0.99 * (sum(_lengths(leg)) + span)
     room = np.sqrt(np.maximum(reach**2 - across[:, 0] ** 2 - across[:, 2] ** 2, 0.0))
     return np.clip(np.where(across[:, 1] < 0, -across[:, 1] - room, 0.0), 0.0, MAX_DROP)
+
+
+def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
+    """The same leg (T, 3, 3) with knees that a decoder bent backwards by some degrees taken forward to straight.
+
+    A knee that swings through straight to the wrong side would have to jump to the right one when its foot is moved.
+    The ankle comes nearer or farther by less than a millimetre.
+    """
+    hip, knee, ankle = leg[:, 0], leg[:, 1], leg[:, 2]
+    axis = normalize(ankle - hip)
+    across = (knee - hip) - axis * np.einsum("ti,ti->t", knee - hip, axis)[:, None]
+    pole = smooth(across, 0.15 * fps) + 0.03 * ahead  # where this knee bends to around that time
+    pole = normalize(pole - axis * np.einsum("ti,ti->t", pole, axis)[:, None])
+    slight = np.clip((0.06 - np.linalg.norm(across, axis=1)) / 0.02, 0.0, 1.0)  # of 6 cm: more is another pose
+    cover = smooth_above(slight * np.maximum(-np.einsum("ti,ti->t", across, pole), 0.0), 0.03 * fps)
+    if not cover.any():
+        return leg
+    l1, l2 = _lengths(leg)
+    across = across + cover[:, None] * pole
+    off = np.minimum(np.linalg.norm(across, axis=1), np.minimum(l1, l2))
+    along, below = np.sqrt(l1**2 - off**2), np.sqrt(l2**2 - off**2)
+    fixed = np.stack([hip, hip + along[:, None] * axis + across, hip + (along + below)[:, None] * axis], axis=1)
+    return np.where((cover > 0)[:, None, None], fixed, leg)
 
 
 def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:

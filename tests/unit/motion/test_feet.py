@@ -97,6 +97,21 @@ def test_knees_do_not_pop_at_a_high_rate_either():
     assert np.isfinite(interpolate_rotations(slow.rotations, times)).all()
 
 
+def test_a_knee_that_a_decoder_bent_backwards_does_not_pop():
+    joints = np.tile(HUMANML3D.rest.astype(float), (120, 1, 1))
+    bend = 0.04 * np.cos(2 * np.pi * np.arange(120) / 12) + 0.025  # from 6.5 cm forward to 1.5 cm backward
+    along = np.sqrt(0.39**2 - bend**2) + np.sqrt(0.41**2 - bend**2)
+    for hip, knee, ankle, toe in ((1, 4, 7, 10), (2, 5, 8, 11)):
+        joints[:, [ankle, toe], 1] += (0.80 - along)[:, None]
+        joints[:, knee] = joints[:, hip] + np.stack([0 * bend, -np.sqrt(0.39**2 - bend**2), bend], axis=1)
+    joints[..., 1] -= (0.80 - along)[:, None]  # feet on the floor, the body goes up and down
+    joints[:, [7, 10]] += drift(3, 120, 3, 0.01)[:, None] * [1, 0, 1]  # and one foot slides
+    joints = solve_pose(joints, HUMANML3D, measure=False).joints
+    clean, _ = clean_feet(joints, HUMANML3D, 20)
+    assert (joints[:, 5, 2] - joints[:, 2, 2]).min() < -0.01
+    assert acceleration(clean)[:, KNEES].max() < 1.3 * acceleration(joints)[:, KNEES].max()
+
+
 def test_motion_whose_feet_stand_already_is_left_alone():
     joints = stepping()
     clean, _ = clean_feet(joints, HUMANML3D, 20)
