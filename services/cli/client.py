@@ -31,6 +31,8 @@ from shared.items import InvalidItems, Problem
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
 """Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
+SUBMIT_TIMEOUT = 300.0
+"""100,000 items take a quarter of a minute to write on a busy machine."""
 RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
 
@@ -93,7 +95,8 @@ class Client:
         body = "\n".join(json.dumps(line, ensure_ascii=False) for line in lines).encode()
         headers = {"Content-Type": "application/x-ndjson", "Idempotency-Key": str(uuid4())}
         query = _given({**params, "validate_only": validate_only or None})
-        return self._send("POST", "/v1/jobs", params=query, content=body, headers=headers).json()
+        timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
+        return self._send("POST", "/v1/jobs", params=query, content=body, headers=headers, timeout=timeout).json()
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
         """Every element of a listing, page after page."""

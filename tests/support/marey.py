@@ -64,7 +64,12 @@ class Marey:
     def environ(self) -> dict[str, str]:
         """The environment of a command: nothing of the caller's own Marey settings."""
         kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
-        own = {"MAREY_HOME": str(self.home), "MAREY_MODELS": str(self.models), "OMP_NUM_THREADS": "1"}
+        own = {
+            "MAREY_HOME": str(self.home),
+            "MAREY_MODELS": str(self.models),
+            "MAREY_THREADS": "1",
+            "OMP_NUM_THREADS": "1",
+        }
         return {**kept, **own, **self.environment}
 
     def __call__(
