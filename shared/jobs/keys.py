@@ -68,7 +68,9 @@ def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
     ).one_or_none()
     if stored is None or not hmac.compare_digest(stored.secret_sha256, _digest(form[2])):
         raise Unauthenticated(
-            "this API key is unknown or revoked", where=f"marey_{form[1]}_…", hint="Make one: `marey admin keys create`."
+            "this API key is unknown or revoked",
+            where=f"marey_{form[1]}_…",
+            hint="Make one: `marey admin keys create`.",
         )
     unused = table.last_used_at.is_(None) | (table.last_used_at < CLOCK - interval(NOTE_USE_EVERY))
     conn.execute(sa.update(schema.api_key).where(table.id == stored.id, unused).values(last_used_at=CLOCK))
