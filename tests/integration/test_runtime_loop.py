@@ -148,6 +148,12 @@ def test_a_bug_in_the_export_fails_its_item_alone(engine: sa.Engine, loop: Loop)
     assert states(engine, job) == {"succeeded": ["walk", "walk"], "ready": ["bad-export"]}
 
 
+def test_a_permanent_error_in_the_export_fails_its_item_alone(engine: sa.Engine, loop: Loop) -> None:
+    job = submit_toys(engine, ["walk", "refused-export", "walk"])
+    loop.run()
+    assert states(engine, job) == {"succeeded": ["walk", "walk"], "failed": ["refused-export"]}
+
+
 def test_out_of_memory_halves_the_batch_in_place(engine: sa.Engine, loop: Loop, toy: ToyHandler) -> None:
     job = submit_toys(engine, ["memory"] * 16)
     loop.run()

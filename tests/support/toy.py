@@ -40,6 +40,8 @@ class Deed(StrEnum):
     """No outcome at all."""
     BAD_EXPORT = "bad-export"
     """An unexpected exception while the files are made."""
+    REFUSED_EXPORT = "refused-export"
+    """A permanent error while the files are made."""
 
 
 class ToyHandler:
@@ -109,6 +111,8 @@ def export(item: ClaimedItem) -> Export:
     """Files that belong to this item alone."""
     if deed(item) is Deed.BAD_EXPORT:
         raise RuntimeError("a bug in the export")
+    if deed(item) is Deed.REFUSED_EXPORT:
+        raise InvalidInput("this motion cannot be written")
     content = f"{item.id} {item.seed}".encode()
     return Export(
         files=(ExportedFile("npz", b"npz " + content), ExportedFile("bvh", b"bvh " + content)),
