@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shared.bundles import find_bundle
-from shared.errors import InvalidBundle
+from shared.errors import InvalidBundle, NotFound
 from shared.text.keys import NO_LABELLER, labeller_bundle
 from shared.text.roles import Frame, RoleLabeller
 
@@ -30,7 +30,12 @@ def load_labeller(name: str) -> RoleLabeller:
     """
     if name == NO_LABELLER:
         return NoLabeller()
-    bundle = find_bundle(labeller_bundle(name))
+    try:
+        bundle = find_bundle(labeller_bundle(name))
+    except NotFound as error:
+        if name == "bert-srl":
+            error.hint = "Import AllenNLP's archive once: `python -m shared.text.convert bert-srl --help`."
+        raise
     model = bundle.manifest.model
     if bundle.manifest.kind == "labeller" and model == "light":
         from shared.text.light import LightLabeller

@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 import torch
+from hypothesis import settings
+
+settings.register_profile("shared machine", deadline=None)  # never a timed test
+settings.load_profile("shared machine")
 
 WORDS = ("a", "person", "walks", "forward", "and", "waves", "his", "left", "right", "hand", "slowly", "then", "turns")
 
