@@ -36,6 +36,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10) -> sa
         pool_size=pool_size,
         max_overflow=max_overflow,
         pool_pre_ping=True,
+        hide_parameters=True,  # an error's text goes to logs, and parameters hold prompts
         pool_timeout=CONNECT_TIMEOUT * 2,
         connect_args={"connect_timeout": CONNECT_TIMEOUT, "application_name": "marey"},
     )
