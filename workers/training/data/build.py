@@ -21,6 +21,7 @@ from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured, 
 from workers.training.data.pack import SPLITS, JointsPack, PackClip, split_root
 from workers.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from workers.training.data.prepared import sha256_of
+from workers.training.data.soundness import is_broken
 from workers.training.data.sources import SOURCES
 
 Array = NDArray[np.floating]
@@ -73,6 +74,8 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
                     facts = _facts(clip, content, joints)
                     if len(joints) <= MIN_FRAMES:
                         left_out[name] = "shorter than a second"
+                    elif is_broken(joints, FPS):
+                        left_out[name] = "broken capture: joints bend or jump as no body does"
                     elif _jumps(joints):
                         left_out[name] = "the body has no clear heading"
                     elif facts is None:

@@ -1,0 +1,33 @@
+"""Captures that went wrong: bodies that bend or jump as none does."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.motion.rotations import cross, normalize
+
+Array = NDArray[np.floating]
+
+# The sound takes (all of Bandai-Namco, and most of CMU) reach 3,450 m/s^3, knees of +3 degrees and feet folded by 117.
+LARGEST_JERK = 5000.0
+LEAST_KNEE = -15.0
+LARGEST_FOOT_FOLD = 130.0
+_LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
+
+
+def is_broken(joints: Array, fps: float) -> bool:
+    """Whether a motion (T, 22, 3) has a joint that jumps, a knee bent backward, or a foot folded against the shank."""
+    joints = np.asarray(joints, np.float64)
+    jerk = np.linalg.norm(np.diff(joints, 3, axis=0), axis=-1) * fps**3
+    if jerk.max(initial=0.0) > LARGEST_JERK:
+        return True
+    left = normalize(joints[:, 1] - joints[:, 2])
+    for hip, knee, ankle, toe in _LEGS:
+        thigh, shank = normalize(joints[:, knee] - joints[:, hip]), normalize(joints[:, ankle] - joints[:, knee])
+        foot = normalize(joints[:, toe] - joints[:, ankle])
+        bend = np.arctan2(np.einsum("ti,ti->t", cross(thigh, shank), left), np.einsum("ti,ti->t", thigh, shank))
+        fold = np.arccos(np.clip(np.einsum("ti,ti->t", shank, foot), -1, 1))
+        if np.degrees(bend.min()) < LEAST_KNEE or np.degrees(fold.max()) > LARGEST_FOOT_FOLD:
+            return True
+    return False
