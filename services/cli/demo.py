@@ -150,7 +150,7 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
         title = f"RANDOM WEIGHTS ({title}): these motions show the machinery, not the prompts"
     table = Table(title=title, title_justify="left")
     for column in ("prompt", "weights", "state", "length", "seed", "took", "files"):
-        table.add_column(column)
+        table.add_column(column, no_wrap=column != "prompt")
     for line in lines:
         length = f"{line['frames'] / line['fps']:.1f} s" if line["frames"] else ""
         took = f"{line['elapsed']:.2f} s" if line["elapsed"] else ""

@@ -64,12 +64,9 @@ class Marey:
     def environ(self) -> dict[str, str]:
         """The environment of a command: nothing of the caller's own Marey settings."""
         kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
-        own = {
-            "MAREY_HOME": str(self.home),
-            "MAREY_MODELS": str(self.models),
-            "MAREY_THREADS": "1",
-            "OMP_NUM_THREADS": "1",
-        }
+        own = {"MAREY_HOME": str(self.home), "MAREY_MODELS": str(self.models)}
+        # Two threads that wait for each other on a machine full of tests are ten times slower than one.
+        own |= {"MAREY_THREADS": "1", "OMP_NUM_THREADS": "1"}
         return {**kept, **own, **self.environment}
 
     def __call__(
@@ -160,14 +157,7 @@ def tiny_models(folder: Path) -> Path:
     from workers.hgm3.bundle import random_bundle
 
     random_bundle(folder / TINY)
-    labeller = REPOSITORY / "models" / "srl-light"
-    if labeller.exists():
-        shutil.copytree(labeller, folder / "srl-light")
-    else:
-        path = folder / TINY / "manifest.json"
-        manifest = json.loads(path.read_text())
-        manifest["text"]["labeller"] = "none"
-        path.write_text(json.dumps(manifest))
+    shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "srl-light")
     return folder
 
 
