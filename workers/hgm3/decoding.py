@@ -41,9 +41,9 @@ class Items:
 
     lengths: Tensor  # (B,) own tokens n
     seeds: Tensor  # (B,) int64
-    nodes: Tensor  # (B, S, W) node embeddings C of the masked transformer's graph
+    condition: Tensor  # (B, S, w) condition tokens of the masked transformer
     present: Tensor  # (B, S) bool
-    sentence: Tensor  # (B, W) plain sentence features
+    sentence: Tensor  # (B, w') text token of the residual transformer
     tokens: Tensor  # (B, n_bucket, V) int64, -1 where not decoded
     decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
 
@@ -120,15 +120,14 @@ def _base_logits(
     model: MaskedTransformer, items: Items, base: Tensor, valid: Tensor, level: int, options: DecodeOptions
 ) -> tuple[Tensor, Tensor]:
     """Logits (B, n, K) with and without condition, from one forward of 2 B sequences."""
-    condition = model.condition(items.nodes)  # (B, S, w)
-    null = torch.cat([model.condition.null.expand_as(condition[:, :1]), condition[:, 1:]], 1)
+    null = torch.cat([model.condition.null.expand_as(items.condition[:, :1]), items.condition[:, 1:]], 1)
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
     first[:, 0] = True
     logits = model(
         base.repeat(2, 1),
         valid.repeat(2, 1),
-        torch.cat([condition, null]),
+        torch.cat([items.condition, null]),
         torch.cat([visible, first]),
         trim=options.trim_slots,
     )
@@ -146,8 +145,7 @@ def decode_residual(
         below = [model.embed(items.tokens[..., v], v) for v in range(level)]
         total = torch.stack(below).sum(0)  # (B, n, d)
         levels = torch.full_like(items.lengths, level).repeat(2)
-        sentence = model.sentence(items.sentence)
-        both = torch.cat([sentence, model.null.expand_as(sentence)])  # (2 B, w)
+        both = torch.cat([items.sentence, model.null.expand_as(items.sentence)])  # (2 B, w')
         logits = model(total.repeat(2, 1, 1), valid.repeat(2, 1), levels, both, trim=options.trim_slots)
         with_text, without = logits.chunk(2)
         guided = guide(with_text, without, config.residual_guidance)

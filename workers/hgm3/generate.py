@@ -254,13 +254,15 @@ class Generator:
         lengths = [-(-f // self.frames_per_token) for f in frames]
         bucket = -(-max(lengths) // BUCKET) * BUCKET
         device, levels = self.device, self.config.tokenizer.levels
-        graphs = graph_batch([r.text for r in requests], self.config.condition, device)
+        # One by one, once a batch: a float32 product of few rows rounds differently with their number.
+        graphs = [graph_batch([r.text], self.config.condition, device) for r in requests]
+        masked, residual = self.networks.masked, self.networks.residual
         return Items(
             lengths=torch.tensor(lengths, device=device),
             seeds=torch.tensor([r.seed for r in requests], device=device),
-            nodes=self.networks.masked.text(graphs),
-            present=graphs.present,
-            sentence=graphs.nodes[:, 0],
+            condition=torch.cat([masked.condition(masked.text(graph)) for graph in graphs]),
+            present=torch.cat([graph.present for graph in graphs]),
+            sentence=torch.cat([residual.sentence(graph.nodes[:, 0]) for graph in graphs]),
             tokens=torch.full((len(requests), bucket, levels), -1, device=device),
             decided=torch.zeros(len(requests), 3, dtype=torch.long, device=device),
         )
