@@ -43,18 +43,19 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
     return x * (kept.to(x.dtype) * (256 / (256 - cut)))
 
 
-def _attention(qkv: Tensor, mask: Tensor | None, rate: float) -> Tensor:
-    """Scaled dot-product attention written out, for CPUs: (3, B, H, S, w / H) to (B, H, S, w / H).
+def _attention(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, rate: float) -> Tensor:
+    """Scaled dot-product attention written out, for CPUs: queries (B, H, Q, D), keys and values (B, H, S, D).
 
     At 64 rows torch's fused CPU kernel takes twice as long forward, and a third of a training step backward.
     """
-    _, batch, heads, size, width = qkv.shape
-    query, key, value = qkv.reshape(3, batch * heads, size, width)
+    batch, heads, size, width = query.shape
+    keys = key.shape[2]
     bias = query.new_zeros(1, 1, 1)
     if mask is not None:
         bias = torch.zeros(mask.shape, dtype=query.dtype, device=mask.device).masked_fill(~mask, -1e30)
-        bias = bias.expand(batch, heads, size, size).reshape(batch * heads, size, size)
-    scores = torch.baddbmm(bias, query, key.transpose(1, 2), alpha=width**-0.5)
+        bias = bias.expand(batch, heads, size, keys).reshape(batch * heads, size, keys)
+    query, key, value = (x.reshape(batch * heads, -1, width) for x in (query, key, value))
+    scores = torch.baddbmm(bias, query, key.transpose(1, 2), alpha=width**-0.5)  # (B · H, Q, S)
     if rate > 0 or torch.is_grad_enabled():
         weights = dropout(scores.float().softmax(-1), rate, training=True).to(value.dtype)
     else:
@@ -75,17 +76,18 @@ class Attention(nn.Module):
         self.qkv = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
 
-    def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
-        """(B, S, w) -> (B, S, w); `mask` (B, 1, 1, S) bool, true where a key may be read."""
+    def forward(self, x: Tensor, mask: Tensor | None, rows: int | None = None) -> Tensor:
+        """(B, S, w) -> (B, S, w), or the first `rows` of it; `mask` (B, 1, 1, S) bool, true where a key may be read."""
         batch, size, width = x.shape
         qkv = self.qkv(x).view(batch, size, 3, self.heads, width // self.heads)
-        qkv = qkv.permute(2, 0, 3, 1, 4)  # (3, B, H, S, w / H)
+        query, key, value = qkv.permute(2, 0, 3, 1, 4)  # each (B, H, S, w / H)
+        query = query[:, :, :rows]
         rate = self.dropout if self.training else 0.0
         if x.device.type == "cpu":
-            mixed = _attention(qkv, mask, rate)
+            mixed = _attention(query, key, value, mask, rate)
         else:
-            mixed = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2], attn_mask=mask, dropout_p=rate)
-        return self.out(mixed.transpose(1, 2).reshape(batch, size, width))
+            mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=rate)
+        return self.out(mixed.transpose(1, 2).reshape(batch, -1, width))
 
 
 class Block(nn.Module):
@@ -103,12 +105,12 @@ class Block(nn.Module):
         self.norm1 = nn.LayerNorm(width)
         self.norm2 = nn.LayerNorm(width)
 
-    def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
-        """(B, S, w) -> (B, S, w)."""
+    def forward(self, x: Tensor, mask: Tensor | None, rows: int | None = None) -> Tensor:
+        """(B, S, w) -> (B, S, w), or the first `rows` of it, which read all S."""
         if self.norm_first:
-            x = x + self._drop(self.attention(self.norm1(x), mask))
+            x = x[:, :rows] + self._drop(self.attention(self.norm1(x), mask, rows))
             return x + self._feedforward(self.norm2(x))
-        x = self.norm1(x + self._drop(self.attention(x, mask)))
+        x = self.norm1(x[:, :rows] + self._drop(self.attention(x, mask, rows)))
         return self.norm2(x + self._feedforward(x))
 
     def _feedforward(self, x: Tensor) -> Tensor:
@@ -140,16 +142,17 @@ class Transformer(nn.Module):
         self.dropout = dropout
         self.dtype = torch.float32
 
-    def forward(self, x: Tensor, valid: Tensor | None) -> Tensor:
+    def forward(self, x: Tensor, valid: Tensor | None, rows: int | None = None) -> Tensor:
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
 
+        Where only the first `rows` of the output are wanted, the last block computes no others.
         After `lower` everything between runs in bfloat16: casting around each matrix costs more than it saves.
         """
         mask = None if valid is None else valid[:, None, None, :]
         x = dropout(x, self.dropout, training=self.training).to(self.dtype)
-        for block in self.blocks:
+        for block in self.blocks[:-1]:
             x = block(x, mask)
-        return self.norm(x).float()
+        return self.norm(self.blocks[-1](x, mask, rows)).float()
 
     def lower(self, dtype: torch.dtype) -> None:
         """Cast to `dtype` for inference; what goes in and comes out stays float32."""

@@ -129,6 +129,7 @@ def _base_logits(
         valid.repeat(2, 1),
         torch.cat([items.condition, null]),
         torch.cat([visible, first]),
+        (valid & (base == model.mask_token)).repeat(2, 1),
         trim=options.trim_slots,
     )
     with_condition, without = logits.chunk(2)

@@ -17,13 +17,11 @@ from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
 from shared.nn.sampling import uniform
-from shared.nn.transformer import Transformer
 from shared.text.features import TextFeatures
 from workers.hgm3.bundle import Networks, load_networks
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import HGM3Config, InferenceConfig
 from workers.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
-from workers.hgm3.tokenizer import Residuals
 from workers.training.loop import choose_device
 
 BUCKET = 8
@@ -153,10 +151,9 @@ class Generator:
             part.to(chosen)
         if dtype != torch.float32:
             # the encoder stays as it was in training: its tokens must not change
-            for part in (networks.masked, networks.residual, networks.tokenizer.decoder):
-                for module in part.modules():
-                    if isinstance(module, Transformer | Residuals):
-                        module.lower(dtype)
+            networks.masked.sequence.transformer.lower(dtype)
+            networks.residual.sequence.transformer.lower(dtype)
+            networks.tokenizer.decoder.lower(dtype)
         return cls(verified, config, networks, chosen, dtype)
 
     @property

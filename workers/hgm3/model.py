@@ -158,32 +158,54 @@ class SequenceModel(nn.Module):
         self.register_buffer("positions", table, persistent=False)
 
     def forward(
-        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, *, trim: bool = True
-    ) -> Tensor:
-        """Embedded tokens (B, n, w) and condition (B, S, w) to outputs at the tokens (B, n, w).
+        self,
+        tokens: Tensor,
+        valid: Tensor,
+        condition: Tensor,
+        visible: Tensor,
+        *,
+        wanted: Tensor | None = None,
+        trim: bool = True,
+    ) -> tuple[Tensor, Tensor]:
+        """Embedded tokens (B, n, w) and condition (B, S, w) to outputs at the wanted tokens.
 
-        Rows that may be read stand first in each sequence: tokens, then slots. Padding follows them all, so leaving it
-        out (`trim`) changes no bit (`pad_length`); outputs where not `valid` mean nothing.
+        In memory wanted tokens stand first, then what else may be read, then padding: leaving padding out (`trim`)
+        changes no bit (`pad_length`), and the last block computes the wanted rows alone.
 
         Args:
             tokens: (B, n, w).
-            valid: (B, n) bool, each row's first n_i true.
+            valid: (B, n) bool, tokens that exist.
             condition: (B, S, w).
             visible: (B, S) bool, slots that may be read.
+            wanted: (B, n) bool, None = all valid ones.
             trim: cut padding that the whole batch has.
+
+        Returns:
+            outputs (B, m, w) and the tokens (B, m) they belong to; rows beyond a sample's own wanted ones belong to
+            others of its tokens, or to no token (index n).
         """
         size, slots = valid.shape[1], visible.shape[1]
+        wanted = valid if wanted is None else wanted
         tokens = tokens + self.positions[self.slots : self.slots + size]
         x = torch.cat([tokens, condition + self.positions[:slots]], 1)  # (B, n + S, w)
         readable = torch.cat([valid, visible], 1)  # (B, n + S)
+        first = torch.cat([wanted, torch.zeros_like(visible)], 1)
+        order = torch.argsort(2 - readable.long() - first.long(), dim=1, stable=True)
+        rows = pad_length(int(wanted.sum(1).max()) if trim else size)
         longest = int(readable.sum(1).max()) if trim else size + slots
-        order = torch.argsort(~readable, dim=1, stable=True)  # readable first, else in place
-        length = pad_length(max(longest, size))
-        order = order[:, torch.arange(length, device=order.device).clamp(max=size + slots - 1)]  # (B, Q)
-        readable = readable.gather(1, order)
-        readable[:, size + slots :] = False
-        rows = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))
-        return self.transformer(rows, readable)[:, :size].contiguous()
+        place = torch.arange(max(pad_length(longest), rows), device=order.device)
+        order = order[:, place.clamp(max=size + slots - 1)]  # (B, Q)
+        readable = readable.gather(1, order) & (place < size + slots)
+        x = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))
+        index = torch.where(place[:rows] < size + slots, order[:, :rows], size).clamp(max=size)
+        return self.transformer(x, readable, rows), index
+
+
+def at_tokens(outputs: Tensor, index: Tensor, size: int) -> Tensor:
+    """Outputs (B, m, …) of tokens `index` (B, m) at their places: (B, size, …), zeros where there is none."""
+    placed = outputs.new_zeros((len(outputs), size + 1, *outputs.shape[2:]))
+    index = index.view(*index.shape, *[1] * (outputs.dim() - 2)).expand_as(outputs)
+    return placed.scatter(1, index, outputs)[:, :size]
 
 
 class TokenHead(nn.Module):
@@ -219,12 +241,16 @@ class MaskedTransformer(nn.Module):
         initialize(self)
 
     def forward(
-        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, *, trim: bool = True
+        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, wanted: Tensor, *, trim: bool = True
     ) -> Tensor:
-        """Logits (B, n, K) of tokens (B, n) in 0 … K (K = [MASK]; any value where not `valid`)."""
+        """Logits (B, n, K) at the `wanted` tokens (B, n) bool; elsewhere they mean nothing.
+
+        `tokens` (B, n) in 0 … K, K = [MASK], any value where not `valid`; for the rest see `SequenceModel`.
+        """
         embedded = self.embedding(tokens.masked_fill(~valid, self.mask_token))
-        hidden = self.sequence(embedded, valid, condition, visible, trim=trim)
-        return self.head(hidden, self.embedding.weight[:-1] if self.compact else None)
+        hidden, index = self.sequence(embedded, valid, condition, visible, wanted=wanted, trim=trim)
+        logits = self.head(hidden, self.embedding.weight[:-1] if self.compact else None)
+        return at_tokens(logits, index, valid.shape[1])
 
 
 class LossPredictor(nn.Module):
@@ -241,8 +267,8 @@ class LossPredictor(nn.Module):
     def forward(self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor) -> Tensor:
         """Difficulty (B, n), only its order means something; zero where not `valid`."""
         embedded = self.embedding(tokens.masked_fill(~valid, 0))
-        hidden = self.sequence(embedded, valid, condition, visible)
-        return self.head(hidden).float().squeeze(-1) * valid
+        hidden, index = self.sequence(embedded, valid, condition, visible)
+        return at_tokens(self.head(hidden).float().squeeze(-1), index, valid.shape[1]) * valid
 
 
 class ResidualTransformer(nn.Module):
@@ -306,7 +332,8 @@ class ResidualTransformer(nn.Module):
         x = self.enter(total) if self.compact else total
         condition = torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)  # (B, 2, w)
         visible = torch.ones(condition.shape[:2], dtype=torch.bool, device=valid.device)
-        return self._logits(self.sequence(x, valid, condition, visible, trim=trim), level - 1)
+        hidden, index = self.sequence(x, valid, condition, visible, trim=trim)
+        return at_tokens(self._logits(hidden, level - 1), index, valid.shape[1])
 
     def _logits(self, hidden: Tensor, index: Tensor) -> Tensor:
         """(B, n, w) -> (B, n, K) float32, with the codes of each sample's own level (B,)."""

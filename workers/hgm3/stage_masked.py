@@ -165,7 +165,7 @@ class MaskedStage:
         targets = sample.tokens.clamp(min=0)
         condition = model.condition(nodes, sample.dropped)
         visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
-        logits = model(self._shown(targets, masked), valid, condition, visible)
+        logits = model(self._shown(targets, masked), valid, condition, visible, masked)
         losses = token_losses(logits, targets)
         predicted = self._predict(self.module.predictor, sample, nodes.detach(), valid)
         return losses, masked, logits.argmax(-1) == targets, ranking_loss(predicted, losses, masked)

@@ -45,20 +45,12 @@ class Residuals(nn.Module):
         super().__init__()
         dilations = [3**i for i in reversed(range(config.depth))]
         self.blocks = nn.ModuleList(ResidualBlock(config.width, d, config.dropout) for d in dilations)
-        self.dtype: torch.dtype | None = None
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """(B, C, T) -> (B, C, T)."""
-        if self.dtype is not None:
-            x = x.to(self.dtype)
         for block in self.blocks:
             x = block(x, mask)
-        return x if self.dtype is None else x.float()
-
-    def lower(self, dtype: torch.dtype) -> None:
-        """Cast to `dtype` for inference; what goes in and comes out is float32, so that no frame is rounded."""
-        self.to(dtype)
-        self.dtype = dtype
+        return x
 
 
 class Encoder(nn.Module):
@@ -90,14 +82,25 @@ class Decoder(nn.Module):
         self.up = nn.ModuleList(nn.Conv1d(config.width, config.width, 3, padding=1) for _ in range(config.stages))
         self.smooth = nn.Conv1d(config.width, config.width, 3, padding=1)
         self.leave = nn.Conv1d(config.width, features, 3, padding=1)
+        self.dtype = torch.float32
+
+    def lower(self, dtype: torch.dtype) -> None:
+        """Cast the stages to `dtype` for inference; the last two convolutions stay, so that no frame is rounded."""
+        self.residuals.to(dtype)
+        self.up.to(dtype)
+        self.dtype = dtype
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """`mask` (B, 1, n) or None."""
         x = _masked(F.relu(self.enter(x)), mask)
+        if self.dtype != torch.float32:
+            x, mask = x.to(self.dtype), None if mask is None else mask.to(self.dtype)
         for residuals, up in zip(self.residuals, self.up, strict=True):
             x = residuals(x, mask).repeat_interleave(2, dim=-1)  # nearest: (B, C, 2 T)
             mask = None if mask is None else mask.repeat_interleave(2, dim=-1)
             x = _masked(up(x), mask)
+        if self.dtype != torch.float32:
+            x, mask = x.float(), None if mask is None else mask.float()
         x = _masked(F.relu(self.smooth(x)), mask)
         return _masked(self.leave(x), mask)
 

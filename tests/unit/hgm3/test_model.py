@@ -113,7 +113,8 @@ def test_a_prompt_without_actions_gives_no_nan_at_any_level(name: str) -> None:
     valid = torch.arange(8)[None] < torch.tensor([[8], [3]])
     for level in (MOTION, ACTION, SPECIFIC):
         visible = model.condition.visible(graphs.present, level)
-        output = model(torch.zeros(2, 8, dtype=torch.long), valid, model.condition(nodes), visible)
+        wanted = (valid,) if name == "masked" else ()
+        output = model(torch.zeros(2, 8, dtype=torch.long), valid, model.condition(nodes), visible, *wanted)
         assert torch.isfinite(output[valid]).all()
 
 
@@ -125,13 +126,27 @@ def test_absent_slots_and_tokens_beyond_the_clip_are_never_read() -> None:
     visible = torch.zeros(1, 25, dtype=torch.bool)
     visible[0, [0, 1, 9]] = True
     tokens, condition = torch.randint(32, (1, 8)), torch.randn(1, 25, 32)
-    first = model(tokens, valid, condition, visible)[0, :5]
+    first = model(tokens, valid, condition, visible, valid)[0, :5]
     condition[~visible] = 1000.0
     tokens[~valid] = 7
-    assert torch.equal(model(tokens, valid, condition, visible)[0, :5], first)
-    assert torch.equal(model(tokens, valid, condition, visible, trim=False)[0, :5], first)
+    assert torch.equal(model(tokens, valid, condition, visible, valid)[0, :5], first)
+    assert torch.equal(model(tokens, valid, condition, visible, valid, trim=False)[0, :5], first)
     condition[0, 9] = torch.randn(32)
-    assert not torch.equal(model(tokens, valid, condition, visible)[0, :5], first)
+    assert not torch.equal(model(tokens, valid, condition, visible, valid)[0, :5], first)
+
+
+@torch.inference_mode()
+def test_outputs_at_wanted_tokens_do_not_depend_on_how_many_are_wanted() -> None:
+    torch.manual_seed(0)
+    model = MaskedTransformer(TINY).eval()
+    valid = torch.arange(24)[None] < torch.tensor([[20], [24]])
+    wanted = torch.rand(2, 24) < 0.3
+    visible = torch.zeros(2, 25, dtype=torch.bool)
+    visible[:, :3] = True
+    tokens, condition = torch.randint(33, (2, 24)), torch.randn(2, 25, 32)
+    some = model(tokens, valid, condition, visible, wanted & valid)
+    everything = model(tokens, valid, condition, visible, valid)
+    torch.testing.assert_close(some[wanted & valid], everything[wanted & valid], atol=1e-5, rtol=1e-5)
 
 
 @torch.inference_mode()
@@ -145,7 +160,7 @@ def test_a_slot_keeps_its_position_whatever_else_is_absent() -> None:
     for slot in (1, 2):
         visible = torch.zeros(1, 25, dtype=torch.bool)
         visible[0, [0, slot]] = True
-        outputs.append(model(tokens, valid, condition, visible))
+        outputs.append(model(tokens, valid, condition, visible, valid))
     assert not torch.allclose(outputs[0], outputs[1])
 
 
