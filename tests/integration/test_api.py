@@ -241,6 +241,16 @@ def test_a_stream_gives_at_most_two_progress_messages_a_second(api: LiveApi, htt
     assert all(later - earlier > 0.3 for earlier, later in itertools.pairwise(arrivals))
 
 
+def test_many_open_streams_leave_the_api_answering(http: httpx2.Client) -> None:
+    path = f"/v1/jobs/{submit(http)['id']}"
+    with contextlib.ExitStack() as streams:
+        for _ in range(60):  # more than the pool has connections
+            opened = http.stream("GET", f"{path}/events", headers={"Accept": "text/event-stream"})
+            assert streams.enter_context(opened).status_code == 200
+        assert http.get(path).status_code == 200
+    http.post(f"{path}/cancel")
+
+
 def test_a_deleted_job_ends_its_streams(api: LiveApi, http: httpx2.Client) -> None:
     job = str(submit(http)["id"])
     with api.client() as client:
@@ -370,6 +380,16 @@ def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:
     with transaction(api.engine) as conn:
         beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu"))
     assert httpx2.get(f"{api.url}/readyz").status_code == 200
+
+
+def test_metrics_count_the_items_that_wait_by_queue(http: httpx2.Client) -> None:
+    def waiting() -> float:
+        lines = http.get("/metrics").text.splitlines()
+        return sum(float(line.rpartition(" ")[2]) for line in lines if line.startswith("marey_waiting_items{"))
+
+    before = waiting()
+    submit(http, {"prompt": "a person waits"}, {"prompt": "a person waits longer"})
+    assert waiting() == before + 2
 
 
 def test_metrics_count_requests_by_route_and_want_a_key(api: LiveApi, http: httpx2.Client) -> None:
