@@ -8,7 +8,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
         job = submit(conn, NewJob(items))
 """
 
-from shared.jobs.claim import claim, heartbeat, load_texts, waiting_batches
+from shared.jobs.claim import claim, heartbeat, load_texts, waiting_batches, waiting_items
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
@@ -139,4 +139,5 @@ __all__ = [
     "transaction",
     "upgrade",
     "waiting_batches",
+    "waiting_items",
 ]

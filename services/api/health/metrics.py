@@ -8,7 +8,7 @@ import sqlalchemy as sa
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shared.jobs import live_workers, transaction, waiting_batches
+from shared.jobs import live_workers, transaction, waiting_items
 
 REGISTRY = CollectorRegistry()
 REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", "route", "status"), registry=REGISTRY)
@@ -24,7 +24,7 @@ def render(engine: sa.Engine) -> bytes:
         Unreachable: the database does not answer.
     """
     with transaction(engine) as conn:
-        waiting, workers = waiting_batches(conn, {}), live_workers(conn)
+        waiting, workers = waiting_items(conn), live_workers(conn)
     for gauge, values in ((WAITING, waiting), (WORKERS, workers)):
         gauge.clear()
         for queue, value in values.items():
