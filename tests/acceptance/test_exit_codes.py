@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
+import socket
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +12,10 @@ from uuid import uuid4
 
 import pytest
 
+from services.cli.client import Client
+from services.cli.place import Server
+from shared.errors import NotFound
+from shared.runtime.embedded import postgres_url, valkey_url
 from tests.support.marey import Marey, Serving
 
 
@@ -88,7 +94,8 @@ def test_keys_are_made_limited_and_revoked(marey: Marey, elsewhere: Marey) -> No
     marey("admin", "keys", "create", "x", "--scope", "everything").refused(2, "everything")
 
 
-def test_garbage_collection_finds_nothing_lost(marey: Marey) -> None:
+def test_a_database_and_a_store_that_are_ready_are_left_alone_and_nothing_is_lost(marey: Marey) -> None:
+    marey("admin", "migrate").ok()
     report = marey("admin", "gc", "--json").ok().lines[0]
     assert report["missing"] == []
 
@@ -104,6 +111,38 @@ def test_models_texts_and_this_machine_can_be_looked_at(marey: Marey, offline: M
         parsed = client.post("/v1/texts/parse", {"prompts": ["a person walks and waves"]})
     assert parsed["items"] == [graph]
     assert all(check["state"] == "ok" for check in marey("doctor", "--json").ok().lines)
+
+
+def test_texts_can_be_served_alone(marey: Marey, offline: Marey) -> None:
+    port = free_port()
+    own = {"MAREY_DATABASE_URL": postgres_url(marey.home), "MAREY_QUEUE_URL": valkey_url(marey.home)}
+    process = replace(offline, environment={**own, "MAREY_PORT": str(port)}).start("text", "serve")
+    try:
+        with marey.client() as client:
+            alone = Client(Server(f"http://127.0.0.1:{port}", client.server.key))
+        with alone:
+            wait_for_port(port)
+            assert alone.post("/v1/texts/parse", {"prompts": ["a person bows"]})["items"][0]["text"] == "a person bows"
+            with pytest.raises(NotFound):
+                alone.get("/v1/jobs")
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def wait_for_port(port: int) -> None:
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"nothing listens on {port}")
 
 
 def test_a_second_serve_says_who_runs(served: tuple[Marey, Serving]) -> None:
