@@ -141,10 +141,10 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
         networks = Networks.build(config)
         networks.tokenizer.quantizer.codebooks.normal_()
         networks.tokenizer.quantizer.initialized.fill_(True)
-        with torch.no_grad():  # transformers start near zero; louder, so that prompts make a difference
-            for name in ("masked", "predictor", "residual"):
-                for parameter in getattr(networks, name).parameters():
-                    parameter.mul_(4.0 if parameter.dim() > 1 else 1.0)
+        for name in ("masked", "predictor", "residual"):
+            for layer in getattr(networks, name).modules():
+                if isinstance(layer, nn.Linear):  # louder than training starts with, so that prompts make a difference
+                    nn.init.normal_(layer.weight, std=0.1)
         parts = {name: network.state_dict() for name, network in networks.parts().items()}
     finally:
         torch.set_rng_state(generator_state)

@@ -109,6 +109,12 @@ class TokenData:
         lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
         return cls(torch.cat(found), starts, lengths)
 
+    def log_shares(self, codes: int) -> Tensor:
+        """Logarithm of how often each code occurs (V, K): where the biases of the heads start."""
+        levels = self.tokens.shape[1]
+        counts = torch.stack([torch.bincount(self.tokens[:, v], minlength=codes) for v in range(levels)]).float() + 1
+        return (counts / counts.sum(1, keepdim=True)).log()
+
     def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:
         """Tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
         lengths = self.lengths[clips, phases].clamp(max=max_tokens)

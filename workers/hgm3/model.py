@@ -221,7 +221,7 @@ class TokenHead(nn.Module):
     def forward(self, x: Tensor, tied: Tensor | None = None) -> Tensor:
         """(B, n, w) -> (B, n, K) logits, float32."""
         h = self.norm(F.gelu(self.dense(x)))
-        logits = self.codes(h) if self.codes is not None else F.linear(h, _given(tied))
+        logits = self.codes(h) if self.codes is not None else F.linear(h * h.shape[-1] ** -0.5, _given(tied))
         return logits.float() + self.bias
 
 
@@ -295,12 +295,15 @@ class ResidualTransformer(nn.Module):
             self.scale = nn.Parameter(torch.ones(t.levels - 1))
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         else:
-            self.embedding = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
+            self.embedding = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.5)
             self.dense = nn.Linear(width, width)
             self.norm = nn.LayerNorm(width)
             self.output = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         initialize(self)
+        if config.compact:  # as loud as the positions, like embeddings
+            nn.init.normal_(self.enter.weight, std=0.5 * t.code_width**-0.5)
+            nn.init.zeros_(self.leave.weight)  # first guess: how often each code occurs
 
     def set_codebooks(self, codebooks: Tensor) -> None:
         """Hand over the tokenizer's codebooks (V, K, d); without effect unless compact."""

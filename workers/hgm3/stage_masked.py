@@ -88,6 +88,8 @@ class MaskedStage:
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
         normalizer.mean.copy_(mean)
         normalizer.std.copy_(std)
+        with torch.no_grad():
+            self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes)[0])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """F (with the graph) and G apart."""

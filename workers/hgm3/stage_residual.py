@@ -42,6 +42,8 @@ class ResidualStage:
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
         self.module.normalizer.mean.copy_(mean)
         self.module.normalizer.std.copy_(std)
+        with torch.no_grad():
+            self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes)[1:])
 
     def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
         """One group."""

@@ -38,6 +38,8 @@ def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedSta
     tokenizer = Tokenizer(config)
     tokenizer.quantizer.codebooks.normal_()
     tokens = TokenData.encode(tokenizer, data)
+    for start, length in zip(tokens.starts.flatten().tolist(), tokens.lengths.flatten().tolist(), strict=True):
+        tokens.tokens[start : start + length, 0] = torch.arange(length) * 3 % config.tokenizer.codes  # can be learnt
     captions = CaptionData.load(CaptionTexts.load(prepared), config.condition, CPU)
     return MaskedStage(config, prepared.clips, tokens, captions)
 
