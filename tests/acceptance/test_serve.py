@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import time
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from shared.runtime.embedded import socket_folder
 from tests.support.marey import Marey, serving
 
 COUNT = 40
@@ -74,6 +76,7 @@ def test_a_killed_server_leaves_no_process_and_can_be_started_again_even_in_a_de
     alone("jobs", "list").refused(4, "does not answer")
     with serving(alone):
         assert alone("jobs", "wait", job, "--timeout", 60).code == 0
+    shutil.rmtree(socket_folder(alone.home))
 
 
 def _is_back(children: Callable[[], dict[str, psutil.Process]], kind: str, old: int) -> bool:

@@ -135,7 +135,8 @@ class Serving:
 @contextlib.contextmanager
 def serving(marey: Marey) -> Iterator[Serving]:
     """`marey serve` on any free port, ready, until the end of the block."""
-    log = marey.home.with_name(marey.home.name + ".log")
+    marey.home.mkdir(mode=0o700, parents=True, exist_ok=True)
+    log = marey.home / "serve.log"
     with log.open("wb") as output:
         process = subprocess.Popen(
             [*COMMAND, "serve", "--port", "0"], stdout=output, stderr=output, cwd=REPOSITORY, env=marey.environ()
