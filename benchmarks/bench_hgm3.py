@@ -1,7 +1,8 @@
 """HGM³ at `paper` size: random weights, 196 frames, L = 10, guidance, two CPU threads, batches of 1 and 32.
 
-With `MOMASK_CODES=folder` naming a checkout of github.com/EricGuo5513/momask-codes, that code runs in turns beside it, at
-the same size (6 layers, 10 steps, guidance 4 and 5). What the machine's matrices give stands in the note: compare machines by it.
+With `MOMASK_CODES=folder` naming a checkout of github.com/EricGuo5513/momask-codes, that code runs in turns beside it,
+at the same size (6 layers, 10 steps, guidance 4 and 5). What the machine's matrices give stands in the note: compare
+machines by it. Ratios of processor time stand there too, for machines that are shared.
 """
 
 from __future__ import annotations
@@ -53,7 +54,9 @@ def main() -> None:
         baseline = "momask-codes" if peer is not None else "hgm3, float32, no savings"
         timings = measure(runs, repeats=9, seconds=90)
         rates = ", ".join(f"{t.name} {batch / t.median:.2f}" for t in timings)
-        print(table(f"batch {batch}", timings, baseline=baseline, note=f"Motions/s: {rates}. {_matrices()}"))
+        used = ", ".join(f"{name} {_processor_seconds(run) / batch:.3f}" for name, run in runs.items())
+        note = f"Motions/s: {rates}. Processor seconds a motion: {used}. {_matrices()}"
+        print(table(f"batch {batch}", timings, baseline=baseline, note=note))
 
 
 def requests(batch: int) -> list[Request]:
@@ -85,10 +88,10 @@ def momask() -> Callable[[int], object] | None:
     for kind in (MaskTransformer, ResidualTransformer):
         kind.load_and_freeze_clip = lambda self, version: torch.nn.Linear(1, 1)
         kind.encode_text = lambda self, texts: torch.randn(len(texts), 512)
-    size = dict(
-        code_dim=512, cond_mode="text", latent_dim=384, ff_size=1024, num_layers=6, num_heads=6, dropout=0.2,
-        clip_dim=512, cond_drop_prob=0.1, clip_version="-", opt=opt,
-    )  # fmt: skip
+    size = {
+        "code_dim": 512, "cond_mode": "text", "latent_dim": 384, "ff_size": 1024, "num_layers": 6, "num_heads": 6,
+        "dropout": 0.2, "clip_dim": 512, "cond_drop_prob": 0.1, "clip_version": "-", "opt": opt,
+    }  # fmt: skip
     masked = MaskTransformer(**size).eval()
     residual = ResidualTransformer(**size, shared_codebook=False, share_weight=True).eval()
     vq = RVQVAE(opt, 263, 512, 512, 512, 2, 2, 512, 3, 3, "relu", None).eval()
@@ -102,6 +105,13 @@ def momask() -> Callable[[int], object] | None:
         return vq.forward_decoder(residual.generate(tokens, captions, lengths, temperature=1, cond_scale=5))
 
     return run
+
+
+def _processor_seconds(run: Callable[[], object]) -> float:
+    """Processor time of one call, all threads: hardly changed by what else runs on the machine."""
+    start = time.process_time()
+    run()
+    return time.process_time() - start
 
 
 def _matrices() -> str:

@@ -66,14 +66,16 @@ class TrainOptions:
 
 
 def train_stage(name: str, options: TrainOptions) -> dict[str, float]:
-    """Train one stage and write its part; returns its metrics.
+    """Train one stage and write its part; returns its metrics. `all` is `train_all`.
 
     Raises:
         NotFound: a stage it builds on has not finished, or captions have no text features.
         InvalidInput: no such stage, or parts of another configuration.
     """
+    if name == "all":
+        return train_all(options)
     if name not in STAGES:
-        raise InvalidInput(f"there is no stage {name!r}", hint=f"Known: {', '.join(STAGES)}.")
+        raise InvalidInput(f"there is no stage {name!r}", hint=f"Known: {', '.join(STAGES)}, all.")
     start_process_group()
     if options.threads:
         torch.set_num_threads(options.threads)

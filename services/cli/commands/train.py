@@ -81,6 +81,7 @@ _stage("tokenizer", "Train the residual VQ-VAE.")
 _stage("masked", "Train the masked transformer, with hard token mining.")
 _stage("residual", "Train the residual transformer.")
 _stage("length", "Train the length estimator.")
+_stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on.")
 
 
 @hgm3.command()
