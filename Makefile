@@ -6,6 +6,9 @@ STAMP  := $(VENV)/.installed
 # A CPU build where pip finds one locally, else the index's own: outside the lock, never hashed.
 TORCH  := torch==2.13.0
 
+# Two processes, a file of tests at a time: the servers of a file start once.
+PARALLEL := -n 2 --dist loadfile
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all chaos lint format bench lock clean
 
@@ -26,10 +29,10 @@ demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
 	$(BIN)/python -m services.cli.demo
 
 test: $(STAMP) lint ## Everything but slow and gpu tests: under ten minutes on two cores
-	$(BIN)/pytest -q
+	$(BIN)/pytest -q $(PARALLEL)
 
 test-all: $(STAMP) lint ## Every test
-	$(BIN)/pytest -q -m ''
+	$(BIN)/pytest -q $(PARALLEL) -m ''
 
 chaos: $(STAMP) ## The long chaos run
 	$(BIN)/pytest -q -m '' tests/chaos
