@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from shared.motion.clip import MotionClip
     from shared.runtime.handler import Role
     from shared.settings import Settings
+    from workers.training.data.pack import JointsPack
 
 HANDLERS = {"hgm3": "workers.hgm3.handler:create_handler", "text": "services.text.handler:create_handler"}
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
@@ -130,34 +131,73 @@ def make_random_bundle(path: Path) -> None:
     random_bundle(path)
 
 
-def prepare_data(
-    sources: Sequence[tuple[str, Path]],
-    output: Path,
-    *,
-    extras: Mapping[str, Mapping[str, Path | None]],
-    processes: int,
-    progress: Callable[[str, int, int], None],
-) -> str:
-    """Prepare training data; a line that says what was made.
+@dataclass(frozen=True)
+class CaptureSources:
+    """What `marey data pack` and `prepare` read.
+
+    Attributes:
+        named: source (`bandai-namco`, `cmu` or `pack`) and its archive, folder or file.
+        splits: of bandai-namco; None = beside the archive.
+        captions: of cmu; None = beside the archive.
+        processes: how many retarget at once.
+    """
+
+    named: Sequence[tuple[str, Path]]
+    splits: Path | None = None
+    captions: Path | None = None
+    processes: int = 2
+
+
+def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | None], None]) -> list[JointsPack]:
+    """The clips of each source on the 22-joint skeleton, at 20 fps.
 
     Raises:
         InvalidInput: an unknown source.
-        NotFound, InvalidFile, TooLarge, Conflict: from reading and writing.
+        NotFound, InvalidFile, TooLarge: from reading.
     """
     try:
-        from workers.training.data.build import build
+        from workers.training.data.pack import JointsPack
         from workers.training.data.prepare import pack_bandai_namco, pack_cmu
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    readers = {"bandai-namco": pack_bandai_namco, "cmu": pack_cmu}
-    for name, _ in sources:
+    options = {"processes": sources.processes}
+    readers: dict[str, Callable[[Path], JointsPack]] = {
+        "bandai-namco": lambda path: pack_bandai_namco(
+            path, splits=sources.splits, progress=partial(progress, "bandai-namco"), **options
+        ),
+        "cmu": lambda path: pack_cmu(path, captions=sources.captions, progress=partial(progress, "cmu"), **options),
+        "pack": JointsPack.load,
+    }
+    for name, _ in sources.named:
         if name not in readers:
             raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join(readers)}.")
-    packs = [
-        readers[name](path, **extras[name], processes=processes, progress=partial(progress, name))
-        for name, path in sources
-    ]
-    manifest = build(packs, output, progress=lambda done, total: progress("building", done, total))
+    return [readers[name](path) for name, path in sources.named]
+
+
+def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> list[Path]:
+    """Write one joints pack a source into a folder: small enough to carry to the machine that trains.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
+    """
+    output.mkdir(parents=True, exist_ok=True)
+    paths = [output / f"{name}.pack.npz" for name, _ in sources.named]
+    for path, pack in zip(paths, read_captures(sources, progress), strict=True):
+        pack.save(path)
+    return paths
+
+
+def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> str:
+    """Prepare training data; a line that says what was made.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
+        Conflict: the folder is in use.
+    """
+    packs = read_captures(sources, progress)
+    from workers.training.data.build import build
+
+    manifest = build(packs, output, progress=partial(progress, "building"))
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
 
 

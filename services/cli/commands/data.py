@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,37 +17,66 @@ app = typer.Typer(help="Training data from capture archives.", no_args_is_help=T
 Prepared = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `marey data prepare` wrote.")]
 
 
+Sources = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="SOURCE PATH …", help="bandai-namco or cmu and its archive or folder; pack and what `pack` wrote."
+    ),
+]
+Splits = Annotated[
+    Path | None, typer.Option("--splits", help="Of bandai-namco; else bandai-namco-splits.json beside it.")
+]
+Captions = Annotated[Path | None, typer.Option("--captions", help="Of cmu; else cmu-captions.json beside it.")]
+Processes = Annotated[int, typer.Option("--processes", min=1, help="How many retarget at once.")]
+
+
+@app.command()
+def pack(
+    pairs: Sources,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for SOURCE.pack.npz.")],
+    splits: Splits = None,
+    captions: Captions = None,
+    processes: Processes = 2,
+) -> None:
+    """Only retarget archives: small files to carry to the machine that prepares and trains."""
+    from services.cli import roles
+
+    sources = roles.CaptureSources(_named(pairs), splits, captions, processes)
+    with _progress() as progress:
+        paths = roles.pack_data(sources, output, progress)
+    for path in paths:
+        console.result(str(path))
+
+
 @app.command()
 def prepare(
-    pairs: Annotated[
-        list[str], typer.Argument(metavar="SOURCE PATH …", help="bandai-namco or cmu, and its archive or folder.")
-    ],
+    pairs: Sources,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write; must be empty or new.")],
-    splits: Annotated[
-        Path | None, typer.Option("--splits", help="Of bandai-namco; else bandai-namco-splits.json beside it.")
-    ] = None,
-    captions: Annotated[
-        Path | None, typer.Option("--captions", help="Of cmu; else cmu-captions.json beside it.")
-    ] = None,
-    processes: Annotated[int, typer.Option("--processes", min=1, help="How many retarget at once.")] = 2,
+    splits: Splits = None,
+    captions: Captions = None,
+    processes: Processes = 2,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
     from services.cli import roles
 
-    if len(pairs) % 2:
-        raise InvalidInput("a SOURCE without its PATH", hint="Write: marey data prepare bandai-namco ARCHIVE -o DIR")
-    sources = [(name, Path(path)) for name, path in zip(pairs[::2], pairs[1::2], strict=True)]
-    with console.bar() as bar:
-        task = bar.add_task("reading", total=None)
-        manifest = roles.prepare_data(
-            sources,
-            output,
-            extras={"bandai-namco": {"splits": splits}, "cmu": {"captions": captions}},
-            processes=processes,
-            progress=lambda what, done, total: bar.update(task, description=what, completed=done, total=total or None),
-        )
+    sources = roles.CaptureSources(_named(pairs), splits, captions, processes)
+    with _progress() as progress:
+        manifest = roles.prepare_data(sources, output, progress)
     console.say(f"{output}: {manifest}")
     console.result(str(output))
+
+
+def _named(pairs: list[str]) -> list[tuple[str, Path]]:
+    if len(pairs) % 2:
+        raise InvalidInput("a SOURCE without its PATH", hint="Write: marey data prepare bandai-namco ARCHIVE -o DIR")
+    return [(name, Path(path)) for name, path in zip(pairs[::2], pairs[1::2], strict=True)]
+
+
+@contextmanager
+def _progress() -> Generator[Callable[[str, int, int | None], None]]:
+    with console.bar() as bar:
+        task = bar.add_task("reading", total=None)
+        yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total or None)
 
 
 @app.command()

@@ -262,6 +262,12 @@ def test_a_folder_with_something_in_it_is_not_written_to(copy):
     assert sorted(p.name for p in copy.iterdir()) == before
 
 
+def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
+    clip = PackClip("stroll", "cmu", "walk", "", "train", 0, 0)
+    build([JointsPack.of([(clip, walker(4.0).astype(np.float32))])], tmp_path / "out")
+    assert {c.dataset for c in PreparedData.open(tmp_path / "out").clips} == {"cmu"}
+
+
 def test_a_failed_build_leaves_no_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("workers.training.data.build.compose", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):

@@ -372,11 +372,13 @@ def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
         return
     composer = Composer(parts)
     makers = (
-        ("S2", counts.pairs, lambda name: composer.sequence(name, 2)),
-        ("S3", counts.triples, lambda name: composer.sequence(name, 3)),
-        ("R", counts.retimed, composer.retimed),
+        ("S2", 2, counts.pairs, lambda name: composer.sequence(name, 2)),
+        ("S3", 3, counts.triples, lambda name: composer.sequence(name, 3)),
+        ("R", 1, counts.retimed, composer.retimed),
     )
-    for letter, wanted, make in makers:
+    for letter, acts, wanted, make in makers:
+        if len(composer.acts) < acts:
+            continue
         made = 0
         for attempt in range(6 * wanted):
             if made >= wanted:
