@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,6 +13,7 @@ from typing import Any
 from services.cli.client import Client
 from services.cli.names import DEFAULT_TEMPLATE, Naming, file_name, slug
 from shared.errors import Conflict, InvalidFile, InvalidInput, Unreachable
+from shared.hashing import sha256_of
 
 PARALLEL = 8
 ATTEMPTS = 4
@@ -178,9 +178,3 @@ def _continue(client: Client, download: Download, part: Path) -> None:
                 stream.write(block)
             stream.flush()
             os.fsync(stream.fileno())
-
-
-def sha256_of(path: Path) -> str:
-    """Hex sha256 of a file."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

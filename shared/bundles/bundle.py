@@ -17,6 +17,7 @@ from safetensors.numpy import load as load_safetensors
 
 from shared.bundles.manifest import MANIFEST_NAME, BundleManifest
 from shared.errors import InvalidBundle, NotFound, Refused
+from shared.hashing import sha256_of
 from shared.settings import Settings, settings
 
 MAX_MANIFEST_BYTES = 4 * 2**20
@@ -50,7 +51,7 @@ class Bundle:
                 raise _broken(file, "the manifest names this file, but it is not there")
             if file.stat().st_size != entry.bytes:
                 raise _broken(file, f"has {file.stat().st_size} bytes, the manifest says {entry.bytes}: truncated?")
-            if verify and _sha256(file) != entry.sha256:
+            if verify and sha256_of(file) != entry.sha256:
                 raise _broken(file, "its sha256 differs from the manifest's: the file was changed or damaged")
         return bundle
 
@@ -180,8 +181,3 @@ def _read_manifest(path: Path) -> BundleManifest:
 
 def _broken(file: Path, message: str) -> InvalidBundle:
     return InvalidBundle(message, where=str(file), hint="Fetch or import the bundle again.")
-
-
-def _sha256(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

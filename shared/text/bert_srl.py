@@ -17,6 +17,7 @@ from shared.bundles import Bundle
 from shared.errors import InvalidBundle
 from shared.text.bio import start_scores, transition_scores, viterbi
 from shared.text.roles import Frame, PredicateFinder, spans_to_arguments
+from shared.text.threads import one_thread
 from shared.text.wordpiece import WordPieces
 
 PREFIX = "bert_model."
@@ -58,6 +59,7 @@ class BertLabeller:
         self._transitions, self._start = transition_scores(self._tags), start_scores(self._tags)
         self._predicates = predicates or _light()
 
+    @one_thread()
     def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
         """The frames of each sentence."""
         return [

@@ -10,6 +10,7 @@ import torch
 from shared.errors import InvalidFile
 from shared.text.encoders import WIDTHS, Encoding, weights_sha256
 from shared.text.pretrained import load_pretrained, read_config
+from shared.text.threads import one_thread
 
 MAX_TOKENS = 77
 
@@ -38,6 +39,7 @@ class ClipEncoder:
         self._tokenizer: Any = load_pretrained(CLIPTokenizer, folder)
         self._model: Any = load_pretrained(CLIPTextModelWithProjection, folder, weights=True)
 
+    @one_thread()
     @torch.inference_mode()
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 77 are left out."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidBundle, InvalidFile, NotFound
+from shared.hashing import sha256_of
 from shared.settings import Settings, settings
 
 WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
@@ -136,5 +137,4 @@ def weights_sha256(folder: Path) -> str:
 
 @lru_cache(maxsize=64)
 def _file_sha256(file: Path, modified: int, size: int) -> str:  # time and size are part of the cache's key
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return sha256_of(file)

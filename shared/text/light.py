@@ -18,6 +18,7 @@ from shared.text.encoders import find_weights, weights_sha256
 from shared.text.light_network import SUFFIX_BUCKETS, LightConfig, LightNetwork
 from shared.text.minilm import MiniLM
 from shared.text.roles import Frame, spans_to_arguments
+from shared.text.threads import one_thread
 
 MAX_SEGMENT_WORDS = 60
 MAX_PIECES = 8  # of one word: a typed-over word must not crowd out the rest; 60 * 8 + 2 < 512
@@ -63,6 +64,7 @@ class LightLabeller:
             raise InvalidBundle(f"its weights do not fit: {error}", where=str(bundle.path)) from error
         return cls(network, WordStates(folder, config.layers), bundle.weights_sha256)
 
+    @one_thread()
     def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
         """The frames of each text, sentence by sentence: no argument crosses a full stop."""
         return [

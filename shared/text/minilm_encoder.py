@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from shared.text.encoders import WIDTHS, Encoding, weights_sha256
 from shared.text.minilm import MAX_TOKENS, MiniLM
+from shared.text.threads import one_thread
 
 
 class MiniLMEncoder:
@@ -21,6 +22,7 @@ class MiniLMEncoder:
         self.sha256 = weights_sha256(folder)
         self._model = MiniLM(folder)
 
+    @one_thread()
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 256 are left out."""
         encoded = self._model.tokenizer.encode(text)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import OrderedDict
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,8 +89,7 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        with one_thread():
-            return self._graphs([self.rewrite(check_prompt(prompt)) for prompt in prompts])
+        return self._graphs([self.rewrite(check_prompt(prompt)) for prompt in prompts])
 
     def rewrite(self, prompt: str) -> str:
         """The prompt as the model reads it: rewritten, or as it is where the rewrite would say something else."""
@@ -116,12 +114,11 @@ class TextPipeline:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
         checked = [check_prompt(prompt) for prompt in prompts]
-        with one_thread():
-            rewritten = [self.rewrite(prompt) for prompt in checked]
-            return [
-                TextFeatures(prompt, text, graph, self.encode(graph))
-                for prompt, text, graph in zip(checked, rewritten, self._graphs(rewritten), strict=True)
-            ]
+        rewritten = [self.rewrite(prompt) for prompt in checked]
+        return [
+            TextFeatures(prompt, text, graph, self.encode(graph))
+            for prompt, text, graph in zip(checked, rewritten, self._graphs(rewritten), strict=True)
+        ]
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
         """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states
@@ -159,20 +156,6 @@ class TextPipeline:
         last = node.words[-1]
         span = sentence.span(starts[node.words[0]], starts[last] + len(graph.words[last]))
         return self.pooled(node.text) if span is None else span  # past the encoder's limit: its own text
-
-
-@contextmanager
-def one_thread() -> Generator[None]:
-    """torch on one thread: a sentence's matrices are too small to share, and on a busy machine threads that wait for
-    each other cost twenty times the work (64 prompts: 2 s on one thread, 40 s on two)."""
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 def _word_starts(graph: SemanticGraph) -> list[int]:

@@ -10,6 +10,7 @@ import torch
 from shared.errors import InvalidFile
 from shared.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
 from shared.text.pretrained import load_pretrained, read_config
+from shared.text.threads import one_thread
 
 MAX_TOKENS = 512
 FEED_FORWARD = {"t5-base": "relu", "t5-v1_1-base": "gated-gelu"}
@@ -38,6 +39,7 @@ class T5Encoder:
         self._tokenizer: Any = load_pretrained(AutoTokenizer, folder)
         self._model: Any = load_pretrained(T5EncoderModel, folder, weights=True)
 
+    @one_thread()
     @torch.inference_mode()
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 512 are left out."""

@@ -9,7 +9,8 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from services.cli.fetching import Download, download_all, sha256_of
+from services.cli.fetching import Download, download_all
+from shared.hashing import sha256_of
 from shared.jobs import create_engine, create_key, transaction
 from shared.storage import open_store
 from shared.storage.s3 import S3Store

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidFile, NotFound
+from shared.hashing import sha256_of
 from shared.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
 from shared.text.pipeline import TextPipeline
 from workers.training.data.manifest import CLIPS, TEXTS
-from workers.training.data.prepared import PreparedData, sha256_of
+from workers.training.data.prepared import PreparedData
 
 CHUNK = 256
 

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shared.motion.feet import runs
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.kinematics import gait, hand, heading, lean, runs, smooth, turning_points
+from workers.training.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
 from workers.training.checks.quality import quality
 
 

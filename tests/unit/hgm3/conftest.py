@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from shared.bundles import TextSpec
+from shared.hashing import sha256_of
 from shared.motion.features import HUMANML3D_263
 from shared.motion.kinematics import forward_kinematics
 from shared.motion.skeleton import HUMANML3D
@@ -19,7 +20,7 @@ from workers.hgm3.bundle import random_bundle
 from workers.hgm3.generate import Generator
 from workers.training.data import manifest as names
 from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured
-from workers.training.data.prepared import PreparedData, sha256_of
+from workers.training.data.prepared import PreparedData
 from workers.training.texts import CaptionTexts
 
 WIDTH = 384

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.motion.feet import runs
+
 Array = NDArray[np.floating]
 
 PELVIS, NECK, HEAD = 0, 12, 15
@@ -55,12 +57,6 @@ def body_frame(vectors: Array, heading_degrees: Array) -> tuple[Array, Array]:
     forward = vectors[..., 0] * np.sin(angle) + vectors[..., 2] * np.cos(angle)
     left = vectors[..., 0] * np.cos(angle) - vectors[..., 2] * np.sin(angle)
     return forward, left
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start and end (exclusive) of each stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 @dataclass(frozen=True)

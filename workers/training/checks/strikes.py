@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from shared.motion.feet import runs
 from workers.training.checks.kinematics import (
     ANKLES,
     HEAD,
@@ -13,7 +14,6 @@ from workers.training.checks.kinematics import (
     Array,
     body_frame,
     heading,
-    runs,
     smooth,
     velocity,
 )

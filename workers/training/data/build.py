@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import Conflict, InvalidInput
+from shared.hashing import sha256_of
 from shared.motion.features import HUMANML3D_263
 from workers.training.data import manifest as names
 from workers.training.data.captions import captions
@@ -20,7 +21,6 @@ from workers.training.data.describe import Facts, describe, describe_cmu
 from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from workers.training.data.pack import SPLITS, JointsPack, PackClip, split_root
 from workers.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
-from workers.training.data.prepared import sha256_of
 from workers.training.data.soundness import is_broken
 from workers.training.data.sources import SOURCES
 

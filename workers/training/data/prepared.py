@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from shared.errors import InvalidFile, NotFound
+from shared.hashing import sha256_of
 from shared.motion.features import FeatureLayout, layout
 from workers.training.data import manifest as names
 from workers.training.data.manifest import Clip, Manifest
@@ -131,12 +131,6 @@ def read_manifest(path: Path) -> Manifest:
     if any(Path(name).name != name for name in manifest.files):
         raise InvalidFile("names files outside its folder", where=str(file))
     return manifest
-
-
-def sha256_of(path: Path) -> str:
-    """Hex digest of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _check_file(path: Path, sha256: str | None, size: int) -> None:

@@ -1,0 +1,31 @@
+"""Reading takes one thread and gives the others back."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from shared.bundles import TextSpec
+from shared.text.pipeline import TextPipeline
+from shared.text.threads import one_thread
+
+
+@pytest.fixture(autouse=True)
+def two_threads():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_the_threads_are_given_back_even_after_an_error():
+    with pytest.raises(KeyError), one_thread():
+        assert torch.get_num_threads() == 1
+        raise KeyError
+    assert torch.get_num_threads() == 2
+
+
+def test_reading_a_prompt_leaves_the_threads_of_the_caller():
+    pipeline = TextPipeline.load(TextSpec())
+    pipeline.features(["a person walks"])
+    assert torch.get_num_threads() == 2
