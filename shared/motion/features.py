@@ -231,11 +231,8 @@ class HeadingLayout:
         half_yaw = np.zeros(values.shape[:-1])
         half_yaw[..., 1:] = np.cumsum(values[..., :-1, 0], axis=-1)
         root = np.zeros((*values.shape[:-1], 3))
-        # the step of t - 1 was turned by the heading of t; back to the world: about Y by -2 half_yaw
-        cos, sin = np.cos(2 * half_yaw[..., 1:]), -np.sin(2 * half_yaw[..., 1:])
-        x, z = values[..., :-1, 1], values[..., :-1, 2]
-        root[..., 1:, 0] = np.cumsum(cos * x + sin * z, axis=-1)
-        root[..., 1:, 2] = np.cumsum(cos * z - sin * x, axis=-1)
+        steps = to_world(half_yaw[..., 1:], values[..., :-1, 1:3])  # the step of t - 1 was turned by the heading of t
+        root[..., 1:, [0, 2]] = np.cumsum(steps, axis=-2)
         root[..., 1] = values[..., 3]
         return half_yaw, root * self.unit
 
@@ -253,15 +250,17 @@ class HeadingLayout:
         """
         if features.ndim < 2 or features.shape[-1] != self.dim or not features.shape[-2]:
             raise InvalidInput(f"features have shape {features.shape}, not (..., Tf >= 1, {self.dim})", where=self.name)
-        half_yaw, root = self.root_trajectory(features)
+        return self.place_joints(features, *self.root_trajectory(features))
+
+    def place_joints(self, features: Array, half_yaw: Array, root: Array) -> Float32:
+        """Joints (..., J, 3) of features (..., D), given half yaw (...) and root position (..., 3) in metres."""
         local = np.asarray(features[..., self.slices["positions"]], np.float64)
         local = local.reshape(*local.shape[:-1], -1, 3) * self.unit
-        cos, sin = np.cos(2 * half_yaw)[..., None], -np.sin(2 * half_yaw)[..., None]
         joints = np.empty((*local.shape[:-2], len(self.skeleton), 3), np.float32)
         joints[..., 0, :] = root
-        joints[..., 1:, 0] = cos * local[..., 0] + sin * local[..., 2] + root[..., None, 0]
+        flat = to_world(half_yaw[..., None], local[..., [0, 2]])
+        joints[..., 1:, [0, 2]] = flat + root[..., None, [0, 2]]
         joints[..., 1:, 1] = local[..., 1]
-        joints[..., 1:, 2] = cos * local[..., 2] - sin * local[..., 0] + root[..., None, 2]
         return joints
 
     def contacts(self, features: Array) -> NDArray[np.bool_]:
@@ -271,6 +270,13 @@ class HeadingLayout:
     def mirror_joints(self, joints: Array) -> Array:
         """See `mirror_joints`."""
         return mirror_joints(joints, self.skeleton)
+
+
+def to_world(half_yaw: Array, flat: Array) -> Array:
+    """X and Z of vectors (..., 2) from the frame of a heading to the world: turned about Y by -2 half_yaw."""
+    cos, sin = np.cos(2 * half_yaw), -np.sin(2 * half_yaw)
+    x, z = flat[..., 0], flat[..., 1]
+    return np.stack([cos * x + sin * z, cos * z - sin * x], axis=-1)
 
 
 def _directions(rows: str) -> Array:

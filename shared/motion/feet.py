@@ -65,8 +65,7 @@ def clean_feet(
         InvalidInput: the skeleton has no feet.
     """
     joints = np.array(joints, np.float64)
-    if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
-        raise InvalidInput("this skeleton's feet or hips are not known", where=skeleton.name)
+    need_feet(skeleton)
     joints[..., 1] -= floor_height(joints, skeleton)
     stands = find_contacts(joints, skeleton, fps, rule=rule) if contacts is None else np.array(contacts, bool)
     before = joints.copy()
@@ -76,6 +75,12 @@ def clean_feet(
         _plant(joints, skeleton, (ankle, toe), stands[:, 2 * side : 2 * side + 2], fps)
     follow_feet(before, joints, stands[:, 1::2], skeleton, fps)
     return joints, stands
+
+
+def need_feet(skeleton: Skeleton) -> None:
+    """Raises InvalidInput for a skeleton whose feet or hips are not known."""
+    if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
+        raise InvalidInput("this skeleton's feet or hips are not known", where=skeleton.name)
 
 
 def floor_height(joints: Array, skeleton: Skeleton) -> float:
@@ -157,7 +162,7 @@ def _plant(joints: Array, skeleton: Skeleton, foot: tuple[int, int], stands: Boo
     shift = _fill(shift, stands[:, 1], fps)
     for j in chain:
         joints[:, j] += shift
-    joints[:, toe, 1] = _over_floor(joints[:, toe, 1])
+    joints[:, toe, 1] = over_floor(joints[:, toe, 1])
     turn, still = np.zeros((len(joints), 3)), np.zeros(len(joints), bool)
     for begin, end in runs(stands[:, 0] & stands[:, 1]):
         correction = joints[begin:end, ankle].mean(axis=0) - joints[begin:end, ankle]
@@ -216,6 +221,6 @@ def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: 
     )
 
 
-def _over_floor(height: Array) -> Array:
+def over_floor(height: Array) -> Array:
     """Heights below zero pressed softly to at most `PRESS` below; those above stay as they are."""
     return np.where(height < 0, PRESS * np.expm1(np.minimum(height, 0.0) / PRESS), height)

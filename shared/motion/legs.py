@@ -54,11 +54,11 @@ def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleto
         hip, ankle = joints[:, leg[0]], joints[:, leg[2]]
         was = _without_backward_bend(before[:, leg], ahead, fps)
         wanted = _soft_distance(was, np.linalg.norm(ankle - hip, axis=1), fps)
-        joints[:, chain] = _draw_foot(joints[:, chain], hip, wanted, hold)
+        joints[:, chain] = draw_foot(joints[:, chain], hip, wanted, hold)
         joints[:, leg[1]] = two_bone_knee(was, hip, joints[:, leg[2]], ahead)
 
 
-def _lengths(leg: Array) -> tuple[Array, Array]:
+def leg_lengths(leg: Array) -> tuple[Array, Array]:
     """(T,) thigh and shank of (T, 3, 3)."""
     bones = np.linalg.norm(np.diff(leg, axis=1), axis=2)
     return bones[:, 0], bones[:, 1]
@@ -67,7 +67,7 @@ def _lengths(leg: Array) -> tuple[Array, Array]:
 def _needed_drop(leg: Array, hip: Array, foot: Array) -> Array:
     """(T,) by how much the hip must come down until leg and foot together reach the toe."""
     across, span = foot[:, 0] - hip, np.linalg.norm(foot[:, -1] - foot[:, 0], axis=1)
-    reach = 0.99 * (sum(_lengths(leg)) + span)
+    reach = 0.99 * (sum(leg_lengths(leg)) + span)
     room = np.sqrt(np.maximum(reach**2 - across[:, 0] ** 2 - across[:, 2] ** 2, 0.0))
     return np.clip(np.where(across[:, 1] < 0, -across[:, 1] - room, 0.0), 0.0, MAX_DROP)
 
@@ -87,7 +87,7 @@ def _without_backward_bend(leg: Array, ahead: Array, fps: float) -> Array:
     cover = smooth_above(slight * np.maximum(-np.einsum("ti,ti->t", across, pole), 0.0), 0.03 * fps)
     if not cover.any():
         return leg
-    l1, l2 = _lengths(leg)
+    l1, l2 = leg_lengths(leg)
     across = across + cover[:, None] * pole
     off = np.minimum(np.linalg.norm(across, axis=1), np.minimum(l1, l2))
     along, below = np.sqrt(l1**2 - off**2), np.sqrt(l2**2 - off**2)
@@ -105,10 +105,9 @@ def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
         leg: (T, 3, 3) as it was.
         distance: (T,) asked for.
     """
-    l1, l2 = _lengths(leg)
+    l1, l2 = leg_lengths(leg)
     was = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=1)
-    stretch, room = distance - was, np.maximum(STRETCH * (l1 + l2) - was, 1e-4)
-    wanted = np.where(stretch > 0, was - room * np.expm1(-np.maximum(stretch, 0.0) / room), distance)
+    wanted = soft_stretch(was, distance, l1 + l2)
     off_was = _bend(was, l1, l2)[1]
     change = smooth((_bend(wanted, l1, l2)[1] - off_was)[:, None], 0.04 * fps)[:, 0]
     off = np.clip(off_was + change, 0.0, np.minimum(l1, l2))
@@ -117,7 +116,14 @@ def _soft_distance(leg: Array, distance: Array, fps: float) -> Array:
     return wanted + straight**2 * (3 - 2 * straight) * (smoothed - wanted)
 
 
-def _draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
+def soft_stretch(was: Array, distance: Array, length: Array) -> Array:
+    """(T,) from hip to ankle: as asked for where that is nearer than it was, else the less far the nearer the leg is to
+    `STRETCH` of its length, which it does not pass."""
+    stretch, room = distance - was, np.maximum(STRETCH * length - was, 1e-4)
+    return np.where(stretch > 0, was - room * np.expm1(-np.maximum(stretch, 0.0) / room), distance)
+
+
+def draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
     """A foot (T, n, 3), toe first, moved so that its ankle is at the wanted distance from the hip.
 
     Where the toe is held (1) the foot turns around it, heel up or down; where it is not (0), the whole foot gives way.
@@ -160,7 +166,7 @@ def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
         (T, 3).
     """
     upper, whole = leg[:, 1] - leg[:, 0], leg[:, 2] - leg[:, 0]
-    l1, l2 = _lengths(leg)
+    l1, l2 = leg_lengths(leg)
     turn = between(whole, ankle - hip)
     axis = normalize(ankle - hip)
     knee = rotate(turn, upper)

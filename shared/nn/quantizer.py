@@ -87,24 +87,38 @@ class ResidualQuantizer(nn.Module):
         perplexity: list[Tensor] = []
         for level in range(self.levels):
             active = valid & (level < kept)[:, None]  # (B, n)
+            vectors = self.scaled(residual.detach(), level).detach()  # (B, n, d)
             if self.training:
-                self._initialize(level, residual.detach()[active])
-            index = self.nearest(residual.detach(), level)  # (B, n)
-            chosen = self.codebooks[level][index] * active[..., None]  # (B, n, d)
+                self._initialize(level, vectors[active])
+            index = self.nearest(vectors, level)  # (B, n)
+            restored = self.restored(self.codebooks[level][index], level) * active[..., None]  # (B, n, d)
+            chosen = restored.detach()
             distance = (residual - chosen).square().mean(-1)  # (B, n)
             commitment = commitment + (distance * active).sum() / active.sum().clamp(min=1)
             usage = torch.bincount(index[active], minlength=self.codes).float()
             perplexity.append(_perplexity(usage))
             if self.training:
-                self._update(level, residual.detach()[active], index[active], usage)
+                self._update(level, vectors[active], index[active], usage)
             residual = residual - chosen
-            total = total + chosen
+            total = total + restored
             tokens.append(index.masked_fill(~active, NO_TOKEN))
         if self.training:
             self.initialized.fill_(True)
         masked = latent * valid[..., None]
-        output = masked + (total - masked).detach()
+        output = self.straight_through(masked, total)
         return Quantized(output, torch.stack(tokens, -1), commitment, torch.stack(perplexity))
+
+    def scaled(self, vectors: Tensor, level: int) -> Tensor:
+        """Vectors (..., d) as the codebook of `level` sees them: here unchanged."""
+        return vectors
+
+    def restored(self, codes: Tensor, level: int) -> Tensor:
+        """The inverse of `scaled`, for codes (..., d)."""
+        return codes
+
+    def straight_through(self, latent: Tensor, total: Tensor) -> Tensor:
+        """`total` by value; the gradient goes to `latent` alone."""
+        return latent + (total - latent).detach()
 
     @torch.no_grad()
     def encode(self, latent: Tensor) -> Tensor:
@@ -112,8 +126,8 @@ class ResidualQuantizer(nn.Module):
         residual = latent.float()
         tokens: list[Tensor] = []
         for level in range(self.levels):
-            index = self.nearest(residual, level)
-            residual = residual - self.codebooks[level][index]
+            index = self.nearest(self.scaled(residual, level), level)
+            residual = residual - self.restored(self.codebooks[level][index], level)
             tokens.append(index)
         return torch.stack(tokens, -1)
 
@@ -122,7 +136,8 @@ class ResidualQuantizer(nn.Module):
         total = self.codebooks.new_zeros((*tokens.shape[:-1], self.codebooks.shape[-1]))
         for level in range(tokens.shape[-1]):
             index = tokens[..., level]
-            total = total + self.codebooks[level][index.clamp(min=0)] * (index >= 0)[..., None]
+            chosen = self.restored(self.codebooks[level][index.clamp(min=0)], level)
+            total = total + chosen * (index >= 0)[..., None]
         return total
 
     def nearest(self, vectors: Tensor, level: int) -> Tensor:

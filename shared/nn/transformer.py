@@ -146,10 +146,13 @@ class Transformer(nn.Module):
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
 
         Where only the first `rows` of the output are wanted, the last block computes no others.
-        After `lower` everything between runs in bfloat16: casting around each matrix costs more than it saves.
+        After `lower`, and under autocast, everything between runs in bfloat16: casting around each matrix costs more
+        than it saves.
         """
         mask = None if valid is None else valid[:, None, None, :]
-        x = dropout(x, self.dropout, training=self.training).to(self.dtype)
+        kind = x.device.type
+        dtype = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else self.dtype
+        x = dropout(x, self.dropout, training=self.training).to(dtype)
         for block in self.blocks[:-1]:
             x = block(x, mask)
         return self.norm(self.blocks[-1](x, mask, rows)).float()

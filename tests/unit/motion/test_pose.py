@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from shared.errors import InvalidInput
 from shared.motion.features import mirror_joints
 from shared.motion.kinematics import bone_lengths, forward_kinematics
-from shared.motion.pose import fit_rotation, measure_offsets, solve_pose
+from shared.motion.pose import measure_offsets, solve_pose
 from shared.motion.rotations import about, angle_between, from_rotvec, multiply, rotate, to_rotvec
 from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from shared.motion.solver import fit_rotation
 from tests.support.exported import tumbling
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker

@@ -1,0 +1,89 @@
+"""From a model's features to what drives a rig, frame by frame: decode, solve, lock the feet, solve again.
+
+The live form of `finish.py`, for the layout's own rate. Joints of a decoder have bones that change a little from frame
+to frame; the first solution gives them the lengths of the skeleton, so that feet that are locked after it stay where
+they are in the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shared.motion.features import Float32, HeadingLayout
+from shared.motion.feet import Bool
+from shared.motion.live_features import LiveDecoder, RootState
+from shared.motion.live_feet import FeetState, LiveFeet
+from shared.motion.live_poses import LivePoses, PoseState
+from shared.motion.rotations import Array
+from shared.motion.rows import Rows
+from shared.motion.skeleton import Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class LiveState(Rows):
+    """What the next frame of S streams needs to know."""
+
+    root: RootState
+    decoded: PoseState
+    feet: FeetState
+    final: PoseState
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrames:
+    """One frame of each of S streams.
+
+    Attributes:
+        rotations: (S, J, 4) local unit quaternions, continuous in sign from frame to frame.
+        root: (S, 3) metres.
+        joints: (S, J, 3) where they put the joints.
+        contacts: (S, 4) L ankle, L toe, R ankle, R toe stand.
+    """
+
+    rotations: Float32 = field(repr=False)
+    root: Float32 = field(repr=False)
+    joints: Float32 = field(repr=False)
+    contacts: Bool = field(repr=False)
+
+
+class LiveMotion:
+    """Finishes frames of live streams.
+
+    Args:
+        layout: what the features mean.
+        skeleton: the layout's, with the bone lengths of the body; clients are told them once.
+
+    Raises:
+        InvalidInput: the skeleton has no feet.
+    """
+
+    def __init__(self, layout: HeadingLayout, skeleton: Skeleton) -> None:
+        self.layout = layout
+        self.skeleton = skeleton
+        self._decoder = LiveDecoder(layout)
+        self._poses = LivePoses(skeleton, layout.fps)
+        self._feet = LiveFeet(skeleton, layout.fps)
+
+    def start(self, streams: int = 1) -> LiveState:
+        """The state before the first frame."""
+        poses = self._poses.start(streams)
+        return LiveState(self._decoder.start(streams), poses, self._feet.start(streams), poses)
+
+    def step(self, features: Array, state: LiveState) -> tuple[LiveFrames, LiveState]:
+        """The next frame of every stream.
+
+        Args:
+            features: (S, D), not normalized.
+            state: of the same streams in the same order; it is not changed.
+
+        Raises:
+            InvalidInput: wrong shape, numbers that are not finite, or a state of other streams.
+        """
+        decoded, root = self._decoder.step(features, state.root)
+        solved, first = self._poses.step(decoded, state.decoded)
+        joints, contacts, feet = self._feet.step(solved.joints, state.feet)
+        pose, final = self._poses.step(joints, state.final)
+        rotations, place, places = (values.astype(np.float32) for values in (pose.rotations, pose.root, pose.joints))
+        return LiveFrames(rotations, place, places, contacts), LiveState(root, first, feet, final)

@@ -1,0 +1,72 @@
+"""Features to joints on a live stream: yaw and root are summed up frame by frame, in a state that is carried along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.errors import InvalidInput
+from shared.motion.features import Float32, HeadingLayout, to_world
+from shared.motion.rotations import Array
+from shared.motion.rows import Rows
+
+
+@dataclass(frozen=True, eq=False)
+class RootState(Rows):
+    """Where S streams are. All zeros before the first frame, which faces +Z over the origin."""
+
+    half_yaw: Array  # (S,) of the frame before
+    place: Array  # (S, 2) its root's X and Z, in units of the features
+    step: Array  # (S, 3) what it says of the way to the next: half yaw step, velocity X and Z
+
+
+class LiveDecoder:
+    """Decodes frames of live streams: the same joints as `layout.decode` of all frames at once, to rounding.
+
+    Args:
+        layout: what the features mean.
+    """
+
+    def __init__(self, layout: HeadingLayout) -> None:
+        self.layout = layout
+
+    def start(self, streams: int = 1) -> RootState:
+        """The state before the first frame."""
+        return RootState(np.zeros(streams), np.zeros((streams, 2)), np.zeros((streams, 3)))
+
+    def step(self, features: Array, state: RootState) -> tuple[Float32, RootState]:
+        """The next frame of every stream.
+
+        Args:
+            features: (S, D), not normalized.
+            state: of the same streams in the same order; it is not changed.
+
+        Returns:
+            Joints (S, J, 3) in metres, and the state after them.
+
+        Raises:
+            InvalidInput: wrong shape, or a state of other streams.
+        """
+        if features.ndim != 2 or features.shape != (len(state), self.layout.dim):
+            wanted = f"({len(state)}, {self.layout.dim})"
+            raise InvalidInput(f"features have shape {features.shape}, not {wanted}", where=self.layout.name)
+        values = np.asarray(features[:, :4], np.float64)
+        half_yaw = state.half_yaw + state.step[:, 0]
+        place = state.place + to_world(half_yaw, state.step[:, 1:])
+        root = np.stack([place[:, 0], values[:, 3], place[:, 1]], axis=1) * self.layout.unit
+        return self.layout.place_joints(features, half_yaw, root), RootState(half_yaw, place, values[:, :3])
+
+    def run(self, features: Array, state: RootState) -> tuple[Float32, RootState]:
+        """The next frames (T, D) of one stream, T at least 1: the same, bit for bit, as T steps.
+
+        Raises:
+            InvalidInput: see `step`; no frames; the state holds more than one stream.
+        """
+        if features.ndim != 2 or not len(features):
+            raise InvalidInput(f"features have shape {features.shape}, not (T >= 1, D)", where=self.layout.name)
+        joints: list[Float32] = []
+        for frame in features:
+            found, state = self.step(frame[None], state)
+            joints.append(found)
+        return np.concatenate(joints), state

@@ -1,0 +1,159 @@
+"""The pose solver on a live stream: rotations of a frame depend on that frame and the past alone.
+
+Each frame is solved by the same closed forms as a clip (`solver.py`), so joints come out as exactly. What a clip
+decides with frames from both sides in time is decided here from a state that is carried along:
+
+- what frames show of a limb's bend plane runs through an exponential mean, so that a straight limb keeps the plane it
+  had and drifts to the neutral one; a critically damped spring takes the twist there without a jump. Only the twist
+  about the bone lags behind (by 0.15 s), never the place of a joint;
+- a spine twisted past half a turn, which no body does, goes on without a jump and is let back within some seconds;
+- signs follow the frame before.
+
+Streams are rows: one call takes a frame of each of any number of streams. A chunk of one stream is solved frame by
+frame, so the size of chunks changes no bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from shared.motion.pose import PLANE_PRIOR, Pose, checked_joints
+from shared.motion.rotations import Array
+from shared.motion.rows import Rows, choose
+from shared.motion.skeleton import Skeleton
+from shared.motion.solver import FrameSolver
+
+SEEN_SECONDS = 0.05  # time constant of the mean of what frames show
+SPRING = 20.0  # 1/s; at 40 a limb that bends again turns by 50 degrees a frame at 20 fps, at 20 by 30
+UNTWIST_SECONDS = 1.0  # time constant in which a full turn too many is let go
+
+
+@dataclass(frozen=True, eq=False)
+class PoseState(Rows):
+    """What the next frame of S streams needs to know, with L limbs, C spines, J joints."""
+
+    started: NDArray[np.bool_]  # (S,) a frame went before
+    seen: Array  # (S, L, 2) mean of what frames showed of the bend planes
+    angle: Array  # (S, L) twist of the bend planes, radians
+    speed: Array  # (S, L) its rate, radians a second
+    twist: Array  # (S, C) of the spines, -pi to pi
+    turns: Array  # (S, C) what is added to it, so that there is no jump
+    rotations: Array  # (S, J, 4) the frame before
+
+
+class LivePoses:
+    """Solves frames of live streams of one skeleton.
+
+    Args:
+        skeleton: with the bone lengths of the body (`measure_offsets`); they stay the same from the first frame on.
+        fps: frames a second.
+    """
+
+    def __init__(self, skeleton: Skeleton, fps: float) -> None:
+        self.skeleton = skeleton
+        self.fps = fps
+        self._solver = FrameSolver(skeleton)
+
+    def start(self, streams: int = 1) -> PoseState:
+        """The state before the first frame."""
+        limbs, chains = len(self._solver.limbs), len(self._solver.spines)
+        return PoseState(
+            np.zeros(streams, bool),
+            np.zeros((streams, limbs, 2)),
+            np.zeros((streams, limbs)),
+            np.zeros((streams, limbs)),
+            np.zeros((streams, chains)),
+            np.zeros((streams, chains)),
+            np.zeros((streams, len(self.skeleton), 4)),
+        )
+
+    def step(self, joints: Array, state: PoseState) -> tuple[Pose, PoseState]:
+        """The next frame of every stream.
+
+        Args:
+            joints: (S, J, 3) metres.
+            state: of the same streams in the same order; it is not changed.
+
+        Returns:
+            A pose whose first axis is the streams, and the state after it.
+
+        Raises:
+            InvalidInput: wrong shape, numbers that are not finite, or a state of other streams.
+        """
+        joints = checked_joints(joints, self.skeleton)
+        if len(state) != len(joints):
+            raise InvalidInput(f"{len(joints)} frames for the {len(state)} streams of the state", where="live poses")
+        past = _Past(state, self.fps)
+        local, places = self._solver.solve(joints, past)
+        backwards = np.einsum("sji,sji->sj", local, state.rotations) < 0
+        first = _positive(local)
+        local = choose(state.started, np.where(backwards[..., None], -local, local), first)
+        return Pose(self.skeleton, local, joints[:, 0].copy(), places), past.after(local)
+
+    def run(self, joints: Array, state: PoseState) -> tuple[Pose, PoseState]:
+        """The next frames (T, J, 3) of one stream: the same, bit for bit, as T steps.
+
+        Raises:
+            InvalidInput: see `step`; the state holds more than one stream.
+        """
+        joints = checked_joints(joints, self.skeleton)
+        poses: list[Pose] = []
+        for frame in joints:
+            pose, state = self.step(frame[None], state)
+            poses.append(pose)
+        rotations, root = np.concatenate([p.rotations for p in poses]), np.concatenate([p.root for p in poses])
+        return Pose(self.skeleton, rotations, root, np.concatenate([p.joints for p in poses])), state
+
+
+class _Past:
+    """Moments of one frame of each stream: decided with the state that its past left."""
+
+    def __init__(self, state: PoseState, fps: float) -> None:
+        self.state = state
+        self.seconds = 1.0 / fps
+        self.seen, self.angle, self.speed = state.seen.copy(), state.angle.copy(), state.speed.copy()
+        self.turned, self.turns = state.twist.copy(), state.turns.copy()
+
+    def after(self, rotations: Array) -> PoseState:
+        """The state that this frame leaves."""
+        started = np.ones(len(rotations), bool)
+        return PoseState(started, self.seen, self.angle, self.speed, self.turned, self.turns, rotations)
+
+    def signs(self, q: Array) -> Array:
+        return _positive(q)
+
+    def bend(self, limb: int, seen: Array) -> Array:
+        before, started = self.state, self.state.started
+        keep = np.exp(-self.seconds / SEEN_SECONDS)
+        mean = choose(started, keep * before.seen[:, limb] + (1 - keep) * seen, seen)
+        aim = np.arctan2(mean[:, 1], mean[:, 0] + PLANE_PRIOR)
+        # The exact motion of a critically damped spring over one frame, on the circle: the shorter way round.
+        off = _principal(before.angle[:, limb] - aim)
+        decay = np.exp(-SPRING * self.seconds)
+        push = (before.speed[:, limb] + SPRING * off) * self.seconds
+        self.seen[:, limb] = mean
+        self.angle[:, limb] = choose(started, _principal(aim + (off + push) * decay), aim)
+        self.speed[:, limb] = choose(started, (before.speed[:, limb] - SPRING * push) * decay, 0.0 * aim)
+        return self.angle[:, limb]
+
+    def twist(self, chain: int, angles: Array) -> Array:
+        now = _principal(angles)
+        passed = 2 * np.pi * np.round((self.state.twist[:, chain] - now) / (2 * np.pi))
+        decay = np.exp(-self.seconds / UNTWIST_SECONDS)
+        self.turned[:, chain] = now
+        self.turns[:, chain] = choose(self.state.started, decay * (self.state.turns[:, chain] + passed), 0.0 * now)
+        return now + self.turns[:, chain]
+
+
+def _principal(angles: Array) -> Array:
+    """The same angles between -pi and pi."""
+    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
+
+
+def _positive(q: Array) -> Array:
+    """Quaternions (..., 4) with the sign of which w is not negative."""
+    return np.where(q[..., :1] < 0, -q, q)

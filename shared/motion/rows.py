@@ -1,0 +1,45 @@
+"""States of live streams: arrays with a row for each stream, so that one call moves all of them a frame on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.motion.rotations import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Base of a state whose every field is an array (S, ...) or such a state itself. Streams join and leave between
+    frames by rows."""
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def take(self, rows: Sequence[int]) -> Self:
+        """The state of these streams, in this order."""
+        index = np.array(rows, np.intp)
+
+        def pick(value: Rows | Array) -> Rows | Array:
+            return value.take(rows) if isinstance(value, Rows) else value[index]
+
+        return type(self)(**{f.name: pick(getattr(self, f.name)) for f in fields(self)})
+
+    @classmethod
+    def join(cls, states: Sequence[Self]) -> Self:
+        """The streams of several states, one after the other."""
+
+        def merge(values: Sequence[Any]) -> Rows | Array:
+            first = values[0]
+            return type(first).join(values) if isinstance(first, Rows) else np.concatenate(values)
+
+        return cls(**{f.name: merge([getattr(state, f.name) for state in states]) for f in fields(cls)})
+
+
+def choose(mask: NDArray[np.bool_], yes: Array, no: Array) -> Array:
+    """`yes` (S, ...) in the rows where the mask (S,) holds, else `no`."""
+    return np.where(mask.reshape(-1, *[1] * (max(yes.ndim, no.ndim) - 1)), yes, no)

@@ -1,0 +1,104 @@
+"""What a client asks of a running stream: messages from any API process to the worker that holds the stream.
+
+They lie in a Redis stream of their own and stay when the worker dies: the next one reads on from the last message that
+the durable state of the stream names.
+"""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal, cast, get_args
+
+import redis
+
+from shared.errors import InvalidInput
+from shared.streams.redis import BLOCK_MS, KEEP_MS, reached, stream_entries, stream_key
+
+Kind = Literal["steer", "pause", "resume", "stop"]
+KINDS: tuple[str, ...] = get_args(Kind)
+START = "0-0"
+KEPT_MESSAGES = 1000  # far more than a person sends while a worker is replaced
+FIELD = b"m"
+
+
+@dataclass(frozen=True)
+class Control:
+    """One message; `prompt` is the new text of a steer, and nothing else has one."""
+
+    kind: Kind
+    prompt: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InvalidInput(f"`{self.kind}` is no control message; {', '.join(KINDS)} are", where="stream control")
+        if (self.kind == "steer") != bool(self.prompt):
+            raise InvalidInput("a steer has a prompt, and no other message has", where="stream control")
+
+    def to_bytes(self) -> bytes:
+        """JSON."""
+        message = {"kind": self.kind} if self.prompt is None else {"kind": self.kind, "prompt": self.prompt}
+        return json.dumps(message, ensure_ascii=False).encode()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Control:
+        """The message in these bytes.
+
+        Raises:
+            InvalidInput: it is none that this release knows.
+        """
+        try:
+            message = json.loads(data)
+        except ValueError as error:
+            raise InvalidInput("not JSON", where="stream control") from error
+        if not isinstance(message, dict) or not set(cast("dict[str, Any]", message)) <= {"kind", "prompt"}:
+            raise InvalidInput("not an object with `kind` and, for a steer, `prompt`", where="stream control")
+        found = cast("dict[str, Any]", message)
+        kind, prompt = found.get("kind"), found.get("prompt")
+        if not isinstance(kind, str) or not isinstance(prompt, str | None):
+            raise InvalidInput("`kind` and `prompt` are texts", where="stream control")
+        return cls(cast("Kind", kind), prompt)
+
+
+class ControlQueue:
+    """The messages of one stream.
+
+    Args:
+        client: as for `FrameStream`.
+        stream: its id.
+    """
+
+    def __init__(self, client: redis.Redis, stream: str) -> None:
+        self.stream = stream
+        self.key = stream_key(stream, "control")
+        self._redis: Any = client
+
+    def send(self, control: Control) -> str:
+        """Add a message; its id. Ids grow."""
+        with reached(self.stream), self._redis.pipeline() as pipe:
+            pipe.xadd(self.key, {FIELD: control.to_bytes()}, maxlen=KEPT_MESSAGES, approximate=False)
+            pipe.pexpire(self.key, KEEP_MS)
+            return pipe.execute()[0].decode()
+
+    def read(self, after: str = START, *, block_ms: int = 0) -> list[tuple[str, Control | InvalidInput]]:
+        """All messages after the one with this id, oldest first, each with its own.
+
+        A message that this release does not know comes as the error that says so: a worker that stopped at it would
+        stop at it for ever.
+
+        Args:
+            after: id of the last message that was obeyed.
+            block_ms: how long to wait when there is none, at most 5 s; 0 does not wait.
+        """
+        block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
+        with reached(self.stream):
+            answer = self._redis.xread({self.key: after}, block=block)
+        found: list[tuple[str, Control | InvalidInput]] = []
+        for identity, fields in stream_entries(answer):
+            try:
+                message: Control | InvalidInput = Control.from_bytes(fields.get(FIELD, b""))
+            except InvalidInput as error:
+                message = error
+            found.append((identity.decode(), message))
+        return found

@@ -1,0 +1,303 @@
+"""Frame streams on Redis: one worker writes, any number of API processes read, and a reader that comes back goes on.
+
+A stream has four keys, all in one hash slot: `frames` (a Redis stream of the last 1,200 frames, one minute at 20 fps;
+frame n has the id `{n+1}-0`, since 0-0 is none), `lease` (who writes; gone 1.5 s after its last renewal), `fence` (the
+number of the newest lease) and `control` (`control.py`). All are gone an hour after the last write.
+
+Whoever writes holds the lease: the script that adds frames compares it in the same step, so a worker that was frozen
+and wakes up adds nothing after the stream moved on. A lease is known by its fencing number, for the rows that are
+written elsewhere, and by a random token, for a Redis that lost its memory and counts from the start again.
+
+Every call raises `Unreachable` when Redis does not answer, is full or refuses.
+"""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, cast
+
+import redis
+from redis.exceptions import ConnectionError as NoConnection
+from redis.exceptions import OutOfMemoryError, ReadOnlyError
+from redis.exceptions import TimeoutError as TookTooLong
+
+from shared.errors import Conflict, InvalidInput, Unreachable
+from shared.streams.frames import Frame, encode_frame
+
+LEASE_MS = 1500
+RENEW_SECONDS = 0.4  # three renewals may fail before the lease is lost
+KEPT_FRAMES = 1200
+KEEP_MS = 3600 * 1000
+BLOCK_MS = 5000  # a read waits no longer: well under the socket timeout, and a stopping process must look up
+FIELD = b"f"
+STREAM_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+_ACQUIRE = """
+if redis.call('EXISTS', KEYS[1]) == 1 then return {0, redis.call('PTTL', KEYS[1])} end
+local fence = math.max(tonumber(redis.call('GET', KEYS[2]) or '0'), tonumber(ARGV[4])) + 1
+fence = string.format('%.0f', fence)
+redis.call('SET', KEYS[2], fence, 'PX', ARGV[3])
+redis.call('SET', KEYS[1], fence .. ':' .. ARGV[1], 'PX', ARGV[2])
+local last = redis.call('XREVRANGE', KEYS[3], '+', '-', 'COUNT', 1)
+return {tonumber(fence), #last > 0 and tonumber(string.match(last[1][1], '^%d+')) or 0}
+"""
+
+_RENEW = """
+if redis.call('GET', KEYS[1]) ~= ARGV[1] then return 0 end
+return redis.call('PEXPIRE', KEYS[1], ARGV[2])
+"""
+
+_RELEASE = """
+if redis.call('GET', KEYS[1]) ~= ARGV[1] then return 0 end
+return redis.call('DEL', KEYS[1])
+"""
+
+# The id of the last frame is the number of the next. A write whose answer was lost is sent again by the client: the
+# same last frame under the same lease is that write.
+_WRITE = """
+if redis.call('GET', KEYS[1]) ~= ARGV[1] then return {'lost', 0} end
+local first, count = tonumber(ARGV[4]), #ARGV - 4
+local last = redis.call('XREVRANGE', KEYS[2], '+', '-', 'COUNT', 1)
+if #last > 0 then
+  local next = tonumber(string.match(last[1][1], '^%d+'))
+  if next == first + count and last[1][2][2] == ARGV[#ARGV] then return {'written', next} end
+  if next ~= first then return {'order', next} end
+end
+for i = 1, count do
+  redis.call('XADD', KEYS[2], 'MAXLEN', '=', ARGV[2], string.format('%.0f-0', first + i), 'f', ARGV[4 + i])
+end
+redis.call('PEXPIRE', KEYS[2], ARGV[3])
+redis.call('PEXPIRE', KEYS[3], ARGV[3])
+return {'written', first + count}
+"""
+
+
+class LeaseLost(Conflict):
+    """The stream is another worker's, or was not renewed in time: write nothing more."""
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The right to write a stream.
+
+    Attributes:
+        fence: goes up with every lease of the stream.
+        token: tells two leases of the same number apart.
+        next_frame: number that the next frame of the stream has; 0 when it has none here.
+    """
+
+    fence: int
+    token: str
+    next_frame: int
+
+    @property
+    def value(self) -> str:
+        """What the lease key holds."""
+        return f"{self.fence}:{self.token}"
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Frames that a reader asked for and that are no more: `first` to `first + count - 1`."""
+
+    first: int
+    count: int
+
+
+@dataclass(frozen=True)
+class StoredFrame:
+    """A frame as it is sent on to a client."""
+
+    number: int
+    data: bytes
+
+
+class FrameStream:
+    """The frames of one stream.
+
+    Args:
+        client: answers in bytes (`decode_responses` off), with timeouts (`shared.runtime.queue.redis_client`).
+        stream: its id, 1 to 64 letters, digits, `_` and `-`.
+        lease_ms, kept, keep_ms: how long a lease lasts, how many frames are kept, how long an idle stream is.
+
+    Raises:
+        InvalidInput: the id is none.
+    """
+
+    def __init__(
+        self,
+        client: redis.Redis,
+        stream: str,
+        *,
+        lease_ms: int = LEASE_MS,
+        kept: int = KEPT_FRAMES,
+        keep_ms: int = KEEP_MS,
+    ) -> None:
+        self.stream = stream
+        self.frames_key, self.lease_key, self.fence_key = (
+            stream_key(stream, part) for part in ("frames", "lease", "fence")
+        )
+        self._redis: Any = client
+        self._lease_ms, self._kept, self._keep_ms = lease_ms, kept, keep_ms
+        self._acquire = self._redis.register_script(_ACQUIRE)
+        self._renew = self._redis.register_script(_RENEW)
+        self._release = self._redis.register_script(_RELEASE)
+        self._write = self._redis.register_script(_WRITE)
+
+    def acquire(self, *, above: int = 0) -> Lease | None:
+        """Take the stream, if nobody has it.
+
+        Args:
+            above: the highest fencing number that is known of it elsewhere; the new one is higher.
+
+        Returns:
+            None while another lease runs.
+        """
+        token = secrets.token_hex(8)
+        with reached(self.stream):
+            fence, following = self._acquire(
+                keys=[self.lease_key, self.fence_key, self.frames_key],
+                args=[token, self._lease_ms, self._keep_ms, above],
+            )
+        return Lease(fence, token, following) if fence else None
+
+    def renew(self, lease: Lease) -> None:
+        """Keep the stream for another 1.5 s; to be called every 0.4 s.
+
+        Raises:
+            LeaseLost: it is another's, or ran out.
+        """
+        with reached(self.stream):
+            kept = self._renew(keys=[self.lease_key], args=[lease.value, self._lease_ms])
+        if not kept:
+            raise self._lost(lease)
+
+    def release(self, lease: Lease) -> bool:
+        """Give the stream back, so that another worker need not wait; False when it was lost already."""
+        with reached(self.stream):
+            return bool(self._release(keys=[self.lease_key], args=[lease.value]))
+
+    def write(self, lease: Lease, frames: Sequence[Frame]) -> None:
+        """Add frames, all or none. The same call made twice writes once.
+
+        Raises:
+            LeaseLost: the lease is another's, or ran out.
+            Conflict: they do not follow the last frame of the stream.
+            InvalidInput: their numbers do not go up by one, or one cannot be encoded.
+        """
+        if not frames:
+            return
+        first = frames[0].number
+        if [frame.number for frame in frames] != list(range(first, first + len(frames))):
+            raise InvalidInput("the numbers of frames of one write go up by one", where=f"stream {self.stream}")
+        data = [encode_frame(frame) for frame in frames]
+        with reached(self.stream):
+            answer, following = self._write(
+                keys=[self.lease_key, self.frames_key, self.fence_key],
+                args=[lease.value, self._kept, self._keep_ms, first, *data],
+            )
+        if answer == b"lost":
+            raise self._lost(lease)
+        if answer == b"order":
+            raise Conflict(f"frame {first} does not follow; the next is {following}", where=f"stream {self.stream}")
+
+    def bounds(self) -> tuple[int, int]:
+        """Number of the oldest frame that is kept, and of the one that comes next; (0, 0) without frames."""
+        with reached(self.stream):
+            oldest = self._redis.xrange(self.frames_key, count=1)
+            newest = self._redis.xrevrange(self.frames_key, count=1)
+        return (_number(oldest[0][0]), _number(newest[0][0]) + 1) if oldest and newest else (0, 0)
+
+    def drop(self) -> None:
+        """Remove the stream, its lease and its messages."""
+        with reached(self.stream):
+            self._redis.delete(self.frames_key, self.lease_key, self.fence_key, stream_key(self.stream, "control"))
+
+    def reader(self, at: int = 0) -> FrameReader:
+        """Read from frame `at` on, which may be one that comes later."""
+        return FrameReader(self._redis, self, at)
+
+    def _lost(self, lease: Lease) -> LeaseLost:
+        hint = "another worker goes on with the stream"
+        return LeaseLost(f"lease {lease.fence} is no more", where=f"stream {self.stream}", hint=hint)
+
+
+class FrameReader:
+    """One client's way through a stream: every frame once and in order, and gaps told with their size.
+
+    Attributes:
+        at: number of the next frame to read; what a client that comes back gives.
+    """
+
+    def __init__(self, client: Any, stream: FrameStream, at: int) -> None:
+        if at < 0:
+            raise InvalidInput(f"frame {at}; frames are counted from 0", where=f"stream {stream.stream}")
+        self.at = at
+        self._redis = client
+        self._stream = stream
+
+    def read(self, *, count: int = 64, block_ms: int = 0) -> list[StoredFrame | Gap]:
+        """The next frames, a gap before those that follow it.
+
+        Args:
+            count: at most so many frames.
+            block_ms: how long to wait when there is none, at most 5 s; 0 does not wait.
+        """
+        block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
+        with reached(self._stream.stream):
+            answer = self._redis.xread({self._stream.frames_key: f"{self.at}-0"}, count=count, block=block)
+        found: list[StoredFrame | Gap] = []
+        for identity, fields in stream_entries(answer):
+            number = _number(identity)
+            if number > self.at:
+                found.append(Gap(self.at, number - self.at))
+            found.append(StoredFrame(number, fields[FIELD]))
+            self.at = number + 1
+        return found
+
+    def skip(self) -> Gap | None:
+        """Go on with the newest frame, for a client that is too slow; what it misses, if anything."""
+        newest = max(self._stream.bounds()[1] - 1, self.at)
+        missed = Gap(self.at, newest - self.at)
+        self.at = newest
+        return missed if missed.count else None
+
+
+def stream_key(stream: str, part: str) -> str:
+    """A key of a stream; the braces put all of them in one hash slot.
+
+    Raises:
+        InvalidInput: the id is none.
+    """
+    if not STREAM_ID.fullmatch(stream):
+        raise InvalidInput("the id of a stream is 1 to 64 letters, digits, `_` and `-`", where=repr(stream[:80]))
+    return f"marey:stream:{{{stream}}}:{part}"
+
+
+@contextmanager
+def reached(stream: str) -> Generator[None]:
+    """Turn what redis-py raises when Redis cannot serve into `Unreachable`."""
+    try:
+        yield
+    except (NoConnection, TookTooLong, OutOfMemoryError, ReadOnlyError) as error:
+        hint = "see that Redis runs and has memory left"
+        raise Unreachable(f"Redis does not serve: {error}", where=f"stream {stream}", hint=hint) from error
+
+
+def _number(identity: bytes) -> int:
+    """Number of the frame with this id."""
+    return int(identity.split(b"-")[0]) - 1
+
+
+def stream_entries(answer: Any) -> list[tuple[bytes, dict[bytes, bytes]]]:
+    """Entries of the one stream that an XREAD asked for: pairs of key and list in RESP2, a mapping in RESP3."""
+    if not answer:
+        return []
+    if isinstance(answer, dict):
+        answer = [(key, batch) for key, batches in cast("dict[Any, Any]", answer).items() for batch in batches]
+    return answer[0][1]

@@ -1,0 +1,31 @@
+"""Tiny networks with random weights, and what goes into them."""
+
+from __future__ import annotations
+
+import torch
+
+from workers.mogo.config import TINY, MOGOConfig
+from workers.mogo.model import RQHCTransformer
+
+
+def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:
+    """In evaluation mode, nothing at zero where training starts."""
+    torch.manual_seed(0)
+    made = RQHCTransformer(config).eval()
+    for parameter in made.parameters():
+        parameter.data.add_(0.1 * torch.randn_like(parameter))
+    made.prompt.mean.normal_()
+    made.prompt.std.uniform_(0.5, 1.5)
+    return made
+
+
+def columns(frames: int, batch: int = 1, config: MOGOConfig = TINY) -> torch.Tensor:
+    """Random tokens (batch, frames, V)."""
+    generator = torch.Generator().manual_seed(frames)
+    return torch.randint(config.tokenizer.codes, (batch, frames, config.tokenizer.levels), generator=generator)
+
+
+def prompts(batch: int, *, seed: int = 0) -> torch.Tensor:
+    """Made-up sentence features (batch, 1, W)."""
+    generator = torch.Generator().manual_seed(seed)
+    return torch.randn(batch, 1, TINY.condition.text_width, generator=generator)

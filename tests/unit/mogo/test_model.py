@@ -1,0 +1,207 @@
+"""RQHC-Transformer: relative positions by hand, causality, levels, prompts, targets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+import torch
+
+from workers.mogo.attention import RelativeAttention
+from workers.mogo.config import PAPER, STARTER, TINY, MOGOConfig
+from workers.mogo.model import NOT_ASKED, RQHCTransformer, Trunk, corrupt, next_targets
+
+from .networks import columns, prompts, transformer
+
+LEVELS, CODES = TINY.tokenizer.levels, TINY.tokenizer.codes
+FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+
+
+def test_attention_equals_equation_9_by_hand() -> None:
+    torch.manual_seed(0)
+    attention = RelativeAttention(6, 2).requires_grad_(False)
+    torch.nn.init.normal_(attention.u)
+    torch.nn.init.normal_(attention.v)
+    trunk = Trunk(replace(TINY.transformer, width=6, heads=2), 9)
+    model = transformer()
+    reach = model.reach(3)
+    x = torch.randn(1, 4, 6)
+    found = attention(x, attention.terms(trunk.sinusoids), reach)
+    query, key, value = (part[0] for part in attention.project(x))  # (4, 2, 3)
+    phi = attention.relative(trunk.sinusoids).view(10, 2, 3)
+    u, v = attention.u.view(2, 3), attention.v.view(2, 3)
+    for i in range(4):
+        mixed = torch.zeros(2, 3)
+        for h in range(2):
+            seen = range(i + 1)  # position 0 is the prompt, and every frame may read it
+            scores = [
+                float(query[i, h] @ key[j, h] + query[i, h] @ phi[i - j, h] + u[h] @ key[j, h] + v[h] @ phi[i - j, h])
+                / math.sqrt(3)
+                for j in seen
+            ]
+            weights = torch.tensor(scores).softmax(0)
+            mixed[h] = sum(weights[j] * value[j, h] for j in seen)
+        torch.testing.assert_close(found[0, i], attention.out(mixed.flatten()), atol=1e-5, rtol=1e-4)
+
+
+def test_a_frame_is_predicted_from_earlier_frames_alone() -> None:
+    model, tokens = transformer(), columns(20)
+    other = tokens.clone()
+    other[:, 12:] = (other[:, 12:] + 1) % CODES
+    first, second = model(prompts(1), tokens), model(prompts(1), other)
+    # the depth head reads the frame it predicts, so frame 13 differs on the levels above 0
+    torch.testing.assert_close(first[:, :, :12], second[:, :, :12])
+    torch.testing.assert_close(first[:, 0, 12], second[:, 0, 12])
+    assert not torch.allclose(first[:, :, 13], second[:, :, 13])
+
+
+def test_level_l_reads_levels_up_to_l_of_the_past() -> None:
+    model, tokens = transformer(FLAT), columns(10)
+    for level in range(1, LEVELS):
+        other = tokens.clone()
+        other[:, 4, level] = (other[:, 4, level] + 1) % CODES
+        first, second = model(prompts(1), tokens), model(prompts(1), other)
+        assert torch.equal(first[:, :level], second[:, :level])
+        assert not torch.allclose(first[:, level, 5:], second[:, level, 5:])
+
+
+def test_with_a_depth_head_level_l_reads_the_codes_below_it_and_no_other() -> None:
+    model, tokens = transformer(), columns(6)
+    at = 3  # codes of frame 4 change; the logits of frame 4 stand at index 3
+    for level in range(LEVELS):
+        other = tokens.clone()
+        other[:, at, level] = (other[:, at, level] + 1) % CODES
+        first, second = model(prompts(1), tokens)[:, :, at], model(prompts(1), other)[:, :, at]
+        torch.testing.assert_close(first[:, : level + 1], second[:, : level + 1])
+        for above in range(level + 1, LEVELS):
+            assert not torch.allclose(first[:, above], second[:, above])
+
+
+def test_an_untrained_depth_head_leaves_levels_independent() -> None:
+    model = RQHCTransformer(TINY)
+    states = torch.randn(2, LEVELS, TINY.transformer.width)
+    torch.testing.assert_close(model.refine(states, columns(2)[0, :, :-1]), states)
+
+
+def test_level_gains_tell_which_level_a_code_came_from() -> None:
+    swapped = torch.tensor([[[3, 5, 7]], [[5, 3, 7]]])
+    plain = transformer(replace(TINY, transformer=replace(TINY.transformer, level_gain=False)))
+    torch.testing.assert_close(*plain.columns(swapped)[:, -1])
+    told = transformer().columns(swapped)[:, -1]
+    assert not torch.allclose(told[0], told[1])
+
+
+def test_only_level_0_can_end_a_clip() -> None:
+    probability = transformer()(prompts(2), columns(5, 2)).softmax(-1)[..., -1]
+    assert (probability[:, 0] > 0).all()
+    assert not probability[:, 1:].any()
+
+
+def test_position_0_is_prompt_plus_level() -> None:
+    model = transformer()
+    text = prompts(2)[:, 0]
+    expected = model.prompt.project((text - model.prompt.mean) / model.prompt.std)
+    found = model.prompt(text)
+    for level in range(LEVELS):
+        torch.testing.assert_close(found[:, level], expected + model.prompt.level.weight[level])
+
+
+def test_a_dropped_prompt_is_the_same_whatever_it_said() -> None:
+    model = transformer()
+    dropped = torch.tensor([True, True])
+    first, second = model.prompt(prompts(2)[:, 0], dropped)
+    assert torch.equal(first, second)
+    never = replace(TINY, condition=replace(TINY.condition, drop=1.0), corruption=0.0)
+    trained = transformer(replace(never, transformer=replace(TINY.transformer, dropout=0.0))).train()
+    tokens = columns(5).expand(2, -1, -1)
+    logits = trained(prompts(2), tokens)
+    torch.testing.assert_close(logits[0], logits[1])
+
+
+def test_the_second_prompt_takes_over_at_the_seam_and_reaches_nothing_before() -> None:
+    model, tokens = transformer(), columns(12, 2)
+    old, new = prompts(2), prompts(2, seed=1)
+    both = model(torch.cat([old, new], 1), tokens, seam=torch.tensor([5, 9]))
+    alone, after = model(old, tokens), model(new, tokens)
+    for row, seam in enumerate((5, 9)):
+        torch.testing.assert_close(both[row, :, :seam], alone[row, :, :seam])
+        assert not torch.allclose(both[row, :, seam], alone[row, :, seam])
+        assert not torch.allclose(both[row, :, seam], after[row, :, seam])  # the past was made under the old prompt
+    first = model(torch.cat([old, new], 1), tokens, seam=torch.tensor([1, 1]))
+    torch.testing.assert_close(first[:, :, 1:], after[:, :, 1:])
+
+
+def test_frames_cut_off_move_the_prompt_away_and_no_further_than_was_trained() -> None:
+    model, tokens = transformer(), columns(6, 2)
+    near = model(prompts(2), tokens)
+    cut = model(prompts(2), tokens, skipped=torch.tensor([0, 7]))
+    torch.testing.assert_close(cut[0], near[0])
+    assert not torch.allclose(cut[1, :, 1:], near[1, :, 1:])
+    far = [model(prompts(2), tokens, skipped=torch.tensor([n, n])) for n in (TINY.max_frames, 10**6)]
+    assert torch.equal(*far)
+
+
+def test_longer_sequences_than_were_trained_are_refused() -> None:
+    with pytest.raises(ValueError, match="25 frames are more than the 24"):
+        transformer()(prompts(1), columns(25))
+
+
+def test_corruption_replaces_whole_columns_at_a_rate_of_each_sample() -> None:
+    torch.manual_seed(0)
+    tokens = columns(200, 400)
+    tokens[:, 150:] = -1
+    changed = corrupt(tokens, CODES, 0.5) != tokens
+    assert not changed[:, 150:].any()
+    rates = changed[:, :150].any(-1).float().mean(1)
+    assert 0.23 < float(rates.mean()) < 0.27
+    assert float(rates.max()) < 0.65
+    assert float(rates.std()) > 0.1  # U(0, 0.5) has 0.14, a flat rate 0.04
+    hit = changed.any(-1)
+    assert float(changed[hit].float().mean()) == pytest.approx(1 - 1 / CODES, abs=0.01)
+
+
+def test_training_corrupts_inputs_and_running_does_not() -> None:
+    still = replace(TINY, condition=replace(TINY.condition, drop=0.0))
+    model = transformer(replace(still, transformer=replace(TINY.transformer, dropout=0.0)))
+    tokens = columns(20)
+    quiet = model(prompts(1), tokens)
+    assert torch.equal(quiet, model(prompts(1), tokens))
+    assert not torch.allclose(model.train()(prompts(1), tokens), quiet)
+
+
+def test_targets_ask_for_the_next_frame_and_for_the_end_of_whole_clips() -> None:
+    tokens = torch.arange(2 * 4 * 3).view(2, 4, 3)
+    lengths, ends = torch.tensor([4, 2]), torch.tensor([False, True])
+    targets = next_targets(tokens, lengths, 99, ends=ends)
+    assert targets[0, 0].tolist() == [0, 3, 6, 9, NOT_ASKED]
+    assert targets[1, 0].tolist() == [12, 15, 99, NOT_ASKED, NOT_ASKED]
+    assert targets[1, 2].tolist() == [14, 17, NOT_ASKED, NOT_ASKED, NOT_ASKED]
+    cropped = next_targets(tokens, lengths, 99, ends=ends, skipped=torch.tensor([30, 0]))
+    assert (cropped[0, :, 0] == NOT_ASKED).all()
+    assert torch.equal(cropped[0, :, 1:], targets[0, :, 1:])
+    assert torch.equal(cropped[1], targets[1])
+
+
+def test_padding_changes_no_logit() -> None:
+    model, tokens = transformer(), columns(9)
+    padded = torch.cat([tokens, tokens.new_full((1, 6, LEVELS), -1)], 1)
+    torch.testing.assert_close(model(prompts(1), padded)[:, :, :9], model(prompts(1), tokens)[:, :, :9])
+
+
+def test_every_weight_learns() -> None:
+    model = transformer().train()
+    tokens = columns(12, 4)
+    logits = model(torch.cat([prompts(4), prompts(4, seed=1)], 1), tokens, seam=torch.tensor([3, 4, 5, 6]))
+    targets = next_targets(tokens, torch.tensor([12, 9, 12, 5]), model.end)
+    torch.nn.functional.cross_entropy(logits.flatten(0, 2), targets.flatten(), ignore_index=NOT_ASKED).backward()
+    silent = {n for n, p in model.named_parameters() if p.grad is None or not p.grad.any()}
+    assert silent <= {"prompt.null"}  # 10 % of the samples
+
+
+@pytest.mark.parametrize(("config", "millions"), [(PAPER, 226), (STARTER, 2.1)])
+def test_the_trunk_has_the_size_it_is_named_for(config: MOGOConfig, millions: float) -> None:
+    with torch.device("meta"):
+        trunk = Trunk(config.transformer, config.max_frames)
+    read = sum(p.numel() for n, p in trunk.named_parameters() if "relative" not in n)  # φ is computed once
+    assert read / 1e6 == pytest.approx(millions, rel=0.01)

@@ -1,0 +1,265 @@
+"""Streams: the cache against whole sequences, sessions beside each other, saving, steering, endless motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from shared.errors import InvalidInput
+from shared.nn.sampling import guide
+from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
+from workers.mogo.model import RQHCTransformer
+from workers.mogo.streaming import Streams
+
+from .networks import columns, prompts, transformer
+
+FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+GUIDED = replace(TINY, inference=replace(TINY.inference, guidance=2.0))
+WINDOW = TINY.inference.window
+
+
+def said(seed: int) -> torch.Tensor:
+    return prompts(1, seed=seed)[0, 0]
+
+
+def run(streams: Streams, frames: int) -> dict[int, torch.Tensor]:
+    """So many steps: the columns (frames, V) of each session that was there all the time."""
+    steps = [streams.step() for _ in range(frames)]
+    return {session: torch.stack([step[session] for step in steps]) for session in steps[-1]}
+
+
+def alone(seed: int, frames: int, model: RQHCTransformer | None = None) -> torch.Tensor:
+    """The columns (frames, V) of a session with nobody beside it."""
+    streams = Streams(model or transformer(), 1)
+    session = streams.start(said(seed), seed)
+    return run(streams, frames)[session]
+
+
+def logits_of(model: RQHCTransformer, states: torch.Tensor, column: torch.Tensor) -> torch.Tensor:
+    """Logits (V, K + 1) of the frame that turned out to be `column` (V,)."""
+    return model.score(model.refine(states, column[None, :-1]))[0]
+
+
+@pytest.mark.parametrize("config", [TINY, FLAT])
+def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(config: MOGOConfig) -> None:
+    model, tokens = transformer(config), columns(WINDOW)
+    whole = model(prompts(1), tokens)[0]  # (V, n + 1, K + 1)
+    streams = Streams(model, 2)
+    streams.start(said(0), 1)
+    for frame in range(WINDOW):
+        found = logits_of(model, streams.states(), tokens[0, frame])
+        torch.testing.assert_close(found, whole[:, frame], atol=1e-5, rtol=0)
+        streams.accept(tokens[:, frame])
+
+
+def test_a_session_draws_the_same_tokens_beside_others() -> None:
+    frames = 2 * WINDOW + 5
+    streams = Streams(transformer(), 5)
+    names = {streams.start(said(seed), seed): seed for seed in range(5)}
+    for session, found in run(streams, frames).items():
+        assert torch.equal(found, alone(names[session], frames))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_a_session_computes_the_same_bits_beside_others(dtype: torch.dtype) -> None:
+    # wide enough for a plain product to take another kernel for one session than for many
+    wide = replace(TINY.transformer, width=256, heads=4, feedforward=512)
+    model = transformer(replace(TINY, transformer=wide))
+
+    def states_of(*seeds: int) -> torch.Tensor:
+        streams = Streams(model, len(seeds), dtype=dtype)
+        for seed in seeds:
+            streams.start(said(seed), seed)
+        run(streams, 8)
+        return streams.states()
+
+    together = states_of(*range(20))
+    for seed in (0, 1, 7, 19):
+        assert torch.equal(states_of(seed)[0], together[seed])
+    assert torch.equal(states_of(3, 4, 5), together[3:6])
+
+
+def test_sessions_join_and_leave_between_frames_and_disturb_nobody() -> None:
+    streams = Streams(transformer(), 3)
+    first = streams.start(said(1), 1)
+    second = streams.start(said(2), 2)
+    before = run(streams, 7)
+    streams.stop(first)
+    third = streams.start(said(3), 3)
+    after = run(streams, 20)
+    assert set(after) == {second, third}
+    assert torch.equal(before[first], alone(1, 7))
+    assert torch.equal(torch.cat([before[second], after[second]]), alone(2, 27))
+    assert torch.equal(after[third], alone(3, 20))
+
+
+def test_tokens_depend_on_seed_and_prompt() -> None:
+    streams = Streams(transformer(), 3)
+    a, b, c = streams.start(said(1), 1), streams.start(said(1), 2), streams.start(said(2), 1)
+    found = run(streams, 10)
+    assert not torch.equal(found[a], found[b])
+    assert not torch.equal(found[a], found[c])
+
+
+@pytest.mark.parametrize("frames", [0, 1, 5, WINDOW, 2 * WINDOW + 3])
+def test_a_saved_session_goes_on_with_the_very_same_tokens(frames: int) -> None:
+    streams = Streams(transformer(), 2)
+    session = streams.start(said(1), 1)
+    for _ in range(frames):
+        streams.step()
+    saved = streams.save(session)
+    expected = run(streams, 20)[session]
+    other = Streams(transformer(), 4)
+    other.start(said(9), 9)
+    resumed = other.resume({name: tensor.clone() for name, tensor in saved.items()})
+    assert torch.equal(run(other, 20)[resumed], expected)
+
+
+@pytest.mark.parametrize("config", [TINY, GUIDED])
+def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None:
+    streams = Streams(transformer(config), 2)
+    session = streams.start(said(1), 1)
+    beside = streams.start(said(2), 2)
+    run(streams, WINDOW + 3)
+    before, other = streams.save(session), streams.save(beside)
+    streams.steer(session, said(3))
+    after = streams.save(session)
+    for name in ("keys", "values"):
+        assert torch.equal(after[name][..., 1:, :], before[name][..., 1:, :])
+        for level in range(TINY.tokenizer.levels):
+            assert not torch.equal(after[name][:, level, :, 0], before[name][:, level, :, 0])
+    for name in ("seeds", "made", "skipped", "may_end", "ended", "last"):
+        assert torch.equal(after[name], before[name])
+    assert all(torch.equal(part, other[name]) for name, part in streams.save(beside).items())
+    fresh = Streams(transformer(config), 1)
+    expected = fresh.save(fresh.start(said(3), 5))
+    torch.testing.assert_close(after["keys"][..., 0, :], expected["keys"][..., 0, :])
+
+
+def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
+    model, tokens, seam = transformer(), columns(WINDOW), 6
+    whole = model(torch.cat([prompts(1), prompts(1, seed=1)], 1), tokens, seam=torch.tensor([seam]))[0]
+    streams = Streams(model, 1)
+    session = streams.start(said(0), 1)
+    for frame in range(WINDOW):
+        if frame == seam:
+            streams.steer(session, said(1))
+        found = logits_of(model, streams.states(), tokens[0, frame])
+        torch.testing.assert_close(found, whole[:, frame], atol=1e-5, rtol=0)
+        streams.accept(tokens[:, frame])
+
+
+def test_a_steer_before_the_first_frame_is_a_start_with_that_prompt() -> None:
+    streams = Streams(transformer(), 1)
+    session = streams.start(said(1), 7)
+    streams.steer(session, said(7))
+    assert torch.equal(run(streams, 10)[session], alone(7, 10))
+
+
+def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
+    model, tokens = transformer(), columns(WINDOW)
+    skipped = 3 * WINDOW + 5
+    whole = model(prompts(1), tokens, skipped=torch.tensor([skipped]))[0]
+    read = WINDOW - 4
+    streams = Streams(model, 1)
+    streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped)
+    for frame in range(read, WINDOW):
+        found = logits_of(model, streams.states(), tokens[0, frame])
+        torch.testing.assert_close(found, whole[:, frame], atol=1e-5, rtol=0)
+        streams.accept(tokens[:, frame])
+
+
+def test_of_a_long_past_the_last_window_is_read() -> None:
+    model, tokens = transformer(), columns(60)
+    streams = Streams(model, 2)
+    streams.start(said(0), 1, past=tokens[0])
+    streams.start(said(0), 1, past=tokens[0, -WINDOW:], skipped=60 - WINDOW)
+    first, second = streams.states()
+    assert torch.equal(first, second)
+    drawn = list(streams.step().values())
+    assert torch.equal(*drawn)
+
+
+def test_frames_that_left_the_window_are_forgotten_and_the_prompt_is_not() -> None:
+    model = transformer(replace(FLAT, transformer=replace(FLAT.transformer, layers=1)))
+    # With one layer a state reads the window itself: deeper ones remember through what they read.
+    tokens = columns(TINY.max_frames)[0]
+    other = tokens.clone()
+    other[:-WINDOW] = (other[:-WINDOW] + 1) % TINY.tokenizer.codes
+    states = []
+    for past, prompt in ((tokens, said(0)), (other, said(0)), (tokens, said(1))):
+        streams = Streams(model, 1)
+        streams.start(prompt, 1)
+        for column in past:
+            streams.states()
+            streams.accept(column[None])
+        states.append(streams.states())
+    torch.testing.assert_close(states[0], states[1])
+    assert not torch.allclose(states[0], states[2])
+
+
+def test_endless_motion_needs_no_more_memory() -> None:
+    streams = Streams(transformer(), 1)
+    streams.start(said(1), 1)
+    addresses = (streams.state.keys.data_ptr(), streams.state.values.data_ptr())
+    run(streams, 5 * WINDOW)
+    assert (streams.state.keys.data_ptr(), streams.state.values.data_ptr()) == addresses
+    assert int(streams.state.made[0]) == 5 * WINDOW
+
+
+def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
+    model = transformer(FLAT)
+    config = InferenceConfig(guidance=2.0, temperature=0, upper_temperature=0, window=WINDOW)
+    streams = Streams(model, 1, config)
+    session = streams.start(said(1), 1)
+    plain = model.prompt(said(1)[None])[:, :, None], model.prompt(said(1)[None], torch.tensor([True]))[:, :, None]
+    with_prompt, without = (model.score(model.trunk(p.flatten(0, 1), model.reach(0))[:, 0]) for p in plain)
+    guided = guide(with_prompt, without, 2.0)
+    guided[0, -1] = -torch.inf
+    assert torch.equal(streams.step()[session], guided.argmax(-1))
+    assert not torch.equal(guided.argmax(-1), with_prompt.argmax(-1))
+
+
+def test_a_stream_never_ends_and_a_clip_ends_when_END_is_drawn() -> None:
+    model = transformer()
+    model.head.bias.data[-1] = 100.0  # END is all but certain
+    streams = Streams(model, 2)
+    endless, clip = streams.start(said(1), 1), streams.start(said(1), 1, may_end=True)
+    found = run(streams, 5)
+    assert (found[endless] >= 0).all()
+    assert (found[endless] < TINY.tokenizer.codes).all()
+    assert (found[clip] == -1).all()
+    assert torch.equal(found[endless], alone(1, 5, model))
+
+
+def test_levels_have_temperatures_of_their_own() -> None:
+    certain = replace(TINY.inference, upper_temperature=0.0)
+    model = transformer(FLAT)
+    streams = Streams(model, 40, certain)
+    for seed in range(40):
+        streams.start(said(1), seed)
+    first = torch.stack(list(streams.step().values()))
+    assert len(first[:, 0].unique()) > 1
+    assert all(len(first[:, level].unique()) == 1 for level in range(1, model.levels))
+
+
+def test_what_cannot_be_is_refused() -> None:
+    streams = Streams(transformer(), 1)
+    session = streams.start(said(1), 1)
+    saved = streams.save(session)
+    with pytest.raises(InvalidInput, match="all 1 sessions"):
+        streams.start(said(1), 1)
+    streams.stop(session)
+    with pytest.raises(InvalidInput, match="no session 1"):
+        streams.steer(session, said(1))
+    with pytest.raises(InvalidInput, match="not given"):
+        streams.start(said(1), 1, skipped=4)
+    with pytest.raises(InvalidInput, match="window of 25 frames"):
+        Streams(transformer(), 1, replace(TINY.inference, window=25))
+    other = Streams(transformer(), 1, replace(TINY.inference, window=8))
+    with pytest.raises(InvalidInput, match="another model"):
+        other.resume(saved)
+    assert other.step() == {}
+    assert streams.step() == {}

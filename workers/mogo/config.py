@@ -1,0 +1,115 @@
+"""Configurations of MOGO: `paper` (its published sizes), `starter` (trains on two CPU cores), `tiny` (tests)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shared.nn.scaled_quantizer import Scale
+
+
+@dataclass(frozen=True)
+class TokenizerConfig:
+    """MoSA-VQ (MOGO Sec. 2.1): one token column a frame."""
+
+    width: int = 512
+    depth: int = 3  # residual blocks, dilations 3^(depth-1) … 1; one stage, as in the public options
+    dropout: float = 0.0
+    levels: int = 6
+    codes: int = 8192
+    code_width: int = 128
+    decay: float = 0.99
+    level_dropout: float = 0.2
+    scale: Scale = "elementwise"
+    commitment: float = 0.02  # β of eq. 6
+    regularizer: float = 0.02  # γ of eq. 6; the paper gives none
+    rotation_weight: float = 1.0  # the rest as in HGM³ (ours): see its `TokenizerConfig`
+    position_weight: float = 5.0
+    velocity_weight: float = 0.5
+    world_weight: float = 2.0
+
+
+@dataclass(frozen=True)
+class TransformerConfig:
+    """The one causal transformer that all levels share."""
+
+    layers: int = 18
+    heads: int = 16
+    width: int = 1024
+    feedforward: int = 4096
+    dropout: float = 0.15
+    level_gain: bool = False
+    """Ours: each level has its own gains on the shared embedding. Without, a sum of embeddings does not tell which
+    level a code came from."""
+
+
+@dataclass(frozen=True)
+class DepthConfig:
+    """Depth head (ours): a small transformer across the levels of one frame; 0 layers draw levels independently."""
+
+    layers: int = 0
+    heads: int = 8
+    width: int = 512
+    feedforward: int = 1024
+
+
+@dataclass(frozen=True)
+class ConditionConfig:
+    """The prompt, one vector a sentence."""
+
+    text_width: int = 768
+    drop: float = 0.1  # share of samples trained without prompt, for guidance
+    noise: float = 0.0  # ours: std of what training adds to standardised text features
+
+
+@dataclass(frozen=True)
+class InferenceConfig:
+    """Drawing tokens."""
+
+    temperature: float = 1.0  # of level 0
+    top_k: float = 0.1  # share of the codes that level 0 may draw
+    upper_temperature: float = 0.6  # of all other levels: against jitter
+    upper_top_k: float = 0.1
+    guidance: float = 1.0  # 1 = off; anything else doubles the cost
+    window: int = 196  # frames that attention reaches back, at most `max_frames`
+
+
+@dataclass(frozen=True)
+class MOGOConfig:
+    """Everything that decides the shapes of one bundle."""
+
+    name: str = "paper"
+    layout: str = "humanml3d-263"
+    features: int = 263  # D
+    joints: int = 22
+    fps: float = 20.0
+    max_frames: int = 196  # longest training sequence: no relative distance beyond it is ever learnt
+    corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
+    tokenizer: TokenizerConfig = TokenizerConfig()
+    condition: ConditionConfig = ConditionConfig()
+    transformer: TransformerConfig = TransformerConfig()
+    depth: DepthConfig = DepthConfig()
+    inference: InferenceConfig = InferenceConfig()
+
+
+PAPER = MOGOConfig()
+
+STARTER = MOGOConfig(
+    name="starter",
+    # 220,000 training frames cannot fill 6 x 8192 codes
+    tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
+    condition=ConditionConfig(text_width=384, noise=0.3),
+    transformer=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True),
+    depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384),
+)
+
+TINY = MOGOConfig(
+    name="tiny",
+    max_frames=24,
+    tokenizer=TokenizerConfig(width=24, depth=2, levels=3, codes=32, code_width=16),
+    condition=ConditionConfig(text_width=384),
+    transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
+    depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32),
+    inference=InferenceConfig(window=16),
+)
+
+CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, STARTER, TINY)}

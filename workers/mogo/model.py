@@ -1,0 +1,259 @@
+"""MOGO's RQHC-Transformer (Sec. 2.2, Alg. 2), read top to bottom.
+
+    prompt + level ── Prompt (PnQ, eq. 7)                 ── position 0 of each level
+    tokens         ── RQHCTransformer.columns (eq. 8)     ── positions 1 … n: sums of the levels up to one's own
+    both           ── Trunk (eq. 9-10), shared by levels  ── states
+    states, codes  ── DepthHead (ours)                    ── states that know the levels drawn below
+    states         ── one head                            ── logits of the next frame's codes, END on level 0
+
+Fu et al., "MOGO: Residual Quantized Hierarchical Causal Transformer for High-Quality and Real-Time 3D Human Motion
+Generation", 2025. All levels run as rows of one batch: a frame costs one pass.
+
+Shapes: B batch, n frames, V levels, K codes, W text width, w transformer width, P prompts (2 where a clip is steered).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from shared.nn.transformer import Block, dropout, initialize, sinusoidal_positions
+from workers.hgm3.tokenizer import frame_mask
+from workers.mogo.attention import Reach, RelativeAttention
+from workers.mogo.config import DepthConfig, MOGOConfig, TransformerConfig
+
+NOT_ASKED = -1
+"""Target that counts in no loss."""
+
+
+class Prompt(nn.Module):
+    """Sentence features to position 0 of every level (eq. 7)."""
+
+    mean: Tensor  # (W,) of the training captions; standardising them is ours, as in HGM³
+    std: Tensor  # (W,)
+
+    def __init__(self, config: MOGOConfig) -> None:
+        super().__init__()
+        width = config.transformer.width
+        self.noise = config.condition.noise
+        self.register_buffer("mean", torch.zeros(config.condition.text_width))
+        self.register_buffer("std", torch.ones(config.condition.text_width))
+        self.project = nn.Linear(config.condition.text_width, width)
+        self.level = nn.Embedding(config.tokenizer.levels, width)
+        self.null = nn.Parameter(torch.zeros(width))  # in place of the prompt, the same at all levels (ours)
+
+    def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> Tensor:
+        """p + q_emb: (B, W) -> (B, V, w); the null prompt where `dropped` (B,) bool."""
+        x = (sentence.float() - self.mean) / self.std
+        if self.training and self.noise > 0:
+            x = x + self.noise * torch.randn_like(x)
+        prompt = self.project(x)
+        if dropped is not None:
+            prompt = torch.where(dropped[:, None], self.null.to(prompt.dtype), prompt)
+        return prompt[:, None] + self.level.weight
+
+
+class TrunkBlock(nn.Module):
+    """Attention and feed-forward (GELU), each behind a norm (ours; Transformer-XL normalises after the residual)."""
+
+    def __init__(self, config: TransformerConfig) -> None:
+        super().__init__()
+        self.dropout = config.dropout
+        self.attention = RelativeAttention(config.width, config.heads)
+        self.wide = nn.Linear(config.width, config.feedforward)
+        self.narrow = nn.Linear(config.feedforward, config.width)
+        self.norm1 = nn.LayerNorm(config.width)
+        self.norm2 = nn.LayerNorm(config.width)
+
+    def forward(self, x: Tensor, attend: Callable[[Tensor], Tensor]) -> Tensor:
+        """(…, w) -> (…, w); `attend` is the attention over whatever may be read."""
+        x = x + self._drop(attend(self.norm1(x)))
+        return x + self._drop(self.narrow(self._drop(F.gelu(self.wide(self.norm2(x))))))
+
+    def _drop(self, x: Tensor) -> Tensor:
+        return dropout(x, self.dropout, training=self.training)
+
+
+class Trunk(nn.Module):
+    """The causal transformer that all levels share."""
+
+    sinusoids: Tensor  # (D + 1, w) of the distances 0 … D, D the longest training sequence
+
+    def __init__(self, config: TransformerConfig, max_distance: int) -> None:
+        super().__init__()
+        self.blocks = nn.ModuleList(TrunkBlock(config) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(config.width)
+        table = sinusoidal_positions(max_distance + 1, config.width)
+        self.register_buffer("sinusoids", table, persistent=False)
+
+    def forward(self, x: Tensor, reach: Reach) -> Tensor:
+        """[prompts | frames] (N, P + n, w) to states of the same shape, float32."""
+        kind = x.device.type
+        x = x.to(torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else x.dtype)
+        for block in self.layers:
+            terms = block.attention.terms(self.sinusoids)
+            x = block(x, lambda h, b=block, t=terms: b.attention(h, t, reach))
+        return self.norm(x).float()
+
+    @property
+    def layers(self) -> list[TrunkBlock]:
+        """The blocks, typed."""
+        return [block for block in self.blocks if isinstance(block, TrunkBlock)]
+
+
+class DepthHead(nn.Module):
+    """A small causal transformer across the levels of one frame (ours): level l sees the codes drawn below it."""
+
+    def __init__(self, config: DepthConfig, levels: int, width: int) -> None:
+        super().__init__()
+        self.state = nn.Linear(width, config.width)
+        self.code = nn.Linear(width, config.width, bias=False)
+        self.level = nn.Parameter(torch.randn(levels, config.width) * 0.02)
+        self.blocks = nn.ModuleList(
+            Block(config.width, config.heads, config.feedforward, 0.0, 0.0, norm_first=True)
+            for _ in range(config.layers)
+        )
+        self.norm = nn.LayerNorm(config.width)
+        self.leave = nn.Linear(config.width, width)
+
+    def forward(self, states: Tensor, below: Tensor) -> Tensor:
+        """States (N, L, w) of the levels 0 … L - 1 and embeddings (N, L - 1, w) of the codes below each: (N, L, w)."""
+        size = states.shape[1]
+        x = self.state(states) + self.level[:size] + F.pad(self.code(below), (0, 0, 1, 0))
+        mask = torch.ones(size, size, dtype=torch.bool, device=x.device).tril()[None, None]
+        for block in self.blocks:
+            x = block(x, mask)
+        return states + self.leave(self.norm(x)).float()
+
+
+class RQHCTransformer(nn.Module):
+    """Prompt and past frames to logits of the next frame's codes on all levels."""
+
+    no_end: Tensor  # (V, K + 1) bool: END on the levels that have none
+
+    def __init__(self, config: MOGOConfig) -> None:
+        super().__init__()
+        t, levels, width = config.transformer, config.tokenizer.levels, config.transformer.width
+        self.config = config
+        self.levels = levels
+        self.codes = config.tokenizer.codes
+        self.prompt = Prompt(config)
+        self.embedding = nn.Embedding(self.codes, width)  # one for all levels (Alg. 2)
+        # residuals get smaller from level to level
+        gains = 2.0 ** (-0.5 * torch.arange(levels))[:, None].repeat(1, width)
+        self.gains = nn.Parameter(gains) if t.level_gain else None
+        self.trunk = Trunk(t, config.max_frames)
+        self.depth = DepthHead(config.depth, levels, width) if config.depth.layers else None
+        self.head = nn.Linear(width, self.codes + 1)  # one for all levels; the last is END
+        no_end = torch.zeros(levels, self.codes + 1, dtype=torch.bool)
+        no_end[1:, -1] = True
+        self.register_buffer("no_end", no_end, persistent=False)
+        initialize(self)
+        if self.depth is not None:
+            nn.init.zeros_(self.depth.leave.weight)  # starts as independent levels
+
+    @property
+    def end(self) -> int:
+        """K, the token of level 0 that ends a clip; never an input."""
+        return self.codes
+
+    def forward(
+        self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
+    ) -> Tensor:
+        """Logits (B, V, n + 1, K + 1) of the frames 1 … n + 1 of clips (training; all frames at once).
+
+        In training mode the prompt of some samples is dropped and frame columns of the input are corrupted; the depth
+        head reads what was not corrupted.
+
+        Args:
+            prompts: (B, P, W) sentence features.
+            tokens: (B, n, V) int64, -1 beyond a clip's own length; n at most `max_frames`.
+            skipped: (B,) frames that were cut off between the prompt and the first column, None = 0.
+            seam: (B,) frames made when the second prompt replaced the first, at least 1; needed where P = 2.
+        """
+        batch, size, levels = tokens.shape
+        training = self.training
+        dropped = torch.rand(batch, device=tokens.device) < self.config.condition.drop if training else None
+        inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
+        first = torch.stack([self.prompt(p, dropped) for p in prompts.unbind(1)], 2)  # (B, V, P, w)
+        x = torch.cat([first, self.columns(inputs).to(first.dtype)], 2).flatten(0, 1)  # (B · V, P + n, w)
+        states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
+        states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
+        states = states.view(batch, levels, size + 1, -1).transpose(1, 2)  # (B, n + 1, V, w)
+        next_codes = F.pad(tokens, (0, 0, 0, 1), value=-1)[..., :-1]  # (B, n + 1, V - 1): of the frame predicted
+        refined = self.refine(states.flatten(0, 1), next_codes.flatten(0, 1))
+        return self.score(refined).view(batch, size + 1, levels, -1).transpose(1, 2)
+
+    def columns(self, tokens: Tensor) -> Tensor:
+        """Inputs (B, V, n, w) of frames (B, n, V): level l gets the sum over levels up to l; -1 adds nothing."""
+        x = self._embed(tokens)  # (B, n, V, w)
+        x = x if self.gains is None else x * self.gains
+        return x.cumsum(2).transpose(1, 2)
+
+    def refine(self, states: Tensor, codes: Tensor) -> Tensor:
+        """States (N, L, w) of levels 0 … L - 1 given the codes (N, L - 1) of the frame they predict."""
+        return states if self.depth is None else self.depth(states, self._embed(codes))
+
+    def score(self, states: Tensor, level: int = 0) -> Tensor:
+        """Logits (…, L, K + 1), float32, of states (…, L, w) of the levels `level` … `level` + L - 1."""
+        hidden = self.no_end[level : level + states.shape[-2]]
+        return self.head(states).float().masked_fill(hidden, torch.finfo(torch.float32).min)
+
+    def reach(self, size: int, prompts: int = 1, skipped: Tensor | None = None, seam: Tensor | None = None) -> Reach:
+        """What `size` frames may read; see `forward`."""
+        device, farthest = self.trunk.sinusoids.device, self.config.max_frames
+        if size > farthest:
+            raise ValueError(f"{size} frames are more than the {farthest} that distances are learnt for")
+        if (prompts == 2) != (seam is not None):
+            raise ValueError("a seam and a second prompt come together")
+        position = torch.arange(1, size + 1, device=device)
+        later = (position[:, None] < position)[None]  # (1, n, n)
+        unread = torch.zeros(1, size, prompts, dtype=torch.bool, device=device)
+        if seam is not None:
+            steered = position >= seam.repeat_interleave(self.levels)[:, None]  # (N, n)
+            unread = torch.stack([steered, ~steered], -1)
+        hidden = torch.cat([unread, later.expand(len(unread), -1, -1)], -1)[:, None]
+        before = position[None] if skipped is None else skipped.repeat_interleave(self.levels)[:, None] + position
+        return Reach(prompts, before.clamp(max=farthest), hidden)
+
+    def _embed(self, tokens: Tensor) -> Tensor:
+        return self.embedding(tokens.clamp(min=0)) * (tokens >= 0)[..., None]
+
+
+def corrupt(tokens: Tensor, codes: int, most: float) -> Tensor:
+    """Replace whole frame columns of (B, n, V) by random codes, at a rate from U(0, `most`) a sample (ours).
+
+    The public repository replaces half of the tokens always. What a stream reads are its own slips, and those come as
+    frames: a wrong level 0 takes the levels above along.
+    """
+    batch, size = tokens.shape[:2]
+    rate = most * torch.rand(batch, 1, device=tokens.device)
+    hit = torch.rand(batch, size, device=tokens.device) < rate
+    return torch.where(hit[..., None] & (tokens >= 0), torch.randint_like(tokens, codes), tokens)
+
+
+def next_targets(
+    tokens: Tensor, lengths: Tensor, end: int, *, ends: Tensor | None = None, skipped: Tensor | None = None
+) -> Tensor:
+    """What `RQHCTransformer.forward` should predict: (B, V, n + 1), NOT_ASKED where nothing is.
+
+    Args:
+        tokens: (B, n, V).
+        lengths: (B,) frames of each clip.
+        end: token that ends a clip, asked behind its last frame on level 0.
+        ends: (B,) bool, clips that really end there (no crop); None = all.
+        skipped: (B,), as in `forward`: what follows a prompt in the middle of a clip is not asked.
+    """
+    size = tokens.shape[1]
+    targets = tokens.masked_fill(~frame_mask(lengths, size)[..., None], NOT_ASKED)
+    targets = F.pad(targets, (0, 0, 0, 1), value=NOT_ASKED)  # (B, n + 1, V)
+    last = torch.arange(size + 1, device=tokens.device) == lengths[:, None]  # (B, n + 1)
+    if ends is not None:
+        last = last & ends[:, None]
+    targets[..., 0] = targets[..., 0].masked_fill(last, end)
+    if skipped is not None:
+        targets[:, 0] = targets[:, 0].masked_fill((skipped > 0)[:, None], NOT_ASKED)
+    return targets.transpose(1, 2)
