@@ -274,13 +274,23 @@ def assemble_bundle(
 ) -> str:
     """Write the bundle of a run; its exact reference."""
     try:
+        from workers.hgm3.assembly import assemble
         from workers.hgm3.config import named_config
-        from workers.hgm3.train import assemble
     except ImportError as error:
         raise needs_extra("worker", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
     made = assemble(data, run, output, named_config(config, mask=mask), card=text, overwrite=overwrite)
     return made.reference
+
+
+def take_bundle_apart(bundle: str, run: Path) -> str:
+    """Write the parts of a bundle into a run folder; the name of its configuration."""
+    try:
+        from shared.bundles import find_bundle
+        from workers.hgm3.assembly import take_apart
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    return take_apart(find_bundle(bundle), run).name
 
 
 def needs_extra(extra: str, error: ImportError) -> InvalidInput:
