@@ -133,57 +133,55 @@ def test_a_hint_names_the_task_and_the_queue(engine: sa.Engine, relay: Relay, li
     assert message["content-type"] == "application/json"
 
 
-def test_a_submit_wakes_the_relay_at_once(
-    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
-) -> None:
-    stopping = threading.Event()
-    slow = Relay(engine, database_url, lists, publisher(create_app(queue_url)), interval=600.0, stopping=stopping)
-    slow.start()
-    try:
-        with engine.connect() as conn:
-            listening = sa.text(
-                "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND query LIKE 'LISTEN%'"
-            )
-            wait(lambda: conn.execute(listening).scalar_one() > 0 and not conn.rollback())
-        time.sleep(0.3)  # the round after LISTEN
-        live(engine, "a")
-        submit_toys(engine, ["walk"])
-        wait(lambda: lists.llen(QUEUE) == 1)
-    finally:
-        stopping.set()
-        submit_toys(engine, ["walk"])  # wakes it up to see that
-        slow.join(10.0)
+class CountingRelay(Relay):
+    """A relay that says when each of its rounds ended; the first ends after it began to listen."""
 
+    def __init__(self, engine: sa.Engine, database_url: str, lists: redis.Redis, queue_url: str) -> None:
+        self.stopping = threading.Event()
+        publish = publisher(create_app(queue_url))
+        super().__init__(engine, database_url, lists, publish, interval=600.0, stopping=self.stopping)
+        self.rounds: list[float] = []
 
-def test_a_burst_of_submits_is_few_rounds(
-    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
-) -> None:
-    stopping = threading.Event()
-    rounds: list[float] = []
-
-    class Counting(Relay):
-        def round(self) -> dict[str, int]:
-            rounds.append(time.monotonic())
+    def round(self) -> dict[str, int]:
+        try:
             return super().round()
+        finally:
+            self.rounds.append(time.monotonic())
 
-    relay = Counting(engine, database_url, lists, publisher(create_app(queue_url)), interval=600.0, stopping=stopping)
+
+@pytest.fixture
+def slow_relay(
+    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
+) -> Iterator[CountingRelay]:
+    """A relay that only a notification can wake, listening already."""
+    relay = CountingRelay(engine, database_url, lists, queue_url)
     relay.start()
     try:
-        wait(lambda: bool(rounds))
-        time.sleep(0.3)
-        live(engine, "a", "b")
-        with engine.connect() as conn:
-            for _ in range(200):
-                conn.execute(sa.text(f"SELECT pg_notify('{QUEUE_CHANNEL}', 'toy')"))
-                conn.commit()
-        submit_toys(engine, ["walk"] * 64)
-        wait(lambda: lists.llen(QUEUE) == 2)
-        assert len(rounds) < 100
+        wait(lambda: bool(relay.rounds))
+        yield relay
     finally:
-        stopping.set()
-        submit_toys(engine, ["walk"])
+        relay.stopping.set()
+        submit_toys(engine, ["walk"])  # wakes it up to see that
         relay.join(10.0)
     assert not relay.is_alive()
+
+
+@pytest.mark.usefixtures("slow_relay")
+def test_a_submit_wakes_the_relay_at_once(engine: sa.Engine, lists: redis.Redis) -> None:
+    live(engine, "a")
+    submit_toys(engine, ["walk"])
+    wait(lambda: lists.llen(QUEUE) == 1)
+
+
+def test_a_burst_of_submits_is_few_rounds(engine: sa.Engine, slow_relay: CountingRelay, lists: redis.Redis) -> None:
+    live(engine, "a", "b")
+    with engine.connect() as conn:
+        for _ in range(200):
+            conn.execute(sa.text(f"SELECT pg_notify('{QUEUE_CHANNEL}', 'toy')"))
+            conn.commit()
+    submit_toys(engine, ["walk"] * 64)
+    wait(lambda: lists.llen(QUEUE) == 2)
+    assert len(slow_relay.rounds) < 100
 
 
 def test_a_relay_goes_on_after_its_connection_was_killed(engine: sa.Engine, relay: Relay, lists: redis.Redis) -> None:
