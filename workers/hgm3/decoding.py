@@ -32,7 +32,6 @@ class DecodeOptions:
     skip_idle: bool = True  # leave out passes that keep nothing
     trim_slots: bool = True  # leave out slots that nobody reads
     min_progress: bool = False  # keep at least one token a pass (ours): other tokens
-    flat: bool = False  # the full condition in every pass (ablation): other tokens
 
 
 @dataclass(frozen=True)
@@ -53,9 +52,9 @@ class Items:
         return Items(**fields)
 
 
-def condition_level(step: int, config: InferenceConfig, *, flat: bool = False) -> int:
+def condition_level(step: int, config: InferenceConfig) -> int:
     """C(l) of eq. 14 for pass l = 1 … L."""
-    if flat or step > config.action_steps:
+    if step > config.action_steps:
         return SPECIFIC
     return MOTION if step <= config.motion_steps else ACTION
 
@@ -71,7 +70,7 @@ def decode_base(
         active = (after < before).nonzero().squeeze(1)
         rows = active if options.skip_idle and len(active) < len(base) else None
         if rows is None or len(rows):
-            level = condition_level(step, config, flat=options.flat)
+            level = condition_level(step, config)
             some = items if rows is None else items.select(rows)
             masked_left = after if rows is None else after[rows]
             part = base if rows is None else base[rows]

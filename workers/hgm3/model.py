@@ -48,7 +48,7 @@ class TextNormalizer(nn.Module):
     """Standardises text features by the training set's mean and std, apart for the three node levels (ours).
 
     Sentence encoders put "left hand" and "right hand" nearly parallel; what differs is small beside what all motion
-    captions share.
+    captions share. In training a little noise stands for the phrases that the captions do not have.
     """
 
     mean: Tensor  # (3, W)
@@ -56,6 +56,7 @@ class TextNormalizer(nn.Module):
 
     def __init__(self, config: ConditionConfig) -> None:
         super().__init__()
+        self.noise = config.noise
         self.register_buffer("mean", torch.zeros(LEVELS, config.text_width))
         self.register_buffer("std", torch.ones(LEVELS, config.text_width))
         level = [MOTION] + [ACTION] * config.max_actions + [SPECIFIC] * config.max_specifics
@@ -64,11 +65,14 @@ class TextNormalizer(nn.Module):
     def forward(self, nodes: Tensor, present: Tensor) -> Tensor:
         """(B, S, W) -> (B, S, W), zeros in absent slots."""
         index: Tensor = self.get_buffer("slot_level")
-        return (nodes.float() - self.mean[index]) / self.std[index] * present[..., None]
+        return self._noisy((nodes.float() - self.mean[index]) / self.std[index]) * present[..., None]
 
     def sentence(self, features: Tensor) -> Tensor:
         """(B, W) encodings of whole sentences, standardised."""
-        return (features.float() - self.mean[MOTION]) / self.std[MOTION]
+        return self._noisy((features.float() - self.mean[MOTION]) / self.std[MOTION])
+
+    def _noisy(self, x: Tensor) -> Tensor:
+        return x + self.noise * torch.randn_like(x) if self.training and self.noise > 0 else x
 
 
 class GraphAttention(nn.Module):

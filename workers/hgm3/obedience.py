@@ -2,6 +2,9 @@
 
     python -m workers.hgm3.obedience models/hgm3-starter --seeds 3 -o report
 
+With `--captions DATA` the captions of that prepared folder's validation clips are asked for instead: what is chosen by
+looking at numbers (steps, guidance, temperature) is chosen there, never on the evaluation prompts.
+
 The checker (`workers/training/checks`) reads joints only and knows nothing of the model; its own rate on real clips
 belongs beside every number here. Motions are judged as users get them: feet cleaned, rotations solved.
 """
@@ -15,18 +18,21 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from shared.errors import InvalidBundle, MareyError
+from shared.errors import InvalidBundle, InvalidInput, MareyError
 from shared.text.features import TextFeatures
 from shared.text.pipeline import TextPipeline
+from workers.hgm3.config import InferenceConfig
 from workers.hgm3.export import finish
 from workers.hgm3.generate import MAX_ROWS, Generator, Request, Settings
 from workers.training.checks.judge import judge, straightness
 from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
 from workers.training.checks.quality import Quality, quality
-from workers.training.checks.rates import Rate, mean_quality
+from workers.training.checks.rates import Rate, expectations, mean_quality, name_of
+from workers.training.data.prepared import PreparedData
 
 
 @dataclass(frozen=True)
@@ -50,11 +56,12 @@ class Report:
 
     bundle: str
     settings: Settings
+    prompts: tuple[EvaluationPrompt, ...]
     trials: tuple[Trial, ...]
 
     def rate(self, wanted: Callable[[EvaluationPrompt], bool]) -> Rate:
         """Share of passed trials among the prompts that `wanted` picks."""
-        texts = {p.text for p in evaluation_prompts() if wanted(p)}
+        texts = {p.text for p in self.prompts if wanted(p)}
         passed = [t.passed for t in self.trials if t.prompt in texts]
         return Rate(len(passed), sum(passed))
 
@@ -105,6 +112,19 @@ class Report:
         }
 
 
+def validation_prompts(folder: Path) -> tuple[EvaluationPrompt, ...]:
+    """Each caption that validation clips have and a check exists for, in the order of the clips."""
+    found: dict[str, EvaluationPrompt] = {}
+    for clip in PreparedData.open(folder).split("val"):
+        expected = expectations(clip.acts, clip.sides)
+        if expected is None or not clip.captions:
+            continue
+        text = clip.captions[len(found) % len(clip.captions)]
+        separate = any(e.act in ("kick", "punch", "slash", "dance") for e in expected)
+        found.setdefault(text, EvaluationPrompt(text, name_of(expected), expected, separate))
+    return tuple(found.values())
+
+
 def measure(
     generator: Generator,
     texts: Sequence[TextFeatures],
@@ -134,7 +154,7 @@ def measure(
         part = jobs[start : start + MAX_ROWS]
         trials += _judged(generator, part, settings)
         progress(len(trials), len(jobs))
-    return Report(generator.bundle.reference, settings, tuple(trials))
+    return Report(generator.bundle.reference, settings, tuple(prompts), tuple(trials))
 
 
 def _judged(
@@ -159,6 +179,21 @@ def _judged(
         )
 
 
+def _settings(given: Sequence[str]) -> dict[str, Any]:
+    """`["guidance=3", "steps=8"]` as the fields of `Settings`."""
+    known = [name for name in InferenceConfig.__dataclass_fields__ if name in Settings.__dataclass_fields__]
+    out: dict[str, Any] = {}
+    for text in given:
+        name, _, value = text.partition("=")
+        try:
+            out[name] = int(value) if name.endswith("steps") else float(value)
+        except ValueError as error:
+            raise InvalidInput("is no NAME=VALUE", where=f"--set {text}", hint="Such as guidance=3.") from error
+        if name not in known:
+            raise InvalidInput("is no setting", where=f"--set {text}", hint=f"Known: {', '.join(known)}.")
+    return out
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure one bundle; JSON and Markdown into a folder, the table on stdout."""
     parser = argparse.ArgumentParser(
@@ -167,10 +202,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("bundle", help="name or path")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--seconds", type=float, help="length of every motion; else the length estimator's")
-    parser.add_argument("--flat", action="store_true", help="all conditions from the first pass on (ablation)")
     parser.add_argument("--min-progress", action="store_true", help="decide at least one token a pass (ablation)")
-    parser.add_argument("--steps", type=int)
-    parser.add_argument("--guidance", type=float)
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="one of the decoding settings, guidance=3"
+    )
+    parser.add_argument("--captions", type=Path, metavar="DATA", help="a folder: its validation captions instead")
     parser.add_argument("--every", type=int, default=1, help="only each K-th prompt, for a quick look")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, help="folder of report.json and report.md")
@@ -179,15 +215,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     text = generator.bundle.manifest.text
     if text is None:
         raise InvalidBundle("does not say how it reads prompts", where=str(generator.bundle.path))
-    prompts = evaluation_prompts()[:: chosen.every]
+    prompts = evaluation_prompts() if chosen.captions is None else validation_prompts(chosen.captions)
+    prompts = prompts[:: chosen.every]
     report = measure(
         generator,
         TextPipeline.load(text).features([p.text for p in prompts]),
         prompts,
         seeds=range(chosen.seeds),
-        settings=Settings(
-            steps=chosen.steps, guidance=chosen.guidance, flat=chosen.flat, min_progress=chosen.min_progress
-        ),
+        settings=Settings(min_progress=chosen.min_progress, **_settings(chosen.set)),
         frames=None if chosen.seconds is None else round(chosen.seconds * generator.config.fps),
         progress=lambda done, total: print(f"\r{done}/{total}", end="", file=sys.stderr),  # noqa: T201
     )

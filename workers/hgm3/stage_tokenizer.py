@@ -95,8 +95,9 @@ def reconstruction_errors(
 ) -> dict[str, float]:
     """Mean joint error of whole clips, encoded and decoded, in millimetres.
 
-    `error_mm` is in space (drift of the root included), averaged over clips; `local_mm` with the root laid over the
-    true one; `error_mm/{dataset}` per data set; `perplexity/{level}` of the code usage.
+    `local_mm` with the pelvis laid over the true one in each frame, which is MoMask's MPJPE; `error_mm` in space, where
+    the drift of the root adds up over a clip; both averaged over clips, and again per data set (`local_mm/{dataset}`);
+    `perplexity/{level}` of the code usage.
     """
     model.eval()
     rate = config.tokenizer.frames_per_token
@@ -122,6 +123,7 @@ def reconstruction_errors(
     result["local_mm"] = 1000 * float(np.mean([r[2] for r in rows]))
     for name in sorted({r[0] for r in rows}):
         result[f"error_mm/{name}"] = 1000 * float(np.mean([r[1] for r in rows if r[0] == name]))
+        result[f"local_mm/{name}"] = 1000 * float(np.mean([r[2] for r in rows if r[0] == name]))
     share = counts / counts.sum(-1, keepdim=True).clamp(min=1)
     perplexity = torch.exp(-(share * torch.log(share + 1e-10)).sum(-1))
     return result | {f"perplexity/{level}": float(p) for level, p in enumerate(perplexity)}

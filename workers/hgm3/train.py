@@ -6,8 +6,6 @@ Each stage reads the parts of those before it in one run folder and leaves its o
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +13,9 @@ import torch
 from safetensors.torch import load_file, save_file
 from torch import nn
 
-from shared.bundles import Bundle, DataSource
 from shared.errors import InvalidInput
 from shared.nn import distributed
-from workers.hgm3.bundle import write_bundle
+from workers.hgm3.assembly import STAGES, same_config
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData, MotionData, TokenData
 from workers.hgm3.stage_masked import MaskedStage
@@ -26,21 +23,11 @@ from workers.hgm3.stage_residual import LengthStage, ResidualStage
 from workers.hgm3.stage_tokenizer import TokenizerStage, reconstruction_errors
 from workers.hgm3.tokenizer import Tokenizer
 from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, Stage, choose_device, start_process_group, train
 from workers.training.parts import Part, load_part, save_part
 from workers.training.texts import CaptionTexts
 
-STAGES = ("tokenizer", "masked", "residual", "length")
-BUILT_FROM = {
-    "tokenizer": ("layout", "features", "joints", "tokenizer"),
-    "masked": ("tokenizer", "condition", "compact", "max_frames", "masked", "predictor"),
-    "residual": ("tokenizer", "condition", "compact", "max_frames", "residual"),
-    "length": ("condition", "max_frames", "length_hidden"),
-}
-"""Fields of the configuration that each stage's networks are built from; how stages were optimised may differ."""
 TOKENS = "tokens.safetensors"
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)
@@ -53,6 +40,7 @@ class TrainOptions:
     budget: Budget
     seed: int = 0
     resume: bool = False
+    warm: bool = False  # start from the weights of the stage's finished part in `run`
     device: str = "auto"
     threads: int = 0
     bf16: bool = True
@@ -114,8 +102,10 @@ def train_all(options: TrainOptions) -> dict[str, float]:
     Called again after a kill it goes on where it stopped. Only minutes are dealt out: steps count for each stage.
 
     Raises:
-        InvalidInput: no minutes are given.
+        InvalidInput: no minutes are given, or a warm start is wanted.
     """
+    if options.warm:
+        raise InvalidInput("all stages at once start from nothing", hint="Give --warm to one stage at a time.")
     minutes = options.budget.minutes
     if minutes is None:
         raise InvalidInput("training all stages needs minutes to deal out", hint="Give --max-minutes.")
@@ -155,7 +145,7 @@ def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
         InvalidInput: trained with another configuration.
     """
     part = load_part(options.run / "tokenizer" / "part")
-    _same_config(part, "tokenizer", options.config, options.run / "tokenizer")
+    same_config(part, "tokenizer", options.config, options.run / "tokenizer")
     tokenizer = Tokenizer(options.config).to(data.features.device)
     tokenizer.load_state_dict(part.state)
     return tokenizer.eval().requires_grad_(False)
@@ -183,51 +173,11 @@ def load_tokens(options: TrainOptions, tokenizer: Tokenizer, data: MotionData) -
     return tokens
 
 
-def assemble(
-    prepared: Path, run: Path, bundle: Path, config: HGM3Config, *, card: str | None = None, overwrite: bool = False
-) -> Bundle:
-    """Write the bundle from the parts of a run.
-
-    Raises:
-        NotFound: a stage has not finished.
-        InvalidInput: parts of different configurations.
-    """
-    data = PreparedData.open(prepared)
-    parts = {name: load_part(run / name / "part") for name in STAGES}
-    for name, part in parts.items():
-        _same_config(part, name, config, run / name)
-    masked = parts["masked"].state
-    states = {
-        "tokenizer": dict(parts["tokenizer"].state),
-        "masked": _under(masked, "masked."),
-        "predictor": _under(masked, "teacher."),
-        "residual": parts["residual"].state,
-        "length": parts["length"].state,
-    }
-    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
-    metrics = {f"{stage}/{k}": v for stage, part in parts.items() for k, v in part.metrics.items()}
-    sha256 = data.manifest.files  # the data's own hashes
-    licences = sorted({source.licence for source in data.manifest.sources})
-    sources = tuple(
-        DataSource(name=s.name, licence=s.licence, credit=s.credit, sha256=sha256["features.npy"].sha256)
-        for s in data.manifest.sources
-    )
-    return write_bundle(
-        bundle,
-        config,
-        states,
-        statistics,
-        text=CaptionTexts.load(data).spec,
-        card=card,
-        overwrite=overwrite,
-        licence=_terms(licences),
-        data=sources,
-        metrics=metrics,
-        training={"commit": _commit(), "budgets": {name: part.budget for name, part in parts.items()}},
-    )
-
-
 def _run(stage: Stage, options: TrainOptions) -> dict[str, float]:
+    if options.warm:
+        part = load_part(options.run / stage.name / "part")
+        same_config(part, stage.name, options.config, options.run / stage.name)
+        stage.module.load_state_dict(part.state)
     return train(stage, options.options(stage.name), options.config.to_dict())
 
 
@@ -238,35 +188,6 @@ def _finish(module: nn.Module, options: TrainOptions, name: str, metrics: dict[s
         save_part(options.run / name / "part", part)
 
 
-def _same_config(part: Part, name: str, config: HGM3Config, where: Path) -> None:
-    """Refuse a part of stage `name` whose networks were built from other values than `config`'s."""
-    theirs = HGM3Config.from_dict(part.config)
-    differ = [field for field in BUILT_FROM[name] if getattr(theirs, field) != getattr(config, field)]
-    if differ:
-        raise InvalidInput(
-            f"was trained with another {differ[0]}", where=str(where), hint="Use one configuration for all stages."
-        )
-
-
-def _under(state: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
-    return {name.removeprefix(prefix): value for name, value in state.items() if name.startswith(prefix)}
-
-
 def _fingerprint(tokenizer: Tokenizer) -> str:
     total = sum(float(value.double().abs().sum()) for value in tokenizer.state_dict().values())
     return f"{total:.6f}"
-
-
-def _terms(licences: Sequence[str]) -> str:
-    """The strictest terms of the sources, as an SPDX name."""
-    return "CC-BY-NC-4.0" if any("NC" in licence for licence in licences) else licences[0]
-
-
-def _commit() -> str | None:
-    try:
-        found = subprocess.run(
-            ["git", "rev-parse", "HEAD"], cwd=REPOSITORY, capture_output=True, text=True, check=True, timeout=10
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return found.stdout.strip()

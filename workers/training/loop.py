@@ -162,7 +162,7 @@ class _Run:
         self.device = next(stage.module.parameters()).device
         trained = [p for group in stage.clip_groups() for p in group]
         self.optimizer = torch.optim.AdamW(
-            _decay_groups(trained, o.weight_decay), lr=o.learning_rate, betas=o.betas, fused=self.device.type == "cuda"
+            _decay_groups(trained, o.weight_decay), lr=o.learning_rate, betas=o.betas, fused=True
         )
         self.average = WeightAverage(stage.module, o.ema)
         self.step = 0

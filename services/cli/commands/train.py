@@ -29,6 +29,7 @@ Steps = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
 Minutes = Annotated[float | None, typer.Option("--max-minutes", help="Minutes; schedules follow whichever ends first.")]
 Seed = Annotated[int, typer.Option("--seed", help="Of weights and batches.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint.")]
+Warm = Annotated[bool, typer.Option("--warm", help="Start from the stage's finished part, not from nothing.")]
 Masking = Annotated[Mask | None, typer.Option("--mask", help="hard or random; none given = as the configuration says.")]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
@@ -46,6 +47,7 @@ def _stage(name: str, what: str) -> None:
         max_minutes: Minutes = None,
         seed: Seed = 0,
         resume: Resume = False,
+        warm: Warm = False,
         mask: Masking = None,
         device: Device = "auto",
         threads: Threads = 0,
@@ -64,6 +66,7 @@ def _stage(name: str, what: str) -> None:
             minutes=max_minutes,
             seed=seed,
             resume=resume,
+            warm=warm,
             device=device,
             threads=threads,
             bf16=bf16,
@@ -107,3 +110,14 @@ def bundle(
         overwrite=overwrite,
     )
     console.result(made)
+
+
+@hgm3.command()
+def unpack(
+    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")],
+    run: Run,
+) -> None:
+    """Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."""
+    from services.cli import roles
+
+    console.result(roles.take_bundle_apart(bundle, run))

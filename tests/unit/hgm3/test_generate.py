@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from workers.hgm3.model import ACTION, MOTION, SPECIFIC
 from .conftest import text_features
 
 COUNT = 32
+FLAT = Settings(motion_steps=0, action_steps=0)
 
 
 def requests() -> list[Request]:
@@ -70,13 +72,13 @@ def test_savings_change_nothing(generator: Generator, reference: list[Generated 
 def test_min_progress_and_flat_conditions_are_other_ways_to_decode(
     generator: Generator, reference: list[Generated | None]
 ) -> None:
-    for settings in (Settings(min_progress=True), Settings(flat=True)):
+    for settings in (Settings(min_progress=True), FLAT):
         assert not equal(reference, generator.generate(requests(), settings))
 
 
 def test_each_token_is_decided_once_and_counted_by_its_condition(generator: Generator) -> None:
     (plain,) = generator.generate([Request(text_features(0), 1, 196)])
-    (flat,) = generator.generate([Request(text_features(0), 1, 196)], Settings(flat=True))
+    (flat,) = generator.generate([Request(text_features(0), 1, 196)], FLAT)
     assert plain is not None
     assert flat is not None
     assert plain.decided == (2, 12, 35)  # 49 tokens: 49 → 47 by C^m, → 35 with actions, → 0 with specifics
@@ -163,7 +165,8 @@ def test_conditions_follow_equation_14() -> None:
     config = InferenceConfig()
     levels = [condition_level(step, config) for step in range(1, 11)]
     assert levels == [MOTION] * 2 + [ACTION] * 3 + [SPECIFIC] * 5
-    assert {condition_level(step, config, flat=True) for step in range(1, 11)} == {SPECIFIC}
+    flat = replace(config, motion_steps=0, action_steps=0)
+    assert {condition_level(step, flat) for step in range(1, 11)} == {SPECIFIC}
 
 
 def test_other_numbers_of_steps_keep_the_shares_of_the_conditions() -> None:

@@ -11,16 +11,18 @@ import torch
 
 from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
+from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import TINY, HGM3Config, named_config
 from workers.hgm3.data import CaptionData, MotionData, TokenData
 from workers.hgm3.generate import Generator, Request
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_tokenizer import TokenizerStage
 from workers.hgm3.tokenizer import Tokenizer
-from workers.hgm3.train import TrainOptions, assemble, train_all, train_stage
+from workers.hgm3.train import TrainOptions, train_all, train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, StepContext, train
+from workers.training.parts import load_part
 from workers.training.texts import CaptionTexts
 
 from .conftest import text_features
@@ -82,6 +84,35 @@ def test_a_bundle_of_another_configuration_is_refused(prepared: PreparedData, ru
     other = replace(TINY, masked=replace(TINY.masked, layers=1))
     with pytest.raises(InvalidInput, match="another masked"):
         assemble(prepared.path, run, tmp_path / "x", other)
+
+
+def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
+    prepared: PreparedData, run: Path, tmp_path: Path
+) -> None:
+    bundle = assemble(prepared.path, run, tmp_path / "first", TINY)
+    again = tmp_path / "run"
+    assert take_apart(bundle, again) == TINY
+    copy = assemble(prepared.path, again, tmp_path / "second", TINY)
+    for part in ("tokenizer", "masked", "predictor", "residual", "length"):
+        theirs, ours = bundle.tensors(part), copy.tensors(part)
+        assert theirs.keys() == ours.keys()
+        assert all(np.array_equal(theirs[name], ours[name]) for name in theirs)
+
+    for stage in ("tokenizer", "masked", "residual", "length"):
+        before = load_part(again / stage / "part").state
+        train_stage(stage, replace(options(prepared, again, 1), warm=True))
+        after = load_part(again / stage / "part").state
+        names = [name for name in before if not name.startswith("quantizer.")]  # tiny batches reset codes that are dead
+        moved = max(float((after[k].float() - before[k].float()).abs().max()) for k in names)
+        assert 0 < moved < 0.1, stage  # from the weights that were there, and not from random ones
+
+
+def test_a_bundle_is_not_taken_apart_into_a_run_that_has_stages(
+    prepared: PreparedData, run: Path, tmp_path: Path
+) -> None:
+    bundle = assemble(prepared.path, run, tmp_path / "bundle", TINY)
+    with pytest.raises(InvalidInput, match="has a stage tokenizer already"):
+        take_apart(bundle, run)
 
 
 def test_a_stage_says_which_one_it_needs_first(prepared: PreparedData, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,14 +33,19 @@ class RealClip:
 
     def expected(self) -> tuple[Expectation, ...] | None:
         """What the clip shows as expectations; None when there is no check for one of its acts."""
-        out = []
-        for act, side in zip(self.acts, self.sides, strict=True):
-            act = _JUDGED_AS.get(act, act)
-            found = [e for e in ALL_EXPECTATIONS if e.act == act and e.side == (side if act in _SIDED else "")]
-            if not found:
-                return None
-            out.append(found[0])
-        return tuple(out)
+        return expectations(self.acts, self.sides)
+
+
+def expectations(acts: Sequence[str], sides: Sequence[str]) -> tuple[Expectation, ...] | None:
+    """Acts and the measured side of each as expectations, in order; None when there is no check for one of them."""
+    out: list[Expectation] = []
+    for act, side in zip(acts, sides, strict=True):
+        act = _JUDGED_AS.get(act, act)
+        found = [e for e in ALL_EXPECTATIONS if e.act == act and e.side == (side if act in _SIDED else "")]
+        if not found:
+            return None
+        out.append(found[0])
+    return tuple(out)
 
 
 @dataclass(frozen=True)

@@ -190,6 +190,12 @@ class _Voice:
             verb = "is " + verb
         return f"{self.subject} {verb}" if self.subject else verb
 
+    @property
+    def again(self) -> str:
+        """The subject, mentioned once more, in front of a verb."""
+        who = {"his": "he", "her": "she"}.get(self.pronoun, "the person")
+        return f"{who} is" if self.form == "progressive" else who
+
 
 def _voice(rng: random.Random, *, plain: bool, adjective: str = "") -> _Voice:
     """`plain` leaves out captions without a subject ("walking forward")."""
@@ -277,12 +283,15 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     for facts in parts:
         after = rng.choice(g.styles[facts.style].after) if not same and rng.random() < 0.6 else ""
         phrases.append(_with(_phrase(facts, rng, voice.pronoun), after))
-    frame = rng.choice(g.two if len(parts) == 2 else g.three)
-    text = (
-        frame.replace("{a}", phrases[0]).replace("{b_ing}", conjugate(phrases[1], "gerund")).replace("{b}", phrases[1])
-    )
-    text = text.replace("{c}", phrases[-1])
+    frames = g.two if len(parts) == 2 else g.three
+    frame = rng.choice([f for f in frames if voice.subject or "{who}" not in f])
+    text = frame.replace("{who}", voice.again)
+    for name, phrase in zip("abc", phrases, strict=False):
+        text = text.replace(f"{{{name}}}", phrase).replace(f"{{{name}_ing}}", conjugate(phrase, "gerund"))
     after = rng.choice(g.styles[parts[0].style].after) if same and rng.random() < 0.7 else ""
+    if text.startswith(("after ", "having ")):  # the subject stands behind the first act
+        form = "gerund" if voice.form == "progressive" else voice.form
+        return _loosen(f"{conjugate(text, form)} {after}", rng)
     if text.startswith("first ") and voice.subject:
         return _loosen("first " + voice.clause(text.removeprefix("first ")) + f" {after}", rng)
     return _loosen(f"{voice.clause(text)} {after}", rng)

@@ -4,13 +4,39 @@ from __future__ import annotations
 
 import re
 
-_DOUBLE = {"run", "jog", "step", "put", "let", "spin", "cut", "jab", "drag", "hop", "stop", "get", "slip", "nod"}
+_DOUBLE = {
+    "run",
+    "jog",
+    "step",
+    "put",
+    "let",
+    "spin",
+    "cut",
+    "jab",
+    "drag",
+    "hop",
+    "stop",
+    "slip",
+    "nod",
+    "trot",
+    "plod",
+    "get",
+    "dip",
+    "drop",
+    "hit",
+    "flap",
+    "bid",
+    "begin",
+}
+_IRREGULAR = {"be": "is", "have": "has"}
 _WORDS = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
 _VERB = re.compile(r"<([a-z]+)>")
 
 
 def third(verb: str) -> str:
     """`walk` to `walks`, `push` to `pushes`, `carry` to `carries`."""
+    if verb in _IRREGULAR:
+        return _IRREGULAR[verb]
     if re.search(r"(s|sh|ch|x|z|o)$", verb):
         return verb + "es"
     if re.search(r"[^aeiou]y$", verb):
@@ -22,7 +48,7 @@ def gerund(verb: str) -> str:
     """`walk` to `walking`, `run` to `running`, `wave` to `waving`."""
     if verb in _DOUBLE:
         return verb + verb[-1] + "ing"
-    if verb.endswith("e") and not verb.endswith(("ee", "oe", "ye")):
+    if verb.endswith("e") and not verb.endswith(("ee", "oe", "ye", "be")):
         return verb[:-1] + "ing"
     return verb + "ing"
 

@@ -1,0 +1,46 @@
+"""The ablation trains what it names and leaves the rest alone; its table holds means and intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.bundles import find_bundle
+from workers.hgm3.ablation import table, train_variant
+from workers.hgm3.assembly import assemble
+from workers.hgm3.config import TINY
+from workers.hgm3.train import TrainOptions, train_stage
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+
+
+def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(
+    prepared: PreparedData, tmp_path: Path
+) -> None:
+    options = TrainOptions(prepared.path, tmp_path / "run", TINY, Budget(steps=2), device="cpu", bf16=False, quiet=True)
+    for stage in ("tokenizer", "masked", "residual", "length"):
+        train_stage(stage, options)
+    bundle = assemble(prepared.path, tmp_path / "run", tmp_path / "bundle", TINY)
+    random_masks = replace(TINY, mining=replace(TINY.mining, mask="random"))
+    numbers = train_variant(prepared.path, str(bundle.path), tmp_path / "variant", random_masks, options)
+    assert numbers["reconstruction/specific"] > 0
+    made = find_bundle(str(tmp_path / "variant" / "bundle"))
+    assert made.manifest.parameters["mining"]["mask"] == "random"
+    for part in ("tokenizer", "residual", "length"):
+        theirs, ours = bundle.tensors(part), made.tensors(part)
+        assert all(np.array_equal(theirs[name], ours[name]) for name in theirs)
+    theirs, ours = bundle.tensors("masked"), made.tensors("masked")
+    assert not all(np.array_equal(theirs[name], ours[name]) for name in theirs)
+
+
+def test_the_table_gives_the_mean_and_the_interval_of_each_variant() -> None:
+    rows = {"hard": [{"obeyed": 0.9}, {"obeyed": 0.8}, {"obeyed": 0.7}], "random": [{"obeyed": 0.5}, {"obeyed": 0.5}]}
+    lines = table(rows).splitlines()
+    assert lines[0] == "| variant | seeds | obeyed |"
+    mean, half = (float(x) for x in lines[2].split("|")[3].split("±"))
+    assert mean == pytest.approx(0.8)
+    assert half == pytest.approx(1.96 * 0.1 / 3**0.5, abs=1e-3)
+    assert lines[3] == "| random | 2 | 0.500 ± 0.000 |"
