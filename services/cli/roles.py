@@ -235,7 +235,8 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
         raise InvalidInput(f"{model!r} does not read prompts", where="--model")
     data = PreparedData.open(folder)
     captions = [clip.captions for clip in data.clips]
-    CaptionTexts.build(captions, TextPipeline.load(spec), progress=progress).save(folder)
+    processes = os.cpu_count() or 1
+    CaptionTexts.build(captions, TextPipeline.load(spec), processes=processes, progress=progress).save(folder)
     return sum(map(len, captions))
 
 

@@ -150,9 +150,7 @@ class CountingRelay(Relay):
 
 
 @pytest.fixture
-def slow_relay(
-    engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis
-) -> Iterator[CountingRelay]:
+def slow_relay(engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Redis) -> Iterator[CountingRelay]:
     """A relay that only a notification can wake, listening already."""
     relay = CountingRelay(engine, database_url, lists, queue_url)
     relay.start()

@@ -9,7 +9,10 @@ their caption · `spec`, `clips_sha256`: strings.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import multiprocessing
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,24 +49,33 @@ class CaptionTexts:
         captions: Sequence[Sequence[str]],
         pipeline: TextPipeline,
         *,
+        processes: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> CaptionTexts:
-        """Parse and encode the captions of each clip; equal texts are encoded once."""
+        """Parse and encode the captions of each clip; equal texts are encoded once.
+
+        Args:
+            captions: those of each clip.
+            pipeline: reads them here, with one process.
+            processes: that many read at once, each with the weights its `spec` names.
+            progress: called with what is done and all.
+        """
         flat = [caption for clip in captions for caption in clip]
-        graphs: dict[str, SemanticGraph] = {}
         unique = list(dict.fromkeys(flat))
-        for at in range(0, len(unique), CHUNK):
-            chunk = unique[at : at + CHUNK]
-            graphs.update(zip(chunk, pipeline.parse(chunk), strict=True))
-            if progress:
-                progress(min(at + CHUNK, len(unique)), 2 * len(unique))
-        table: dict[str, int] = {}
-        node_string = [table.setdefault(n.text, len(table)) for text in flat for n in graphs[text].nodes]
-        strings = np.empty((len(table), pipeline.spec.width), np.float16)
-        for text, row in table.items():
-            strings[row] = pipeline.pooled(text)
-            if progress and row % CHUNK == 0:
-                progress(len(unique) + row * len(unique) // len(table), 2 * len(unique))
+        with _readers(pipeline, processes) as (parse, encode):
+            graphs: dict[str, SemanticGraph] = {}
+            for found in parse(_chunks(unique)):
+                graphs.update(zip(unique[len(graphs) :], found, strict=False))
+                if progress:
+                    progress(len(graphs), 2 * len(unique))
+            table: dict[str, int] = {}
+            node_string = [table.setdefault(n.text, len(table)) for text in flat for n in graphs[text].nodes]
+            rows: list[NDArray[np.float16]] = []
+            for block in encode(_chunks(list(table))):
+                rows.append(block)
+                if progress:
+                    progress(len(unique) + len(rows) * CHUNK * len(unique) // len(table), 2 * len(unique))
+        strings = np.concatenate(rows)
         nodes = [graphs[text].nodes for text in flat]
         edges = [(e.source, e.target, EDGE_TYPES.index(e.type)) for text in flat for e in graphs[text].edges]
         return cls(
@@ -144,6 +156,44 @@ class CaptionTexts:
         adjacency[owner, source, target] = kind
         adjacency[owner, target, source] = kind
         return strings, adjacency
+
+
+Read = Callable[[Sequence[Sequence[str]]], Iterator[list[SemanticGraph]]]
+Encode = Callable[[Sequence[Sequence[str]]], Iterator[NDArray[np.float16]]]
+
+
+@contextmanager
+def _readers(pipeline: TextPipeline, processes: int) -> Generator[tuple[Read, Encode]]:
+    """What parses and what encodes chunks of texts, in their order."""
+    if processes == 1:
+        yield lambda chunks: map(pipeline.parse, chunks), lambda chunks: (_encode(pipeline, texts) for texts in chunks)
+        return
+    spawning = multiprocessing.get_context("spawn")  # torch's threads do not survive a fork
+    with ProcessPoolExecutor(processes, spawning, _load, (pipeline.spec,)) as pool:
+        yield lambda chunks: pool.map(_parse_there, chunks), lambda chunks: pool.map(_encode_there, chunks)
+
+
+def _encode(pipeline: TextPipeline, texts: Sequence[str]) -> NDArray[np.float16]:
+    return np.stack([pipeline.pooled(text) for text in texts]).astype(np.float16)
+
+
+_loaded: list[TextPipeline] = []  # in a process of the pool: its own pipeline
+
+
+def _load(spec: TextSpec) -> None:
+    _loaded.append(TextPipeline.load(spec))
+
+
+def _parse_there(texts: Sequence[str]) -> list[SemanticGraph]:
+    return _loaded[0].parse(texts)
+
+
+def _encode_there(texts: Sequence[str]) -> NDArray[np.float16]:
+    return _encode(_loaded[0], texts)
+
+
+def _chunks(texts: Sequence[str]) -> list[Sequence[str]]:
+    return [texts[at : at + CHUNK] for at in range(0, len(texts), CHUNK)]
 
 
 def _starts(counts: Sequence[int]) -> NDArray[np.int64]:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import re
 
 import pytest
@@ -48,7 +49,7 @@ def test_every_caption_is_complete_english(name):
 )
 def test_the_side_of_a_caption_is_the_side_of_the_motion(name, side, wrong):
     for text in many(EXAMPLES[name]()):
-        lowered = text.lower()
+        lowered = text.lower().replace("right angle", "")
         if wrong and re.search(rf"\b{wrong}\b", lowered):  # the other arm may be said to hang down
             assert re.search(rf"{wrong} (arm|hand) (hangs|kept|does)", lowered), text
         assert side in lowered or wrong is None, text
@@ -90,7 +91,7 @@ def test_long_captions_have_thirty_to_sixty_words(name):
 
 def test_each_act_has_ten_phrasings_and_each_style_several():
     words = grammar()
-    assert all(len(set(phrases)) >= 10 for phrases in words.acts.values())
+    assert all(len(set(act.phrases)) >= 10 for act in words.acts.values())
     assert set(ACTS.values()) <= set(words.acts)
     assert all(len(set(style.after)) >= 5 for style in words.styles.values())
     assert set(STYLE_NAMES.values()) <= set(words.styles)
@@ -108,9 +109,9 @@ def test_a_sequence_names_its_acts_in_order():
     for k in range(200):
         text = joined_caption(parts, seeded(k)).lower()
         assert "left" in text
-        bowing = re.search(r"bow|inclin|bend|upper body", text)
+        bowing = re.search(r"bow|inclin|bend|upper body|lean|torso|trunk|fold|stoop|waist|dip|hips|respect|greet", text)
         assert bowing, text
-        assert bowing.start() < re.search(r"wav|swing|sway|shak|flap|hello|the raised", text).start(), text
+        assert bowing.start() < text.index("left"), text
 
 
 # -- what training must never see --------------------------------------------------------------------------------------
@@ -121,7 +122,7 @@ def plain(text: str) -> str:
 
 
 def trained_phrases() -> set[str]:
-    """All verb phrases of the grammar, in all forms, sides and hands, without their measured numbers."""
+    """All phrases of the grammar, in all forms, sides and hands, without their measured numbers."""
     out = set()
     words = grammar()
     measured = [
@@ -129,16 +130,40 @@ def trained_phrases() -> set[str]:
         for pace in sum(words.pace.values(), ())
         for height in sum(words.height.values(), ())
     ]
-    for phrases in words.acts.values():
-        for phrase in phrases:
-            for side, hands in (("left", "left hand"), ("right", "right hand"), ("both", "both hands")):
-                for his in ("his", "her", "their", "the"):
-                    values = {"side": side, "hands": hands, "arms": hands.replace("hand", "arm"), "it": "it"}
-                    values |= {"hands_his": hands if side == "both" else f"{his} {hands}", "other": "left"}
-                    values |= {"degrees": "90", "metres": "5", "steps": "5"}
-                    for more in measured if "{pace}" in phrase or "{height}" in phrase else measured[:1]:
-                        filled = phrase.format(**values, **more).replace("the both ", "both ")
-                        out |= {plain(conjugate(filled, form)) for form in ("third", "gerund", "base")}
+    phrases = [p for act in words.acts.values() for p in (*act.phrases, *act.nouns, *act.whole)]
+    phrases += [p for act in words.acts.values() for rows in act.manners.values() for p in rows]
+    for phrase in phrases:
+        for side, hands in (("left", "left hand"), ("right", "right hand"), ("both", "both hands")):
+            for his in ("his", "her", "their", "the"):
+                values = {"side": side, "hands": hands, "arms": hands.replace("hand", "arm"), "it": "it", "is": "is"}
+                values |= {"hands_his": hands if side == "both" else f"{his} {hands}", "other": "left"}
+                values |= {"degrees": "90", "metres": "5", "steps": "5"}
+                for sided in (f"{side}-handed", f"with the {side}", "with both hands"):
+                    for angle in ("a right angle", "90 degrees", "ninety degrees", "a quarter of a circle"):
+                        some = values | {"sided": sided, "right_angle": angle}
+                        for more in measured if "{pace}" in phrase or "{height}" in phrase else measured[:1]:
+                            filled = phrase.format(**some, **more).replace("the both ", "both ")
+                            out |= {plain(conjugate(filled, form)) for form in ("third", "gerund", "base")}
+                        if "{right_angle}" not in phrase:
+                            break
+                    if "{sided}" not in phrase:
+                        break
+    return out | joined_phrases()
+
+
+def joined_phrases() -> set[str]:
+    """All phrases that two acts have together."""
+    out = set()
+    joins = grammar().joins
+    for phrase in (p for table in (joins.same, joins.pairs) for rows in table.values() for p in rows):
+        for a, b in itertools.product(("left", "right", "both"), repeat=2):
+            values = {}
+            for name, side in (("a", a), ("b", b)):
+                hands = f"{side} hands" if side == "both" else f"{side} hand"
+                values |= {f"{name}_hands": hands, f"{name}_arms": hands.replace("hand", "arm"), f"{name}_side": side}
+                values |= {f"{name}_sided": "with both hands" if side == "both" else f"{side}-handed"}
+            filled = phrase.format(**values).replace("the both ", "both ")
+            out |= {plain(conjugate(filled, form)) for form in ("third", "gerund", "base")}
     return out
 
 
@@ -147,14 +172,14 @@ def known(text: str, trained: set[str]) -> bool:
     words = grammar()
     for after in (plain(a) for style in words.styles.values() for a in style.after if a):
         text = re.sub(rf"(^{after} | {after}$)", "", text).strip()
-    who = {w for subject in words.subjects for w in plain(subject).split()}
+    subjects = [*words.subjects, *(w for act in words.acts.values() for w in act.who)]
+    subjects += [w for style in words.styles.values() for w in style.who]
+    who = {w for subject in subjects for w in plain(subject).split()}
     who |= {w for style in words.styles.values() for adjective in style.adjective for w in plain(adjective).split()}
     who |= {"is", "an", "after", "starts", "walker", "runner", "actor", "fighter", "old", "young"}
     pieces = text.split()
-    begin = 0
-    while begin < len(pieces) and pieces[begin] in who:
-        begin += 1
-    return " ".join(pieces[begin:]) in trained
+    begins = itertools.takewhile(lambda k: k == 0 or pieces[k - 1] in who, range(len(pieces)))
+    return any(" ".join(pieces[begin:]) in trained for begin in begins)
 
 
 def test_no_evaluation_prompt_can_be_made_by_the_training_grammar():
@@ -202,7 +227,7 @@ def test_verbs_are_conjugated(verb, she, ing):
 
 
 def test_every_verb_of_the_grammar_has_its_forms():
-    verbs = {v for phrases in grammar().acts.values() for p in phrases for v in re.findall(r"<(\w+)>", p)}
+    verbs = {v for act in grammar().acts.values() for p in act.phrases for v in re.findall(r"<(\w+)>", p)}
     assert {gerund(v) for v in verbs} >= {"running", "spinning", "putting", "letting", "cutting", "jogging", "making"}
     assert not [v for v in verbs if re.fullmatch(r"[^aeiou]*[aeiou][bdgmnpt]", v) and gerund(v)[len(v)] != v[-1]]
 

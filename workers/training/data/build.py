@@ -157,7 +157,7 @@ class FolderWriter:
                     steps=walked.steps,
                     side=acts[0].side,
                 ),
-                captions=captions(acts, name, 2 if spliced else 3),
+                captions=captions(acts, name, 2 if spliced and len(acts) == 1 else 3),
             )
         )
         self.frames += len(features)

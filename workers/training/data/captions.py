@@ -17,18 +17,12 @@ from workers.training.data.describe import LOCOMOTION, Facts
 from workers.training.data.english import conjugate, number, sentence, with_adjective
 
 _FIELD = re.compile(r"{(\w+)}")
-_PRONOUNS = {
-    "a man": "his",
-    "a guy": "his",
-    "he": "his",
-    "a woman": "her",
-    "a lady": "her",
-    "she": "her",
-    "the man": "his",
-    "the woman": "her",
-}
+_HIS = re.compile(r"\b(he|man|guy|boy|gentleman|grandfather|fellow|schoolboy|sportsman)\b")
+_HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b")
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
+RIGHT_ANGLE = 16.0  # degrees about 90 within which a turn is called a right angle
+NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, MANNER_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35, 0.35
 
 
 @dataclass(frozen=True)
@@ -38,6 +32,44 @@ class Style:
     after: tuple[str, ...]
     adjective: tuple[str, ...]
     sentence: tuple[str, ...]
+    who: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Words:
+    """How an act is said.
+
+    Attributes:
+        phrases: verb phrases.
+        nouns: without a verb ("a wave of the left hand").
+        whole: sentences whose subject is the limb ("the left hand goes up").
+        who: subjects that go with the act ("a runner").
+        manners: verb phrases that say a style as well, by style ("trudges").
+    """
+
+    phrases: tuple[str, ...]
+    nouns: tuple[str, ...]
+    whole: tuple[str, ...]
+    who: tuple[str, ...]
+    manners: dict[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Joins:
+    """How acts follow each other.
+
+    Attributes:
+        two, three: frames for any acts.
+        halt: frames for an act in place after travel.
+        same: by act, for two sides of one act.
+        pairs: by `first-second`, for two acts that have words of their own together.
+    """
+
+    two: tuple[str, ...]
+    three: tuple[str, ...]
+    halt: tuple[str, ...]
+    same: dict[str, tuple[str, ...]]
+    pairs: dict[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -53,13 +85,12 @@ class Grammar:
     """`grammar.toml`."""
 
     subjects: tuple[str, ...]
-    acts: dict[str, tuple[str, ...]]
+    acts: dict[str, Words]
     details: dict[str, Detail]
     pace: dict[str, tuple[str, ...]]
     height: dict[str, tuple[str, ...]]
     styles: dict[str, Style]
-    two: tuple[str, ...]
-    three: tuple[str, ...]
+    joins: Joins
 
 
 @lru_cache(maxsize=1)
@@ -68,19 +99,29 @@ def grammar() -> Grammar:
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("grammar.toml").read_text("utf-8"))
     return Grammar(
         subjects=tuple(table["subjects"]),
-        acts={act: tuple(rows["phrases"]) for act, rows in table["acts"].items()},
+        acts={act: _words(rows, table["manners"].get(act, {})) for act, rows in table["acts"].items()},
         details={
             name: Detail(tuple(rows["clause"]), tuple(rows["sentence"])) for name, rows in table["details"].items()
         },
         pace={name: tuple(rows) for name, rows in table["pace"].items()},
         height={name: tuple(rows) for name, rows in table["height"].items()},
         styles={
-            name: Style(tuple(rows["after"]), tuple(rows["adjective"]), tuple(rows["sentence"]))
+            name: Style(**{key: tuple(rows[key]) for key in ("after", "adjective", "sentence", "who")})
             for name, rows in table["styles"].items()
         },
-        two=tuple(table["join"]["two"]),
-        three=tuple(table["join"]["three"]),
+        joins=_joins(table["join"]),
     )
+
+
+def _words(rows: dict[str, Any], manners: dict[str, Any]) -> Words:
+    lists = {key: tuple(rows.get(key, ())) for key in ("phrases", "nouns", "whole", "who")}
+    return Words(**lists, manners={style: tuple(row["phrases"]) for style, row in manners.items()})
+
+
+def _joins(rows: dict[str, Any]) -> Joins:
+    frames = {key: tuple(rows[key]) for key in ("two", "three", "halt")}
+    keyed = {key: {name: tuple(phrases) for name, phrases in rows[key].items()} for key in ("same", "pairs")}
+    return Joins(**frames, **keyed)
 
 
 def seeded(*parts: object) -> random.Random:
@@ -123,9 +164,15 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
             out["steps"] = number(facts.gait.steps, words=words)
         if facts.act == "turn":
             out["degrees"] = str(round(abs(facts.gait.turn) / 10) * 10)
+            if abs(abs(facts.gait.turn) - 90) < RIGHT_ANGLE:
+                out["right_angle"] = rng.choice(
+                    ["a right angle", "90 degrees", "ninety degrees", "a quarter of a circle"]
+                )
     if facts.side:
         hands = f"{facts.side} hands" if facts.side == "both" else f"{facts.side} hand"
-        out |= {"side": facts.side, "it": "them" if facts.side == "both" else "it"}
+        both = facts.side == "both"
+        out |= {"side": facts.side, "it": "them" if both else "it", "is": "are" if both else "is"}
+        out |= {"sided": "with both hands" if both else rng.choice([f"{facts.side}-handed", f"with the {facts.side}"])}
         out |= {"arms": hands.replace("hand", "arm"), "wrists": hands, "hands": hands}
         out |= {"hands_his": hands if facts.side == "both" else f"{pronoun} {hands}"}
         if facts.side != "both":
@@ -197,29 +244,48 @@ class _Voice:
         return f"{who} is" if self.form == "progressive" else who
 
 
-def _voice(rng: random.Random, *, plain: bool, adjective: str = "") -> _Voice:
-    """`plain` leaves out captions without a subject ("walking forward")."""
+def _pronoun(subject: str) -> str:
+    return "his" if _HIS.search(subject) else "her" if _HER.search(subject) else "their"
+
+
+def _voice(rng: random.Random, *, plain: bool, adjective: str = "", who: Sequence[str] = ()) -> _Voice:
+    """`plain` leaves out captions without a subject ("walking forward"); `who` are more subjects that fit."""
     draw = rng.random()
-    subject = rng.choice(grammar().subjects)
-    pronoun = _PRONOUNS.get(subject, "their")
     if not plain and draw < 0.3 and not adjective:
         return _Voice("", "base" if draw < 0.15 else "gerund", rng.choice(["the", "their"]))
-    if adjective and subject in _UNADJECTIVED:
-        subject, pronoun = "a person", "their"
-    return _Voice(with_adjective(subject, adjective), "progressive" if draw > 0.82 else "third", pronoun)
+    subject = rng.choice(who if who and rng.random() < WHO_SHARE else grammar().subjects)
+    if adjective and (subject in _UNADJECTIVED or " " not in subject):
+        subject = "a person"
+    return _Voice(with_adjective(subject, adjective), "progressive" if draw > 0.82 else "third", _pronoun(subject))
+
+
+def _voice_of(subject: str, rng: random.Random) -> _Voice:
+    return _Voice(subject, "progressive" if rng.random() < 0.2 else "third", _pronoun(subject))
 
 
 def _phrase(facts: Facts, rng: random.Random, pronoun: str) -> str:
     """A verb phrase of the act, filled; verbs still in angle brackets. After a pace it ends in `and`: see `_with`."""
-    phrases = list(grammar().acts[facts.act])
+    words = grammar().acts[facts.act]
+    manners = words.manners.get(facts.style, ())
     values = fields(facts, rng, pronoun)
-    rng.shuffle(phrases)
-    for phrase in phrases:
+    if manners and rng.random() < MANNER_SHARE:
+        return rng.choice(manners) + _repeated(facts, rng)
+    filled, phrase = _filled(words.phrases, values, rng)
+    text = filled + _repeated(facts, rng)
+    return text + " and" if phrase.endswith("{pace}") else text
+
+
+def _filled(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -> tuple[str, str]:
+    """One of the phrases whose fields were all measured, filled, and as it stands in the grammar."""
+    for phrase in rng.sample(phrases, len(phrases)):
         filled = _fill(phrase, values)
         if filled is not None:
-            text = filled + (_times(facts.repeats, rng) if facts.repeats > 1 else "")
-            return text + " and" if phrase.endswith("{pace}") else text
-    raise AssertionError(f"no phrase of {facts.act} without fields")
+            return filled, phrase
+    raise AssertionError(f"no phrase without fields among {phrases[:3]}")
+
+
+def _repeated(facts: Facts, rng: random.Random) -> str:
+    return _times(facts.repeats, rng) if facts.repeats > 1 else ""
 
 
 def _with(phrase: str, after: str) -> str:
@@ -236,14 +302,31 @@ def _times(repeats: int, rng: random.Random) -> str:
 def short_caption(facts: Facts, rng: random.Random) -> str:
     """A few words: the act, and its style as an adverb, an adjective or not at all."""
     style = grammar().styles[facts.style]
+    words = grammar().acts[facts.act]
+    if verbless := _verbless(facts, rng):
+        return _loosen(_with(verbless, rng.choice(style.after)), rng)
     draw = rng.random()
     adjective = rng.choice(style.adjective) if style.adjective and draw < 0.3 else ""
-    voice = _voice(rng, plain=False, adjective=adjective)
+    if style.who and not adjective and draw < 0.45:
+        voice = _voice_of(rng.choice(style.who), rng)
+        return _loosen(_with(voice.clause(_phrase(facts, rng, voice.pronoun)), ""), rng)
+    voice = _voice(rng, plain=False, adjective=adjective, who=words.who)
     text = voice.clause(_phrase(facts, rng, voice.pronoun))
     after = "" if adjective or draw > 0.88 else rng.choice(style.after)
     if after and rng.random() < 0.12 and voice.subject:
         return sentence(f"{after}, {_with(text, '')}")
     return _loosen(_with(text, after), rng)
+
+
+def _verbless(facts: Facts, rng: random.Random) -> str | None:
+    """Sometimes a caption without a person: a noun phrase, or the limb as its subject."""
+    words = grammar().acts[facts.act]
+    draw = rng.random()
+    phrases = words.nouns if draw < NOUN_SHARE else words.whole if draw < NOUN_SHARE + WHOLE_SHARE else ()
+    if not phrases or facts.repeats > 1:
+        return None
+    text, _ = _filled(phrases, fields(facts, rng, "the"), rng)
+    return conjugate(text, "base" if facts.side == "both" else "third")
 
 
 def long_caption(facts: Facts, rng: random.Random) -> str:
@@ -277,24 +360,53 @@ _AGAIN = ("In other words,", "Seen from outside,", "That is to say,", "To put it
 def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     """Two or three acts in their order, with verbs of each."""
     g = grammar()
-    voice = _voice(rng, plain=False)
     same = len({facts.style for facts in parts}) == 1
-    phrases = []
-    for facts in parts:
+    style = g.styles[parts[0].style]
+    voice = _voice(rng, plain=False, who=style.who + g.acts[parts[0].act].who if same else ())
+    text = _pair(parts, rng) if len(parts) == 2 and rng.random() < PAIR_SHARE else None
+    if text is None:
+        text = _framed(parts, rng, voice, same=same)
+    after = rng.choice(style.after) if same and rng.random() < 0.6 else ""
+    return _loosen(f"{_spoken(text, voice)} {after}", rng)
+
+
+def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
+    """The words that two acts have together ("slows to a walk"); None where they have none."""
+    joins, (first, second) = grammar().joins, parts
+    phrases = joins.pairs.get(f"{first.act}-{second.act}", ())
+    if first.act == second.act:
+        phrases = joins.same.get(first.act, ())
+    if not phrases:
+        return None
+    values = {f"{name}_{key}": value for name, facts in zip("ab", parts, strict=True)
+              for key, value in fields(facts, rng, "the").items()}  # fmt: skip
+    return _filled(phrases, values, rng)[0]
+
+
+def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: bool) -> str:
+    """A frame with the phrase of each act in its place."""
+    g = grammar()
+    frames = g.joins.two if len(parts) == 2 else g.joins.three
+    if len(parts) == 2 and parts[0].act in LOCOMOTION and parts[1].act not in LOCOMOTION:
+        frames += g.joins.halt
+    text = rng.choice([f for f in frames if voice.subject or "{who}" not in f]).replace("{who}", voice.again)
+    for name, facts in zip("abc", parts, strict=False):
         after = rng.choice(g.styles[facts.style].after) if not same and rng.random() < 0.6 else ""
-        phrases.append(_with(_phrase(facts, rng, voice.pronoun), after))
-    frames = g.two if len(parts) == 2 else g.three
-    frame = rng.choice([f for f in frames if voice.subject or "{who}" not in f])
-    text = frame.replace("{who}", voice.again)
-    for name, phrase in zip("abc", phrases, strict=False):
-        text = text.replace(f"{{{name}}}", phrase).replace(f"{{{name}_ing}}", conjugate(phrase, "gerund"))
-    after = rng.choice(g.styles[parts[0].style].after) if same and rng.random() < 0.7 else ""
-    if text.startswith(("after ", "having ")):  # the subject stands behind the first act
-        form = "gerund" if voice.form == "progressive" else voice.form
-        return _loosen(f"{conjugate(text, form)} {after}", rng)
-    if text.startswith("first ") and voice.subject:
-        return _loosen("first " + voice.clause(text.removeprefix("first ")) + f" {after}", rng)
-    return _loosen(f"{voice.clause(text)} {after}", rng)
+        phrase = _with(_phrase(facts, rng, voice.pronoun), after)
+        for ending, form in (("", None), ("_ing", "gerund"), ("_base", "base")):
+            said = conjugate(phrase, form) if form else phrase
+            text = text.replace(f"{{{name}{ending}}}", said)
+    return text
+
+
+def _spoken(text: str, voice: _Voice) -> str:
+    """Put the subject where it belongs, and verbs into its form."""
+    if text.startswith(("after ", "having ", "once ", "when ")):  # the subject stands behind the first act
+        return conjugate(text, "gerund" if voice.form == "progressive" else voice.form)
+    for opening in ("first ", "initially "):
+        if text.startswith(opening) and voice.subject:
+            return opening + voice.clause(text.removeprefix(opening))
+    return voice.clause(text)
 
 
 def _loosen(text: str, rng: random.Random) -> str:

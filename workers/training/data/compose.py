@@ -46,6 +46,8 @@ SEQUENCE_WEIGHTS: dict[str, float] = {
     "call": 0.2,
     "dance": 0.2,
 }
+SIDED = ("wave", "raise", "turn")
+OTHER_SIDE_SHARE = 0.15  # how often one of these is followed by itself with another side
 _STRAIGHT = ("walk", "run", "walk_back")
 _CANDIDATES = 8  # clips among which the best seam is taken
 _WORST_SEAM = 0.6  # mean squared metres, see splice.seam_costs; a bow into a run has 0.4 and looks well
@@ -62,7 +64,7 @@ class Counts:
 
 
 COUNTS: dict[str, Counts] = {
-    "train": Counts(pairs=2400, triples=600, retimed=2000),
+    "train": Counts(pairs=3400, triples=500, retimed=2200),
     "val": Counts(pairs=60, triples=10, retimed=0),
     "test": Counts(pairs=200, triples=40, retimed=0),
 }
@@ -179,8 +181,11 @@ class Composer:
     def _draw_acts(self, rng: random.Random, count: int) -> list[str]:
         acts: list[str] = []
         while len(acts) < count:
+            if acts and acts[-1] in SIDED and rng.random() < OTHER_SIDE_SHARE:
+                acts.append(acts[-1])
+                continue
             act = rng.choices(self.acts, [SEQUENCE_WEIGHTS[a] for a in self.acts])[0]
-            if not acts or act != acts[-1] or act in ("wave", "raise", "turn"):
+            if not acts or act != acts[-1] or act in SIDED:
                 acts.append(act)
         return acts
 
@@ -293,6 +298,8 @@ def _stretch(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[
         return None
     x, y = hold
     joints = whole[: y + 1]
+    if part.facts.act == "raise" and target > len(whole):
+        return held_longer(whole, x, y, target - len(whole)), (part,) * 2, 1
     if target < len(whole):  # skip a piece of the hold
         i, j, cost = best_cut(part, range(x, x + max((y - x) // 3, 1)), part, range(max(x, y - (y - x) // 3), y + 1))
         joints = whole[: i + 1]
@@ -306,6 +313,23 @@ def _stretch(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[
         joints = join_clips(joints, whole[j : i + 1], FPS)
     joints = np.concatenate([joints[:-1], join_clips(joints[-2:], whole[i:], FPS)[1:]])
     return joints[:LIMIT], (part,) * 2, 1
+
+
+def held_longer(joints: Array, first: int, last: int, more: int) -> Array:
+    """Slow down the frames first..last of (T, 22, 3) so that they take `more` frames longer; gives (T + more, 22, 3).
+
+    Loops of a held hand would swing it to and fro, which is a wave. Time runs at its own speed at both ends and slows
+    down within some frames, so that the rise before and the fall after are as captured.
+    """
+    steps = last - first + more
+    ends = np.minimum(np.arange(steps), np.arange(steps)[::-1])
+    near = np.clip(1 - ends / 5, 0, 1)
+    slow = (last - first - near.sum()) / (steps - near.sum())
+    at = first + np.concatenate([[0.0], np.cumsum(slow + (1 - slow) * near)])
+    below = np.clip(at.astype(int), first, last - 1)
+    part = (at - below)[:, None, None]
+    held = (1 - part) * joints[below] + part * joints[below + 1]
+    return np.concatenate([joints[:first], held, joints[last + 1 :]])
 
 
 def _hold(part: Part, a: int, b: int) -> tuple[int, int] | None:

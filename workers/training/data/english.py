@@ -27,6 +27,12 @@ _DOUBLE = {
     "flap",
     "bid",
     "begin",
+    "leg",
+    "wag",
+    "set",
+    "strut",
+    "slog",
+    "skip",
 }
 _IRREGULAR = {"be": "is", "have": "has"}
 _WORDS = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
