@@ -28,7 +28,7 @@ from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.generate import Generator, Settings
 from workers.hgm3.obedience import measure
-from workers.hgm3.train import TrainOptions, train_stage
+from workers.hgm3.train import TOKENS, TrainOptions, train_stage
 from workers.training.budget import Budget
 from workers.training.checks.prompts import evaluation_prompts
 from workers.training.checks.rates import mean_quality
@@ -44,7 +44,11 @@ def train_variant(data: Path, bundle: str, folder: Path, config: HGM3Config, opt
     """Train one masked transformer beside the bundle's other parts; write its bundle and return all its numbers."""
     shutil.rmtree(folder, ignore_errors=True)
     take_apart(find_bundle(bundle), folder / "run")
+    encoded = folder.parent / TOKENS  # of the tokenizer that all variants share
+    if encoded.is_file():
+        shutil.copy(encoded, folder / "run")
     found = train_stage("masked", replace(options, run=folder / "run", config=config))
+    shutil.copy(folder / "run" / TOKENS, encoded)
     assemble(data, folder / "run", folder / "bundle", config)
     return found
 

@@ -3,7 +3,8 @@
     python -m workers.hgm3.obedience models/hgm3-starter --seeds 3 -o report
 
 With `--captions DATA` the captions of that prepared folder's validation clips are asked for instead: what is chosen by
-looking at numbers (steps, guidance, temperature) is chosen there, never on the evaluation prompts.
+looking at numbers (steps, guidance, temperature) is chosen there, never on the evaluation prompts. `--blind` asks for a
+second set of evaluation prompts, by an author who knew neither the training captions nor the first set.
 
 The checker (`workers/training/checks`) reads joints only and knows nothing of the model; its own rate on real clips
 belongs beside every number here. Motions are judged as users get them: feet cleaned, rotations solved.
@@ -207,6 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="one of the decoding settings, guidance=3"
     )
     parser.add_argument("--captions", type=Path, metavar="DATA", help="a folder: its validation captions instead")
+    parser.add_argument("--blind", action="store_true", help="the second set of prompts, by another author")
     parser.add_argument("--every", type=int, default=1, help="only each K-th prompt, for a quick look")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, help="folder of report.json and report.md")
@@ -215,7 +217,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     text = generator.bundle.manifest.text
     if text is None:
         raise InvalidBundle("does not say how it reads prompts", where=str(generator.bundle.path))
-    prompts = evaluation_prompts() if chosen.captions is None else validation_prompts(chosen.captions)
+    prompts = validation_prompts(chosen.captions) if chosen.captions else evaluation_prompts(blind=chosen.blind)
     prompts = prompts[:: chosen.every]
     report = measure(
         generator,

@@ -182,9 +182,10 @@ def known(text: str, trained: set[str]) -> bool:
     return any(" ".join(pieces[begin:]) in trained for begin in begins)
 
 
-def test_no_evaluation_prompt_can_be_made_by_the_training_grammar():
+@pytest.mark.parametrize("blind", [False, True])
+def test_no_evaluation_prompt_can_be_made_by_the_training_grammar(blind):
     trained = trained_phrases()
-    for prompt in evaluation_prompts():
+    for prompt in evaluation_prompts(blind=blind):
         text = plain(prompt.text)
         assert not known(text, trained), prompt.text
         if len(prompt.expected) > 1:
@@ -204,6 +205,13 @@ def test_evaluation_prompts_are_two_hundred_and_all_different():
     texts = [plain(p.text) for p in evaluation_prompts()]
     assert len(set(texts)) == 200
     assert sum(p.separate for p in evaluation_prompts()) == 16
+
+
+def test_the_second_set_repeats_nothing_of_the_first():
+    first = {plain(p.text) for p in evaluation_prompts()}
+    second = [plain(p.text) for p in evaluation_prompts(blind=True)]
+    assert len(set(second)) == len(second) > 150
+    assert not first & set(second)
 
 
 # -- English -----------------------------------------------------------------------------------------------------------

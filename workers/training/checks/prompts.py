@@ -1,4 +1,4 @@
-"""The evaluation prompts and what each motion must do (`prompts.toml`)."""
+"""The evaluation prompts and what each motion must do: `prompts.toml`, and `prompts_blind.toml` by another author."""
 
 from __future__ import annotations
 
@@ -33,10 +33,15 @@ class EvaluationPrompt:
         return len(self.expected) == 1 and self.expected[0].side != ""
 
 
-@lru_cache(maxsize=1)
-def evaluation_prompts() -> tuple[EvaluationPrompt, ...]:
-    """All 200, in the order of the file."""
-    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("prompts.toml").read_text("utf-8"))
+@lru_cache(maxsize=2)
+def evaluation_prompts(*, blind: bool = False) -> tuple[EvaluationPrompt, ...]:
+    """The 200 that the bars are set on, in the order of their file.
+
+    Args:
+        blind: those of an author who knew neither the training captions nor the 200, by which nothing was ever chosen.
+    """
+    name = "prompts_blind.toml" if blind else "prompts.toml"
+    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
     return tuple(
         EvaluationPrompt(
             text, group["name"], tuple(Expectation(**row) for row in group["expect"]), group.get("separate", False)
