@@ -13,6 +13,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from shared.nn.packed import PackedLinear, can_pack, pack_linears
+
 SEQUENCE_MULTIPLE = 16
 """Sequences padded to a multiple of this give the same bits however much padding follows (see `pad_length`)."""
 
@@ -44,7 +46,8 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
 
 
 def _attention(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, rate: float) -> Tensor:
-    """Scaled dot-product attention written out, for CPUs: queries (B, H, Q, D), keys and values (B, H, S, D).
+    """Scaled dot-product attention written out, for CPUs: queries (B, H, Q, D), keys and values (B, H, S, D), `mask`
+    (B or 1, 1, Q or 1, S).
 
     At 64 rows torch's fused CPU kernel takes twice as long forward, and a third of a training step backward.
     """
@@ -53,7 +56,8 @@ def _attention(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, r
     bias = query.new_zeros(1, 1, 1)
     if mask is not None:
         bias = torch.zeros(mask.shape, dtype=query.dtype, device=mask.device).masked_fill(~mask, -1e30)
-        bias = bias.expand(batch, heads, size, keys).reshape(batch * heads, size, keys)
+        queries = mask.shape[2]  # 1 where all of them read the same
+        bias = bias.expand(batch, heads, queries, keys).reshape(batch * heads, queries, keys)
     query, key, value = (x.reshape(batch * heads, -1, width) for x in (query, key, value))
     scores = torch.baddbmm(bias, query, key.transpose(1, 2), alpha=width**-0.5)  # (B · H, Q, S)
     if rate > 0 or torch.is_grad_enabled():
@@ -100,7 +104,8 @@ class Block(nn.Module):
         self.norm_first = norm_first
         self.dropout = dropout
         self.attention = Attention(width, heads, attention_dropout)
-        self.wide = nn.Linear(width, feedforward)
+        self.wide: nn.Module = nn.Linear(width, feedforward)
+        self.gelu: nn.Module = nn.GELU()
         self.narrow = nn.Linear(feedforward, width)
         self.norm1 = nn.LayerNorm(width)
         self.norm2 = nn.LayerNorm(width)
@@ -113,8 +118,14 @@ class Block(nn.Module):
         x = self.norm1(x[:, :rows] + self._drop(self.attention(x, mask, rows)))
         return self.norm2(x + self._feedforward(x))
 
+    def pack(self, dtype: torch.dtype) -> None:
+        """Pack the matrices for inference on a CPU, GELU into the first of the feed-forward."""
+        if isinstance(self.wide, nn.Linear):
+            self.wide, self.gelu = PackedLinear(self.wide, dtype, many=True, gelu=True), nn.Identity()
+        pack_linears(self, dtype, many=True)
+
     def _feedforward(self, x: Tensor) -> Tensor:
-        return self._drop(self.narrow(self._drop(F.gelu(self.wide(x)))))
+        return self._drop(self.narrow(self._drop(self.gelu(self.wide(x)))))
 
     def _drop(self, x: Tensor) -> Tensor:
         return dropout(x, self.dropout, training=self.training)
@@ -158,9 +169,13 @@ class Transformer(nn.Module):
         return self.norm(self.blocks[-1](x, mask, rows)).float()
 
     def lower(self, dtype: torch.dtype) -> None:
-        """Cast to `dtype` for inference; what goes in and comes out stays float32."""
+        """Cast to `dtype` for inference, for good; what goes in and comes out stays float32."""
         self.to(dtype)
         self.dtype = dtype
+        if can_pack(self):
+            for block in self.blocks:
+                if isinstance(block, Block):
+                    block.pack(dtype)
 
 
 def sinusoidal_positions(size: int, width: int) -> Tensor:

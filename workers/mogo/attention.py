@@ -82,8 +82,9 @@ class RelativeAttention(nn.Module):
             distance: (S, slots) int64 relative distance of each slot, -1 where nothing may be read.
         """
         sessions, lanes, heads, width = query.shape
-        about = (query + self.v.view(heads, width)).permute(2, 0, 1, 3).reshape(heads, sessions * lanes, width)
-        positions = torch.bmm(about, terms).view(heads, sessions, lanes, -1).permute(1, 2, 0, 3)  # (S, L, H, D + 1)
+        about = (query + self.v.view(heads, width)).transpose(1, 2)  # (S, H, L, w / H)
+        # session by session: with more rows some processors' products add in another order
+        positions = torch.stack([torch.bmm(each, terms) for each in about]).transpose(1, 2)  # (S, L, H, D + 1)
         index = distance.clamp(min=0)[:, None, None].expand(-1, lanes, heads, -1)
         bias = positions.gather(-1, index).masked_fill((distance < 0)[:, None, None], _HIDDEN)  # (S, L, H, slots)
         content = (query + self.u.view(heads, width)) * width**-0.5
