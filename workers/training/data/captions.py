@@ -119,9 +119,8 @@ def _words(rows: dict[str, Any], manners: dict[str, Any]) -> Words:
 
 
 def _joins(rows: dict[str, Any]) -> Joins:
-    frames = {key: tuple(rows[key]) for key in ("two", "three", "halt")}
-    keyed = {key: {name: tuple(phrases) for name, phrases in rows[key].items()} for key in ("same", "pairs")}
-    return Joins(**frames, **keyed)
+    same, pairs = ({name: tuple(p) for name, p in rows[key].items()} for key in ("same", "pairs"))
+    return Joins(tuple(rows["two"]), tuple(rows["three"]), tuple(rows["halt"]), same, pairs)
 
 
 def seeded(*parts: object) -> random.Random:
