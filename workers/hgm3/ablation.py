@@ -28,10 +28,11 @@ from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.generate import Generator, Settings
 from workers.hgm3.obedience import measure
-from workers.hgm3.train import TOKENS, TrainOptions, train_stage
+from workers.hgm3.train import TrainOptions, train_stage
 from workers.training.budget import Budget
 from workers.training.checks.prompts import evaluation_prompts
 from workers.training.checks.rates import mean_quality
+from workers.training.motions import TOKENS
 
 DECODINGS = {
     "hierarchical": Settings(motion_steps=2, action_steps=5),

@@ -15,9 +15,10 @@ from torch import Tensor, nn
 from shared.bundles import Bundle, BundleWriter, TextSpec
 from shared.errors import InvalidBundle
 from shared.motion.features import layout
+from shared.nn.motion_tokenizer import biased_std
 from workers.hgm3.config import HGM3Config, named_config
 from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
-from workers.hgm3.tokenizer import Tokenizer, biased_std
+from workers.hgm3.tokenizer import Tokenizer
 
 MODEL = "hgm3"
 NOT_STORED = ("quantizer.sums", "mean", "std")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, Literal, Self, TypeVar, get_type_hints
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, Self
 
+from shared.configs import build_config
 from shared.errors import InvalidInput
-
-T = TypeVar("T")
+from workers.training.optimisation import StageConfig
 
 
 @dataclass(frozen=True)
@@ -96,22 +96,6 @@ class InferenceConfig:
 
 
 @dataclass(frozen=True)
-class StageConfig:
-    """Optimisation of one training stage."""
-
-    batch: int
-    learning_rate: float = 2e-4
-    warmup_steps: int = 2000
-    warmup_share: float = 0.05  # warm-up = the smaller of the two
-    decay: Literal["constant", "cosine"] = "constant"
-    final: float = 0.02  # where the cosine ends, as a share of the learning rate
-    weight_decay: float = 1e-5
-    betas: tuple[float, float] = (0.9, 0.99)
-    clip: float = 1.0
-    ema: float = 0.999  # of the weights that are validated and shipped
-
-
-@dataclass(frozen=True)
 class HGM3Config:
     """Everything that decides shapes and training of one bundle."""
 
@@ -155,20 +139,7 @@ class HGM3Config:
         Raises:
             InvalidInput: an unknown field.
         """
-        return _build(cls, values, "config")
-
-
-def _build(kind: type[T], values: Mapping[str, Any], where: str) -> T:
-    hints = get_type_hints(kind)
-    unknown = set(values) - {f.name for f in fields(kind)}  # pyright: ignore[reportArgumentType]
-    if unknown:
-        raise InvalidInput(f"unknown fields: {', '.join(sorted(unknown))}", where=where)
-    built: dict[str, Any] = {}
-    for name, value in values.items():
-        if is_dataclass(hints[name]) and isinstance(value, Mapping):
-            value = _build(hints[name], value, f"{where}.{name}")
-        built[name] = tuple(value) if isinstance(value, list) else value
-    return kind(**built)
+        return build_config(cls, values)
 
 
 PAPER = HGM3Config()

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
+from shared.nn.convolution import frame_mask
 from shared.nn.masking import remaining_masks
 from shared.nn.sampling import guide, sample_top_k, uniform
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.model import ACTION, MOTION, SPECIFIC, MaskedTransformer, ResidualTransformer
-from workers.hgm3.tokenizer import frame_mask
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
 """What random numbers are drawn for; see `shared.nn.sampling.uniform`."""

@@ -11,16 +11,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from shared.nn.convolution import frame_mask
 from shared.nn.ema import update_average, warm_momentum
 from shared.nn.losses import ranking_loss, token_losses
 from shared.nn.masking import easy_to_hard_mask, mask_counts
 from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import PHASES, CaptionData, TokenData
+from workers.hgm3.data import CaptionData
 from workers.hgm3.model import LEVELS, GraphBatch, LossPredictor, MaskedTransformer
-from workers.hgm3.tokenizer import frame_mask
 from workers.training.data.manifest import Clip
 from workers.training.data.sampling import sampling_weights
 from workers.training.loop import StepContext
+from workers.training.motions import TokenData
 
 
 def pieces_of(lengths: Tensor) -> list[Tensor]:
@@ -134,7 +135,7 @@ class MaskedStage:
     def sample(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Sample:
         """Draw phase, caption, τ, noise, drop and level for each clip."""
         device = self.tokens.tokens.device
-        phases = torch.from_numpy(rng.integers(PHASES, size=len(clips))).to(device)
+        phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
         captions = self.captions.choose(clips, rng)
         return Sample(

@@ -10,14 +10,15 @@ import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from shared.nn.convolution import frame_mask
 from shared.nn.losses import token_losses
 from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import PHASES, CaptionData, TokenData
+from workers.hgm3.data import CaptionData
 from workers.hgm3.model import LengthEstimator, ResidualTransformer
 from workers.hgm3.stage_masked import Pairs, pieces_of
-from workers.hgm3.tokenizer import frame_mask
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
+from workers.training.motions import TokenData
 
 
 class ResidualStage:
@@ -78,7 +79,7 @@ class ResidualStage:
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Summed loss, right answers and tokens (B,) of a batch; `level` None = one drawn a sample."""
         device = self.tokens.tokens.device
-        phases = torch.from_numpy(rng.integers(PHASES, size=len(clips))).to(device)
+        phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
         tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
         sentences = self.captions.sentences(self.captions.choose(clips, rng))
         drawn = rng.integers(1, self.module.levels, size=len(clips))

@@ -10,24 +10,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from safetensors.torch import load_file, save_file
 from torch import nn
 
 from shared.errors import InvalidInput
 from shared.nn import distributed
 from workers.hgm3.assembly import STAGES, same_config
 from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import CaptionData, MotionData, TokenData
+from workers.hgm3.data import CaptionData
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_residual import LengthStage, ResidualStage
-from workers.hgm3.stage_tokenizer import TokenizerStage, reconstruction_errors
 from workers.hgm3.tokenizer import Tokenizer
 from workers.training.budget import Budget
 from workers.training.loop import RunOptions, Stage, choose_device, start_process_group, train
+from workers.training.motions import MotionData, load_tokens
 from workers.training.parts import Part, load_part, save_part
 from workers.training.texts import CaptionTexts
-
-TOKENS = "tokens.safetensors"
+from workers.training.tokenizing import TokenizerStage
 
 
 @dataclass(frozen=True)
@@ -73,9 +71,9 @@ def train_stage(name: str, options: TrainOptions) -> dict[str, float]:
     if name == "tokenizer":
         return _train_tokenizer(options, data)
     texts = CaptionTexts.load(data.prepared)
-    captions = CaptionData.load(texts, options.config.condition, device)
+    captions = CaptionData.of(texts, options.config.condition, device)
     tokenizer = load_tokenizer(options, data)
-    tokens = load_tokens(options, tokenizer, data)
+    tokens = load_tokens(options.run, tokenizer, data)
     codebooks = tokenizer.quantizer.codebooks
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
@@ -124,17 +122,10 @@ def train_all(options: TrainOptions) -> dict[str, float]:
 
 
 def _train_tokenizer(options: TrainOptions, data: MotionData) -> dict[str, float]:
-    stage = TokenizerStage(options.config, data)
-    metrics = _run(stage, options)
-    metrics |= tokenizer_test(stage.module, options.config, data)
+    stage = TokenizerStage(options.config, data, Tokenizer(options.config))
+    metrics = _run(stage, options) | stage.test()
     _finish(stage.module, options, stage.name, metrics, data.sha256)
     return metrics
-
-
-def tokenizer_test(tokenizer: Tokenizer, config: HGM3Config, data: MotionData) -> dict[str, float]:
-    """Reconstruction errors on the captured test clips."""
-    errors = reconstruction_errors(tokenizer, config, data, data.originals("test"))
-    return {f"test/{name}": value for name, value in errors.items()}
 
 
 def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
@@ -151,28 +142,6 @@ def load_tokenizer(options: TrainOptions, data: MotionData) -> Tokenizer:
     return tokenizer.eval().requires_grad_(False)
 
 
-def load_tokens(options: TrainOptions, tokenizer: Tokenizer, data: MotionData) -> TokenData:
-    """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
-    file = options.run / TOKENS
-    key = f"{data.sha256}:{_fingerprint(tokenizer)}"
-    if file.is_file():
-        values = load_file(file, device=str(data.features.device))
-        if bytes(values.pop("key").cpu().numpy().tobytes()).decode() == key:
-            return TokenData(**{name: value.long() for name, value in values.items()})
-    tokens = TokenData.encode(tokenizer, data)
-    if distributed.rank() == 0:
-        values = {
-            "tokens": tokens.tokens.to(torch.int16),
-            "starts": tokens.starts.int(),
-            "lengths": tokens.lengths.int(),
-            "key": torch.tensor(list(key.encode()), dtype=torch.uint8),
-        }
-        temporary = file.with_suffix(".part")
-        save_file({name: value.cpu().contiguous() for name, value in values.items()}, temporary)
-        temporary.replace(file)
-    return tokens
-
-
 def _run(stage: Stage, options: TrainOptions) -> dict[str, float]:
     if options.warm:
         part = load_part(options.run / stage.name / "part")
@@ -186,8 +155,3 @@ def _finish(module: nn.Module, options: TrainOptions, name: str, metrics: dict[s
         budget = {"steps": options.budget.steps, "minutes": options.budget.minutes, "seed": options.seed}
         part = Part(module.state_dict(), options.config.to_dict(), metrics, data_sha256, budget)
         save_part(options.run / name / "part", part)
-
-
-def _fingerprint(tokenizer: Tokenizer) -> str:
-    total = sum(float(value.double().abs().sum()) for value in tokenizer.state_dict().values())
-    return f"{total:.6f}"

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Self
 
+from shared.configs import build_config
+from shared.errors import InvalidInput
 from shared.nn.scaled_quantizer import Scale
+from workers.training.optimisation import StageConfig
 
 
 @dataclass(frozen=True)
@@ -20,6 +25,7 @@ class TokenizerConfig:
     decay: float = 0.99
     level_dropout: float = 0.2
     scale: Scale = "elementwise"
+    feature_bias: float = 5.0  # as in HGM³
     commitment: float = 0.02  # β of eq. 6
     regularizer: float = 0.02  # γ of eq. 6; the paper gives none
     rotation_weight: float = 1.0  # the rest as in HGM³ (ours): see its `TokenizerConfig`
@@ -89,6 +95,22 @@ class MOGOConfig:
     transformer: TransformerConfig = TransformerConfig()
     depth: DepthConfig = DepthConfig()
     inference: InferenceConfig = InferenceConfig()
+    windows: tuple[int, ...] = (64,)  # frames; the tokenizer's training windows
+    train_tokenizer: StageConfig = StageConfig(batch=256, ema=0.0)
+    train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values, for manifests and checkpoints."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Rebuild a configuration from `to_dict`'s output (lists become tuples).
+
+        Raises:
+            InvalidInput: an unknown field.
+        """
+        return build_config(cls, values)
 
 
 PAPER = MOGOConfig()
@@ -100,6 +122,9 @@ STARTER = MOGOConfig(
     condition=ConditionConfig(text_width=384, noise=0.3),
     transformer=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384),
+    windows=(64, 64, 128),
+    train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
+    train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
 )
 
 TINY = MOGOConfig(
@@ -110,6 +135,20 @@ TINY = MOGOConfig(
     transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
     depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32),
     inference=InferenceConfig(window=16),
+    windows=(32,),
+    train_tokenizer=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),
+    train_transformer=StageConfig(batch=4, learning_rate=1e-3, ema=0.9),
 )
 
 CONFIGS: dict[str, MOGOConfig] = {c.name: c for c in (PAPER, STARTER, TINY)}
+
+
+def named_config(name: str) -> MOGOConfig:
+    """A configuration by name.
+
+    Raises:
+        InvalidInput: no such configuration.
+    """
+    if name not in CONFIGS:
+        raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(CONFIGS)}.")
+    return CONFIGS[name]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import torch.nn.functional as F
 from torch import Tensor
 
 from shared.nn.quantizer import Quantized
-from workers.hgm3.tokenizer import TokenizerLoss, tokenizer_loss
 from workers.mogo.config import MOGOConfig
 from workers.mogo.model import NOT_ASKED
 from workers.mogo.tokenizer import Tokenizer
+from workers.training.tokenizing import TokenizerLoss, tokenizer_loss
 
 
 def mosa_loss(
@@ -27,8 +26,7 @@ def mosa_loss(
         lengths: (B,) frames, or None where every window is full.
         fraction: of the budget used.
     """
-    alike: Any = tokenizer_loss  # reads only fields that both models' configurations and tokenizers have
-    loss, quantized = alike(model, config, features, lengths, fraction)
+    loss, quantized = tokenizer_loss(model, config, features, lengths, fraction)
     return replace(loss, total=loss.total + config.tokenizer.regularizer * model.quantizer.regularizer()), quantized
 
 

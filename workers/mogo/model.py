@@ -20,8 +20,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from shared.nn.convolution import frame_mask
 from shared.nn.transformer import Block, dropout, initialize, sinusoidal_positions
-from workers.hgm3.tokenizer import frame_mask
 from workers.mogo.attention import Reach, RelativeAttention
 from workers.mogo.config import DepthConfig, MOGOConfig, TransformerConfig
 

@@ -15,9 +15,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from shared.nn.convolution import ResidualBlock, frame_mask, masked
+from shared.nn.motion_tokenizer import MotionTokenizer
 from shared.nn.quantizer import Quantized
 from shared.nn.scaled_quantizer import ScaledQuantizer
-from workers.hgm3.tokenizer import ResidualBlock, frame_mask
 from workers.mogo.config import MOGOConfig, TokenizerConfig
 
 
@@ -77,11 +78,11 @@ class Encoder(nn.Module):
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """`mask` (B, 1, T) or None for full windows."""
-        x = _masked(F.relu(self.enter(x)), mask)
-        x = _masked(self.stage(x), mask)
+        x = masked(F.relu(self.enter(x)), mask)
+        x = masked(self.stage(x), mask)
         for block in self.blocks:
             x = block(x, mask)
-        return _masked(self.leave(x), mask)
+        return masked(self.leave(x), mask)
 
 
 class Decoder(nn.Module):
@@ -113,14 +114,11 @@ class Decoder(nn.Module):
         return x, DecoderState(tuple(pasts))
 
 
-class Tokenizer(nn.Module):
+class Tokenizer(MotionTokenizer):
     """Features in their own units to tokens and back; normalisation is inside."""
 
-    mean: Tensor  # (D,)
-    std: Tensor  # (D,), as the network uses it
-
     def __init__(self, config: MOGOConfig) -> None:
-        super().__init__()
+        super().__init__(config.features, frames_per_token=1)
         t = config.tokenizer
         self.config = t
         self.encoder = Encoder(config.features, t)
@@ -128,13 +126,11 @@ class Tokenizer(nn.Module):
         self.quantizer = ScaledQuantizer(
             t.levels, t.codes, t.code_width, decay=t.decay, dropout=t.level_dropout, scale=t.scale
         )
-        self.register_buffer("mean", torch.zeros(config.features))
-        self.register_buffer("std", torch.ones(config.features))
 
-    def set_statistics(self, mean: Tensor, std: Tensor) -> None:
-        """Mean and std (D,) as the network uses them."""
-        self.mean.copy_(mean)
-        self.std.copy_(std)
+    @property
+    def codebooks(self) -> Tensor:
+        """(V, K, d)."""
+        return self.quantizer.codebooks
 
     def forward(self, features: Tensor, lengths: Tensor | None = None) -> tuple[Tensor, Quantized]:
         """Reconstruct (training): features (B, T, D) in their own units, `lengths` (B,) in frames or None = all T.
@@ -169,19 +165,15 @@ class Tokenizer(nn.Module):
         """
         latent = self.quantizer.decode(tokens)  # (B, T, d)
         x, state = self.decoder(latent.transpose(1, 2), state)
-        return x.transpose(1, 2) * self.std + self.mean, state
+        return self.restore(x.transpose(1, 2)), state
 
     def _latent(self, features: Tensor, lengths: Tensor | None) -> tuple[Tensor, Tensor | None]:
         """Latents (B, T, d) and the mask (B, T) of frames that exist."""
         mask = None if lengths is None else frame_mask(lengths, features.shape[1])
-        x = ((features - self.mean) / self.std).transpose(1, 2)  # (B, D, T)
+        x = self.normalize(features).transpose(1, 2)  # (B, D, T)
         wide = None if mask is None else mask[:, None].to(x.dtype)
-        return self.encoder(_masked(x, wide), wide).transpose(1, 2), mask
+        return self.encoder(masked(x, wide), wide).transpose(1, 2), mask
 
 
 def _dilations(config: TokenizerConfig) -> list[int]:
     return [3**i for i in reversed(range(config.depth))]
-
-
-def _masked(x: Tensor, mask: Tensor | None) -> Tensor:
-    return x if mask is None else x * mask

@@ -29,6 +29,7 @@ from shared.nn import distributed
 from shared.nn.ema import WeightAverage
 from workers.training.budget import Budget, learning_rate
 from workers.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
+from workers.training.optimisation import StageConfig
 
 log = structlog.get_logger()
 
@@ -40,31 +41,6 @@ class StepContext:
     step: int
     fraction: float  # of the budget, 0 to 1: every schedule runs on it
     rng: np.random.Generator  # for the choice of data, seeded from (seed, step, rank)
-
-
-class OptimisationConfig(Protocol):
-    """The fields of a stage's configuration that the loop reads."""
-
-    @property
-    def batch(self) -> int: ...
-    @property
-    def learning_rate(self) -> float: ...
-    @property
-    def warmup_steps(self) -> int: ...
-    @property
-    def warmup_share(self) -> float: ...
-    @property
-    def decay(self) -> Any: ...
-    @property
-    def final(self) -> float: ...
-    @property
-    def weight_decay(self) -> float: ...
-    @property
-    def betas(self) -> tuple[float, float]: ...
-    @property
-    def clip(self) -> float: ...
-    @property
-    def ema(self) -> float: ...
 
 
 class Stage(Protocol):
@@ -81,7 +57,7 @@ class Stage(Protocol):
         ...
 
     @property
-    def optimisation(self) -> OptimisationConfig:
+    def optimisation(self) -> StageConfig:
         """Batch size, learning rate and the like."""
         ...
 

@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from shared.motion.features import HUMANML3D_263
+from shared.nn.motion_tokenizer import biased_std
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import PAPER, STARTER, TINY, named_config
 from workers.hgm3.data import CaptionData
-from workers.hgm3.joints import heading_joints, world_joints
 from workers.hgm3.model import (
     ACTION,
     MOTION,
@@ -23,7 +23,9 @@ from workers.hgm3.model import (
     MaskedTransformer,
     ResidualTransformer,
 )
-from workers.hgm3.tokenizer import Tokenizer, biased_std, tokenizer_loss
+from workers.hgm3.tokenizer import Tokenizer
+from workers.training.joints import heading_joints, world_joints
+from workers.training.tokenizing import tokenizer_loss
 
 from .conftest import made_up_texts, swinging, text_features
 
@@ -192,7 +194,7 @@ def test_the_residual_transformer_predicts_each_samples_own_level(compact: bool)
 
 def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
     texts = made_up_texts(12)
-    data = CaptionData.load(texts, TINY.condition, CPU)
+    data = CaptionData.of(texts, TINY.condition, CPU)
     from .conftest import graph
 
     for k in range(12):
@@ -206,7 +208,7 @@ def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
 
 def test_text_statistics_weigh_a_string_by_how_often_it_occurs() -> None:
     texts = made_up_texts(12)
-    data = CaptionData.load(texts, TINY.condition, CPU)
+    data = CaptionData.of(texts, TINY.condition, CPU)
     mean, std = data.statistics(range(6), TINY.condition)
     rows = texts.strings[texts.node_string[texts.node_level == 1]].astype("f8")
     torch.testing.assert_close(mean[ACTION], torch.from_numpy(rows.mean(0)).float(), atol=1e-5, rtol=1e-4)

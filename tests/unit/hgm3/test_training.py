@@ -13,17 +13,18 @@ from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
 from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import TINY, HGM3Config, named_config
-from workers.hgm3.data import CaptionData, MotionData, TokenData
+from workers.hgm3.data import CaptionData
 from workers.hgm3.generate import Generator, Request
 from workers.hgm3.stage_masked import MaskedStage
-from workers.hgm3.stage_tokenizer import TokenizerStage
 from workers.hgm3.tokenizer import Tokenizer
 from workers.hgm3.train import TrainOptions, train_all, train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, StepContext, train
+from workers.training.motions import MotionData, TokenData
 from workers.training.parts import load_part
 from workers.training.texts import CaptionTexts
+from workers.training.tokenizing import TokenizerStage
 
 from .conftest import text_features
 
@@ -42,7 +43,7 @@ def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedSta
     tokens = TokenData.encode(tokenizer, data)
     for start, length in zip(tokens.starts.flatten().tolist(), tokens.lengths.flatten().tolist(), strict=True):
         tokens.tokens[start : start + length, 0] = torch.arange(length) * 3 % config.tokenizer.codes  # can be learnt
-    captions = CaptionData.load(CaptionTexts.load(prepared), config.condition, CPU)
+    captions = CaptionData.of(CaptionTexts.load(prepared), config.condition, CPU)
     return MaskedStage(config, prepared.clips, tokens, captions)
 
 
@@ -127,7 +128,7 @@ def test_a_run_killed_and_resumed_ends_with_the_same_weights_bit_for_bit(
     def stage() -> TokenizerStage | MaskedStage:
         torch.manual_seed(0)
         if name == "tokenizer":
-            return TokenizerStage(TINY, MotionData.load(prepared.path, CPU))
+            return TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY))
         return masked_stage(prepared)
 
     def go(folder: Path, stage: TokenizerStage | MaskedStage, *, resume: bool = False) -> dict[str, torch.Tensor]:
@@ -158,17 +159,17 @@ def test_a_run_killed_and_resumed_ends_with_the_same_weights_bit_for_bit(
 
 def test_resuming_with_another_seed_is_refused(prepared: PreparedData, tmp_path: Path) -> None:
     run_options = RunOptions(tmp_path, Budget(steps=1), bf16=False, quiet=True)
-    train(TokenizerStage(TINY, MotionData.load(prepared.path, CPU)), run_options, {})
+    train(TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY)), run_options, {})
     with pytest.raises(InvalidInput, match="another stage, seed or configuration"):
         train(
-            TokenizerStage(TINY, MotionData.load(prepared.path, CPU)),
+            TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY)),
             replace(run_options, resume=True, seed=1, budget=Budget(steps=2)),
             {},
         )
 
 
 def test_the_tokenizer_learns(prepared: PreparedData, tmp_path: Path) -> None:
-    stage = TokenizerStage(TINY, MotionData.load(prepared.path, CPU))
+    stage = TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY))
     before = stage.validate()["local_mm"]
     train(stage, RunOptions(tmp_path, Budget(steps=120), bf16=False, quiet=True, validate_times=1), {})
     assert stage.validate()["local_mm"] < 0.8 * before

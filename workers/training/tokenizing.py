@@ -1,21 +1,131 @@
-"""Training stage of the RVQ-VAE tokenizer."""
+"""Training a motion tokenizer: losses on features and joints, windows of clips, errors of reconstruction."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import MotionData, dataset_of
-from workers.hgm3.joints import world_joints
-from workers.hgm3.tokenizer import Tokenizer, biased_std, frame_mask, tokenizer_loss
+from shared.nn.convolution import frame_mask
+from shared.nn.motion_tokenizer import MotionTokenizer, biased_std
+from shared.nn.quantizer import Quantized
 from workers.training.data.manifest import Clip
 from workers.training.data.sampling import sampling_weights
+from workers.training.joints import heading_joints, world_joints
 from workers.training.loop import StepContext
+from workers.training.motions import MotionData, dataset_of
+from workers.training.optimisation import StageConfig
+
+
+class TokenizerWeights(Protocol):
+    """What training reads of a tokenizer's own configuration."""
+
+    @property
+    def levels(self) -> int: ...
+    @property
+    def codes(self) -> int: ...
+    @property
+    def feature_bias(self) -> float: ...
+    @property
+    def commitment(self) -> float: ...
+    @property
+    def rotation_weight(self) -> float: ...
+    @property
+    def position_weight(self) -> float: ...
+    @property
+    def velocity_weight(self) -> float: ...
+    @property
+    def world_weight(self) -> float: ...
+
+
+class TokenizerTraining(Protocol):
+    """What training reads of a model's configuration."""
+
+    @property
+    def features(self) -> int: ...
+    @property
+    def joints(self) -> int: ...
+    @property
+    def fps(self) -> float: ...
+    @property
+    def tokenizer(self) -> TokenizerWeights: ...
+    @property
+    def windows(self) -> tuple[int, ...]: ...
+    @property
+    def train_tokenizer(self) -> StageConfig: ...
+
+
+@dataclass(frozen=True)
+class TokenizerLoss:
+    """The terms of the training objective, each already averaged over valid frames."""
+
+    total: Tensor
+    features: Tensor  # L1 of normalised features (eq. 2, first term)
+    commitment: Tensor  # eq. 2, second term, without β
+    position: Tensor  # metres, in the heading frame
+    velocity: Tensor  # m/s, in the heading frame
+    world: Tensor  # metres, in space: with the drift of the root since the window's start
+
+
+def tokenizer_loss(
+    model: MotionTokenizer,
+    config: TokenizerTraining,
+    features: Tensor,
+    lengths: Tensor | None = None,
+    fraction: float = 1.0,
+) -> tuple[TokenizerLoss, Quantized]:
+    """Eq. 2 of HGM³, eq. 6 of MOGO without its last term, plus terms on the joints (ours): they are what is measured.
+
+    The term in space rises with the budget's `fraction`: drift adds up over a window, and at first its gradient drowns
+    all others.
+
+    Args:
+        model: the tokenizer.
+        config: weights of the terms.
+        features: (B, T, D) in their own units.
+        lengths: (B,) frames, or None where every window is full.
+        fraction: of the budget used.
+    """
+    t = config.tokenizer
+    output, quantized = model(features, lengths)
+    target = model.normalize(features)
+    valid = torch.ones_like(features[..., 0]) if lengths is None else frame_mask(lengths, features.shape[1]).float()
+    weights = feature_weights(config).to(features.device)  # (D,)
+    l1 = _average(((output - target).abs() * weights).sum(-1) / weights.sum(), valid)
+
+    restored = model.restore(output)
+    local = heading_joints(restored, config.joints) - heading_joints(features, config.joints)  # (B, T, J, 3)
+    position = _average(local.abs().sum(-1).mean(-1), valid)
+    velocity = _average(local.diff(dim=1).abs().sum(-1).mean(-1) * config.fps, valid[:, 1:])
+    drift = world_joints(restored, config.joints) - world_joints(features, config.joints)
+    world = _average(drift.abs().sum(-1).mean(-1), valid)
+    total = (
+        l1
+        + t.commitment * quantized.commitment
+        + t.position_weight * position
+        + t.velocity_weight * velocity
+        + t.world_weight * min(1.0, 2 * fraction) ** 2 * world
+    )
+    terms = (l1, quantized.commitment, position, velocity, world)
+    return TokenizerLoss(total, *(term.detach() for term in terms)), quantized
+
+
+def feature_weights(config: TokenizerTraining) -> Tensor:
+    """Weight of each feature column (D,) in the L1 term: 1, or `rotation_weight` for the 6-D rotations."""
+    weights = torch.ones(config.features)
+    start = 4 + 3 * (config.joints - 1)
+    weights[start : start + 6 * (config.joints - 1)] = config.tokenizer.rotation_weight
+    return weights
+
+
+def _average(values: Tensor, valid: Tensor) -> Tensor:
+    return (values * valid).sum() / valid.sum().clamp(min=1)
+
 
 SHARES = {"bandai-namco/1": 0.45, "bandai-namco/2": 0.45}
 """Share of the windows drawn from a data set; others divide what is left. The first has 6 % of the clips, each of
@@ -27,14 +137,21 @@ class TokenizerStage:
 
     name = "tokenizer"
 
-    def __init__(self, config: HGM3Config, data: MotionData) -> None:
+    def __init__(
+        self,
+        config: TokenizerTraining,
+        data: MotionData,
+        module: MotionTokenizer,
+        penalty: Callable[[], Tensor] | None = None,
+    ) -> None:
+        """`module` is trained, on the data's statistics; `penalty` is added to its loss."""
         self.config = config
         self.optimisation = config.train_tokenizer
         self.data = data
-        device = data.features.device
-        self.module = Tokenizer(config).to(device)
+        self.penalty = penalty
+        self.module = module.to(data.features.device)
         self.module.set_statistics(data.mean, biased_std(data.std, config.tokenizer.feature_bias))
-        rate = config.tokenizer.frames_per_token
+        rate = module.frames_per_token
         self.train_clips = [c for c in data.prepared.split("train") if not c.spliced and c.length >= rate]
         self.weights = tokenizer_weights(self.train_clips)
         self.first = np.array([c.start for c in self.train_clips])
@@ -67,7 +184,7 @@ class TokenizerStage:
             "perplexity_0": quantized.perplexity[0],
             "perplexity_last": quantized.perplexity[-1],
         }
-        return loss.total, logs
+        return loss.total if self.penalty is None else loss.total + self.penalty(), logs
 
     def after_step(self, context: StepContext) -> None:
         """Nothing: the codebooks moved in the forward pass."""
@@ -75,6 +192,11 @@ class TokenizerStage:
     def validate(self) -> Mapping[str, float]:
         """Errors on the validation clips, whole."""
         return reconstruction_errors(self.module, self.config, self.data, self.data.originals("val"))
+
+    def test(self) -> dict[str, float]:
+        """Errors on the captured test clips, whole."""
+        errors = reconstruction_errors(self.module, self.config, self.data, self.data.originals("test"))
+        return {f"test/{name}": value for name, value in errors.items()}
 
 
 def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
@@ -91,7 +213,7 @@ def tokenizer_weights(clips: Sequence[Clip]) -> NDArray[np.float64]:
 
 @torch.no_grad()
 def reconstruction_errors(
-    model: Tokenizer, config: HGM3Config, data: MotionData, clips: Sequence[Clip], *, batch: int = 64
+    model: MotionTokenizer, config: TokenizerTraining, data: MotionData, clips: Sequence[Clip], *, batch: int = 64
 ) -> dict[str, float]:
     """Mean joint error of whole clips, encoded and decoded, in millimetres.
 
@@ -100,7 +222,7 @@ def reconstruction_errors(
     `perplexity/{level}` of the code usage.
     """
     model.eval()
-    rate = config.tokenizer.frames_per_token
+    rate = model.frames_per_token
     order = sorted((c for c in clips if c.length >= rate), key=lambda c: c.length)
     rows: list[tuple[str, float, float]] = []
     counts = torch.zeros(config.tokenizer.levels, config.tokenizer.codes, device=data.features.device)

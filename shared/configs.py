@@ -1,0 +1,29 @@
+"""Configurations of models as plain JSON values and back: what stands in manifests and checkpoints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar, cast, get_type_hints
+
+from shared.errors import InvalidInput
+
+T = TypeVar("T")
+
+
+def build_config(kind: type[T], values: Mapping[str, Any], where: str = "config") -> T:
+    """A frozen dataclass, others in its fields, from what `dataclasses.asdict` gave (lists become tuples).
+
+    Raises:
+        InvalidInput: an unknown field.
+    """
+    hints = get_type_hints(kind)
+    unknown = set(values) - {f.name for f in fields(kind)}  # pyright: ignore[reportArgumentType]
+    if unknown:
+        raise InvalidInput(f"unknown fields: {', '.join(sorted(unknown))}", where=where)
+    built: dict[str, Any] = {}
+    for name, value in values.items():
+        if is_dataclass(hints[name]) and isinstance(value, Mapping):
+            value = build_config(hints[name], cast("Mapping[str, Any]", value), f"{where}.{name}")
+        built[name] = tuple(cast("list[Any]", value)) if isinstance(value, list) else value
+    return kind(**built)

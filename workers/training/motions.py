@@ -1,0 +1,153 @@
+"""Motions as training reads them, on one device: features of all clips end to end, and their tokens.
+
+Choices of data come from a numpy generator that the loop seeds from (seed, step, rank); nothing here has a state.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from shared.nn import distributed
+from shared.nn.motion_tokenizer import MotionTokenizer
+from workers.training.data.manifest import Clip
+from workers.training.data.prepared import PreparedData
+
+TOKENS = "tokens.safetensors"
+
+
+@dataclass(frozen=True)
+class MotionData:
+    """All clips of a prepared folder, end to end on one device."""
+
+    prepared: PreparedData
+    features: Tensor  # (F, D) float32, in their own units
+    mean: Tensor  # (D,)
+    std: Tensor  # (D,), grouped
+
+    @classmethod
+    def load(cls, folder: Path, device: torch.device) -> MotionData:
+        """Read a prepared folder; raises as `PreparedData.open`."""
+        prepared = PreparedData.open(folder)
+        return cls(
+            prepared,
+            torch.from_numpy(np.array(prepared.all_features)).to(device),
+            torch.from_numpy(prepared.mean).to(device),
+            torch.from_numpy(prepared.std).to(device),
+        )
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the manifest, which names every file's."""
+        return hashlib.sha256(self.prepared.manifest.model_dump_json().encode()).hexdigest()
+
+    def originals(self, split: str) -> list[Clip]:
+        """Captured clips of a split: no mirror images, no loops or splices."""
+        return [c for c in self.prepared.split(split) if not c.mirrored and not c.spliced]
+
+    def windows(self, starts: Tensor, size: int) -> Tensor:
+        """(B,) first frames to features (B, size, D); frames beyond the last one of all repeat it."""
+        index = starts[:, None] + torch.arange(size, device=self.features.device)
+        return self.features[index.clamp(max=len(self.features) - 1)]
+
+
+def dataset_of(clip: Clip) -> str:
+    """Data set, with the part of it where the content names one: `bandai-namco/1`."""
+    number, slash, _ = clip.content.partition("/")
+    return f"{clip.dataset}/{number}" if slash and number.isdigit() else clip.dataset
+
+
+@dataclass(frozen=True)
+class TokenData:
+    """Tokens of all clips. A training clip is tokenized from its frames 0, 1, … on, as many as a token has frames (P):
+    the same motion on P token grids."""
+
+    tokens: Tensor  # (N, V) int64, sequences end to end
+    starts: Tensor  # (C, P) int64, first token of clip c at phase p; phase 0 where a clip has fewer
+    lengths: Tensor  # (C, P) int64 tokens
+
+    @classmethod
+    @torch.no_grad()
+    def encode(cls, tokenizer: MotionTokenizer, data: MotionData, *, batch: int = 64) -> TokenData:
+        """Tokenize every clip whole; training clips at all phases, others at phase 0."""
+        tokenizer.eval()
+        rate = tokenizer.frames_per_token
+        device = data.features.device
+        clips = data.prepared.clips
+        jobs = [
+            (c, p, clip.start + p, (clip.length - p) // rate)
+            for c, clip in enumerate(clips)
+            for p in range(rate if clip.split == "train" else 1)
+            if clip.length - p >= rate
+        ]
+        jobs.sort(key=lambda job: job[3])  # alike lengths together
+        starts = torch.zeros(len(clips), rate, dtype=torch.long)
+        lengths = torch.zeros(len(clips), rate, dtype=torch.long)
+        found: list[Tensor] = []
+        total = 0
+        for at in range(0, len(jobs), batch):
+            part = jobs[at : at + batch]
+            counts = torch.tensor([job[3] for job in part], device=device)
+            features = data.windows(torch.tensor([job[2] for job in part], device=device), int(counts.max()) * rate)
+            tokens = tokenizer.encode(features, counts * rate)  # (B, n, V)
+            for row, (clip, phase, _, count) in enumerate(part):
+                starts[clip, phase], lengths[clip, phase] = total, count
+                found.append(tokens[row, :count])
+                total += count
+        missing = lengths == 0
+        starts = torch.where(missing, starts[:, :1], starts).to(device)
+        lengths = torch.where(missing, lengths[:, :1], lengths).to(device)
+        return cls(torch.cat(found), starts, lengths)
+
+    @property
+    def phases(self) -> int:
+        """P."""
+        return self.starts.shape[1]
+
+    def log_shares(self, codes: int) -> Tensor:
+        """Logarithm of how often each code occurs (V, K): where the biases of the heads start."""
+        levels = self.tokens.shape[1]
+        counts = torch.stack([torch.bincount(self.tokens[:, v], minlength=codes) for v in range(levels)]).float() + 1
+        return (counts / counts.sum(1, keepdim=True)).log()
+
+    def batch(self, clips: Tensor, phases: Tensor, max_tokens: int) -> tuple[Tensor, Tensor]:
+        """Tokens (B, n, V), -1 beyond a clip's own length, and lengths (B,); longer clips lose their end."""
+        lengths = self.lengths[clips, phases].clamp(max=max_tokens)
+        size = int(lengths.max())
+        position = torch.arange(size, device=clips.device)
+        index = (self.starts[clips, phases][:, None] + position).clamp(max=len(self.tokens) - 1)
+        valid = position[None] < lengths[:, None]
+        return self.tokens[index].masked_fill(~valid[..., None], -1), lengths
+
+
+def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> TokenData:
+    """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
+    file = run / TOKENS
+    key = f"{data.sha256}:{_fingerprint(tokenizer)}"
+    if file.is_file():
+        values = load_file(file, device=str(data.features.device))
+        if bytes(values.pop("key").cpu().numpy().tobytes()).decode() == key:
+            return TokenData(**{name: value.long() for name, value in values.items()})
+    tokens = TokenData.encode(tokenizer, data)
+    if distributed.rank() == 0:
+        values = {
+            "tokens": tokens.tokens.to(torch.int16),
+            "starts": tokens.starts.int(),
+            "lengths": tokens.lengths.int(),
+            "key": torch.tensor(list(key.encode()), dtype=torch.uint8),
+        }
+        temporary = file.with_suffix(".part")
+        save_file({name: value.cpu().contiguous() for name, value in values.items()}, temporary)
+        temporary.replace(file)
+    return tokens
+
+
+def _fingerprint(tokenizer: MotionTokenizer) -> str:
+    total = sum(float(value.double().abs().sum()) for value in tokenizer.state_dict().values())
+    return f"{total:.6f}"

@@ -1,0 +1,73 @@
+"""Captions of all clips as sentence features, on one device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from shared.errors import InvalidFile
+from workers.training.texts import CaptionTexts
+
+
+@dataclass(frozen=True)
+class SentenceData:
+    """Whole sentences, without the parts of their graphs."""
+
+    strings: Tensor  # (U, W) float16
+    sentence: Tensor  # (K,) int64: string of each caption
+    first: NDArray[np.int64]  # (C + 1,): clip c has captions first[c] … first[c + 1] - 1
+
+    @classmethod
+    def load(cls, texts: CaptionTexts, width: int, device: torch.device) -> Self:
+        """Put the captions on a device.
+
+        Raises:
+            InvalidFile: texts of another encoder's width.
+        """
+        return cls(**sentence_fields(texts, width, device))
+
+    def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
+        """One caption of each clip (B,) at random."""
+        low, high = self.first[clips], self.first[clips + 1]
+        chosen = low + np.floor(rng.random(len(clips)) * (high - low)).astype(np.int64)
+        return torch.from_numpy(chosen).to(self.sentence.device)
+
+    def sentences(self, captions: Tensor) -> Tensor:
+        """Sentence features (B, W)."""
+        return self.strings[self.sentence[captions]].float()
+
+    def captions_of(self, clips: Sequence[int]) -> Tensor:
+        """All captions of some clips."""
+        rows = np.concatenate([np.arange(self.first[c], self.first[c + 1]) for c in clips])
+        return torch.from_numpy(rows).to(self.sentence.device)
+
+
+def sentence_fields(texts: CaptionTexts, width: int, device: torch.device) -> dict[str, Any]:
+    """The fields of `SentenceData`, checked."""
+    if texts.strings.shape[1] != width:
+        raise InvalidFile(
+            f"texts are {texts.strings.shape[1]} wide, this configuration reads {width}",
+            hint="Run `marey data text` with the encoder of the configuration.",
+        )
+    whole = texts.node_string[texts.node_start[:-1]]  # the motion node comes first
+    return {
+        "strings": torch.from_numpy(np.asarray(texts.strings)).to(device),
+        "sentence": torch.from_numpy(whole.astype(np.int64)).to(device),
+        "first": np.asarray(texts.first, np.int64),
+    }
+
+
+def text_statistics(strings: Tensor, index: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean and std (W,) of the strings (U, W) at `index`, each counted as often as it occurs there."""
+    counts = torch.bincount(index, minlength=len(strings)).double()
+    share = (counts / counts.sum().clamp(min=1))[:, None]
+    values = strings.double()
+    mean = (values * share).sum(0)
+    std = ((values - mean).square() * share).sum(0).sqrt().clamp(min=1e-4)
+    return mean.float(), std.float()
