@@ -251,12 +251,12 @@ def train_stage(
     minutes: float | None,
     **options: Any,
 ) -> dict[str, float]:
-    """Train one stage of HGM³; its metrics. See `workers.hgm3.train.TrainOptions` for the options."""
+    """Train one stage of HGM³; its metrics. See `workers.training.staging.TrainOptions` for the options."""
     try:
         from workers.hgm3.config import named_config
-        from workers.hgm3.train import TrainOptions
         from workers.hgm3.train import train_stage as train
         from workers.training.budget import Budget
+        from workers.training.staging import TrainOptions
     except ImportError as error:
         raise needs_extra("worker", error) from error
     budget = Budget(steps, minutes)

@@ -28,11 +28,12 @@ from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.generate import Generator, Settings
 from workers.hgm3.obedience import measure
-from workers.hgm3.train import TrainOptions, train_stage
+from workers.hgm3.train import train_stage
 from workers.training.budget import Budget
 from workers.training.checks.prompts import evaluation_prompts
 from workers.training.checks.rates import mean_quality
 from workers.training.motions import TOKENS
+from workers.training.staging import TrainOptions
 
 DECODINGS = {
     "hierarchical": Settings(motion_steps=2, action_steps=5),
@@ -41,7 +42,9 @@ DECODINGS = {
 }
 
 
-def train_variant(data: Path, bundle: str, folder: Path, config: HGM3Config, options: TrainOptions) -> dict[str, float]:
+def train_variant(
+    data: Path, bundle: str, folder: Path, config: HGM3Config, options: TrainOptions[HGM3Config]
+) -> dict[str, float]:
     """Train one masked transformer beside the bundle's other parts; write its bundle and return all its numbers."""
     shutil.rmtree(folder, ignore_errors=True)
     take_apart(find_bundle(bundle), folder / "run")

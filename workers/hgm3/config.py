@@ -128,6 +128,11 @@ class HGM3Config:
         """Longest clip in tokens."""
         return self.max_frames // self.tokenizer.frames_per_token
 
+    @property
+    def min_tokens(self) -> int:
+        """Shortest clip in tokens."""
+        return -(-self.min_frames // self.tokenizer.frames_per_token)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, for manifests and checkpoints."""
         return asdict(self)

@@ -19,9 +19,9 @@ from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData
 from workers.hgm3.model import LEVELS, GraphBatch, LossPredictor, MaskedTransformer
 from workers.training.data.manifest import Clip
-from workers.training.data.sampling import sampling_weights
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
+from workers.training.pairs import Pairs
 
 
 def pieces_of(lengths: Tensor) -> list[Tensor]:
@@ -84,7 +84,7 @@ class MaskedStage:
         self.optimisation = config.train_masked
         self.tokens, self.captions = tokens, captions
         self.module = MaskedModule(config).to(tokens.tokens.device)
-        self.pairs = Pairs(config, clips, tokens, captions)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
         normalizer = self.module.masked.text.normalizer
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
         normalizer.mean.copy_(mean)
@@ -211,29 +211,6 @@ class MaskedStage:
         loss = {f"reconstruction/{n}": float(t[0] / t[2]) for n, t in zip(names, totals, strict=True)}
         accuracy = {f"accuracy/{n}": float(t[1] / t[2]) for n, t in zip(names, totals, strict=True)}
         return loss | accuracy | {"ranking": ranks}
-
-
-class Pairs:
-    """Which clips are drawn, and how often."""
-
-    def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
-        usable = (tokens.lengths[:, 0].cpu().numpy() * config.tokenizer.frames_per_token >= config.min_frames) & (
-            np.diff(captions.first) > 0
-        )
-        splits = np.array([c.split for c in clips])
-        self.train = np.flatnonzero(usable & (splits == "train"))
-        self.validation = np.flatnonzero(usable & (splits == "val"))
-        self.weights = sampling_weights([clips[int(i)] for i in self.train])
-
-    def draw(self, rng: np.random.Generator, batch: int) -> NDArray[np.int64]:
-        """Training clips (B,)."""
-        chosen: NDArray[np.int64] = rng.choice(self.train, size=batch, p=self.weights)
-        return chosen
-
-    def validation_batches(self, batch: int) -> Iterator[NDArray[np.int64]]:
-        """All validation clips."""
-        for at in range(0, len(self.validation), batch):
-            yield self.validation[at : at + batch]
 
 
 def _pieces(sample: Sample) -> Iterator[Sample]:

@@ -15,10 +15,11 @@ from shared.nn.losses import token_losses
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData
 from workers.hgm3.model import LengthEstimator, ResidualTransformer
-from workers.hgm3.stage_masked import Pairs, pieces_of
+from workers.hgm3.stage_masked import pieces_of
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
+from workers.training.pairs import Pairs
 
 
 class ResidualStage:
@@ -39,7 +40,7 @@ class ResidualStage:
         self.tokens, self.captions = tokens, captions
         self.module = ResidualTransformer(config).to(tokens.tokens.device)
         self.module.set_codebooks(codebooks)
-        self.pairs = Pairs(config, clips, tokens, captions)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
         self.module.normalizer.mean.copy_(mean)
         self.module.normalizer.std.copy_(std)
@@ -114,7 +115,7 @@ class LengthStage:
         self.config = config
         self.optimisation = config.train_length
         self.captions = captions
-        self.pairs = Pairs(config, clips, tokens, captions)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
         self.lengths = tokens.lengths[:, 0].clamp(max=config.max_tokens)
         self.module = LengthEstimator(config).to(tokens.tokens.device)
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)

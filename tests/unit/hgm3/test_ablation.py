@@ -12,9 +12,10 @@ from shared.bundles import find_bundle
 from workers.hgm3.ablation import table, train_variant
 from workers.hgm3.assembly import assemble
 from workers.hgm3.config import TINY
-from workers.hgm3.train import TrainOptions, train_stage
+from workers.hgm3.train import train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
+from workers.training.staging import TrainOptions
 
 
 def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(

@@ -17,12 +17,13 @@ from workers.hgm3.data import CaptionData
 from workers.hgm3.generate import Generator, Request
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.tokenizer import Tokenizer
-from workers.hgm3.train import TrainOptions, train_all, train_stage
+from workers.hgm3.train import train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.loop import RunOptions, StepContext, train
 from workers.training.motions import MotionData, TokenData
 from workers.training.parts import load_part
+from workers.training.staging import TrainOptions
 from workers.training.texts import CaptionTexts
 from workers.training.tokenizing import TokenizerStage
 
@@ -31,7 +32,7 @@ from .conftest import text_features
 CPU = torch.device("cpu")
 
 
-def options(prepared: PreparedData, run: Path, steps: int, config: HGM3Config = TINY) -> TrainOptions:
+def options(prepared: PreparedData, run: Path, steps: int, config: HGM3Config = TINY) -> TrainOptions[HGM3Config]:
     return TrainOptions(prepared.path, run, config, Budget(steps=steps), device="cpu", bf16=False, quiet=True)
 
 
@@ -73,12 +74,12 @@ def test_all_stages_end_in_a_bundle_that_generates(prepared: PreparedData, run: 
 
 def test_training_all_stages_again_after_a_kill_does_only_what_is_left(prepared: PreparedData, tmp_path: Path) -> None:
     whole = replace(options(prepared, tmp_path, 2), budget=Budget(steps=2, minutes=60))
-    metrics = train_all(whole)
+    metrics = train_stage("all", whole)
     assert {name.split("/")[0] for name in metrics} == {"tokenizer", "masked", "residual", "length"}
     (tmp_path / "length" / "part" / "part.json").unlink()
-    assert {name.split("/")[0] for name in train_all(whole)} == {"length"}
+    assert {name.split("/")[0] for name in train_stage("all", whole)} == {"length"}
     with pytest.raises(InvalidInput, match="minutes"):
-        train_all(options(prepared, tmp_path, 2))
+        train_stage("all", options(prepared, tmp_path, 2))
 
 
 def test_a_bundle_of_another_configuration_is_refused(prepared: PreparedData, run: Path, tmp_path: Path) -> None:

@@ -1,0 +1,34 @@
+"""Which clips training draws, each with a caption, and how often."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workers.training.data.manifest import Clip
+from workers.training.data.sampling import sampling_weights
+from workers.training.motions import TokenData
+from workers.training.sentences import SentenceData
+
+
+class Pairs:
+    """Clips that have captions and are long enough."""
+
+    def __init__(self, clips: Sequence[Clip], tokens: TokenData, captions: SentenceData, min_tokens: int) -> None:
+        usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (np.diff(captions.first) > 0)
+        splits = np.array([c.split for c in clips])
+        self.train = np.flatnonzero(usable & (splits == "train"))
+        self.validation = np.flatnonzero(usable & (splits == "val"))
+        self.weights = sampling_weights([clips[int(i)] for i in self.train])
+
+    def draw(self, rng: np.random.Generator, batch: int) -> NDArray[np.int64]:
+        """Training clips (B,)."""
+        chosen: NDArray[np.int64] = rng.choice(self.train, size=batch, p=self.weights)
+        return chosen
+
+    def validation_batches(self, batch: int) -> Iterator[NDArray[np.int64]]:
+        """All validation clips."""
+        for at in range(0, len(self.validation), batch):
+            yield self.validation[at : at + batch]

@@ -1,0 +1,152 @@
+"""Training a bundle stage by stage in one run folder: each reads the parts of those before it and leaves its own.
+
+run/{stage}/checkpoint    to resume from
+run/{stage}/tensorboard   the curves
+run/{stage}/part          what is finished
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import torch
+from torch import nn
+
+from shared.errors import InvalidInput
+from shared.nn import distributed
+from workers.training.budget import Budget
+from workers.training.loop import RunOptions, Stage, train
+from workers.training.parts import Part, load_part, save_part
+
+
+class ModelConfig(Protocol):
+    """A model's configuration."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        ...
+
+
+C = TypeVar("C", bound=ModelConfig)
+
+
+@dataclass(frozen=True)
+class TrainOptions(Generic[C]):
+    """What the command line chooses for any stage."""
+
+    prepared: Path
+    run: Path  # one folder for all stages of a bundle
+    config: C
+    budget: Budget
+    seed: int = 0
+    resume: bool = False
+    warm: bool = False  # start from the weights of the stage's finished part in `run`
+    device: str = "auto"
+    threads: int = 0
+    bf16: bool = True
+    quiet: bool = False
+
+    def options(self, stage: str) -> RunOptions:
+        """The loop's options for a stage."""
+        return RunOptions(
+            self.run / stage, self.budget, seed=self.seed, resume=self.resume, bf16=self.bf16, quiet=self.quiet
+        )
+
+
+@dataclass(frozen=True)
+class Recipe(Generic[C]):
+    """What a model's stages are.
+
+    Attributes:
+        read: a configuration from its plain values.
+        built_from: of each stage in training order the fields of the configuration that its networks are built from;
+            how stages were optimised may differ.
+        shares: how the minutes of a whole training are dealt out.
+        most_steps: stages that learn by heart beyond so many steps.
+    """
+
+    read: Callable[[Mapping[str, Any]], C]
+    built_from: Mapping[str, tuple[str, ...]]
+    shares: Mapping[str, float]
+    most_steps: Mapping[str, int] = field(default_factory=dict[str, int])
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """In training order."""
+        return tuple(self.built_from)
+
+    def check_name(self, name: str) -> None:
+        """Refuse a stage that is not there."""
+        if name not in self.stages:
+            raise InvalidInput(f"there is no stage {name!r}", hint=f"Known: {', '.join(self.stages)}, all.")
+
+    def part(self, name: str, config: C, run: Path) -> Part:
+        """The finished part of a stage in a run folder.
+
+        Raises:
+            NotFound: not trained yet.
+            InvalidInput: its networks were built from other values than `config`'s.
+        """
+        part = load_part(run / name / "part")
+        theirs = self.read(part.config)
+        differ = [f for f in self.built_from[name] if getattr(theirs, f) != getattr(config, f)]
+        if differ:
+            raise InvalidInput(
+                f"was trained with another {differ[0]}",
+                where=str(run / name),
+                hint="Use one configuration for all stages.",
+            )
+        return part
+
+    def train(self, stage: Stage, options: TrainOptions[C]) -> dict[str, float]:
+        """Train one stage; with `warm` from its finished part. See `part` for what is raised then."""
+        if options.warm:
+            stage.module.load_state_dict(self.part(stage.name, options.config, options.run).state)
+        return train(stage, options.options(stage.name), options.config.to_dict())
+
+
+def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: dict[str, float], sha256: str) -> None:
+    """Leave a stage's part: averaged weights, configuration, metrics, and the hash of the data."""
+    if distributed.rank() == 0:
+        budget = {"steps": options.budget.steps, "minutes": options.budget.minutes, "seed": options.seed}
+        part = Part(module.state_dict(), options.config.to_dict(), metrics, sha256, budget)
+        save_part(options.run / name / "part", part)
+
+
+def train_all(
+    recipe: Recipe[C], train_stage: Callable[[str, TrainOptions[C]], dict[str, float]], options: TrainOptions[C]
+) -> dict[str, float]:
+    """Train every stage that has not finished, one after another; `options.budget` is for all of them together.
+
+    Called again after a kill it goes on where it stopped. Only minutes are dealt out: steps count for each stage.
+
+    Raises:
+        InvalidInput: no minutes are given, or a warm start is wanted.
+    """
+    if options.warm:
+        raise InvalidInput("all stages at once start from nothing", hint="Give --warm to one stage at a time.")
+    minutes = options.budget.minutes
+    if minutes is None:
+        raise InvalidInput("training all stages needs minutes to deal out", hint="Give --max-minutes.")
+    metrics: dict[str, float] = {}
+    for name in recipe.stages:
+        if (options.run / name / "part" / "part.json").is_file():
+            continue
+        steps, most = options.budget.steps, recipe.most_steps.get(name)
+        if most is not None:
+            steps = min(steps or most, most)
+        budget = Budget(steps, minutes * recipe.shares[name])
+        started = (options.run / name / "checkpoint" / "state.json").is_file()
+        found = train_stage(name, dataclasses.replace(options, budget=budget, resume=started))
+        metrics |= {f"{name}/{metric}": value for metric, value in found.items()}
+    return metrics
+
+
+def use_threads(threads: int) -> None:
+    """So many threads of torch; 0 leaves its own choice."""
+    if threads:
+        torch.set_num_threads(threads)
