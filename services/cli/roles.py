@@ -234,7 +234,7 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
     if spec is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="--model")
     data = PreparedData.open(folder)
-    captions = [clip.captions for clip in data.clips]
+    captions = [clip.captions + clip.act_captions for clip in data.clips]
     processes = os.cpu_count() or 1
     CaptionTexts.build(captions, TextPipeline.load(spec), processes=processes, progress=progress).save(folder)
     return sum(map(len, captions))

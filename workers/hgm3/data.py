@@ -23,15 +23,17 @@ class CaptionData(SentenceData):
     adjacency: Tensor  # (K, S, S) int8
 
     @classmethod
-    def of(cls, texts: CaptionTexts, config: ConditionConfig, device: torch.device) -> CaptionData:
-        """Put the captions' graphs into slots.
+    def of(
+        cls, texts: CaptionTexts, counts: Sequence[int], config: ConditionConfig, device: torch.device
+    ) -> CaptionData:
+        """Put the captions' graphs into slots; `counts` are captions of each whole clip.
 
         Raises:
             InvalidFile: texts of another encoder's width.
         """
         slots, adjacency = texts.slots(config.max_actions, config.max_specifics)
         return cls(
-            **sentence_fields(texts, config.text_width, device),
+            **sentence_fields(texts, counts, config.text_width, device),
             slots=torch.from_numpy(slots.astype(np.int32)).to(device),
             adjacency=torch.from_numpy(adjacency.astype(np.int8)).to(device),
         )

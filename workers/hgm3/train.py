@@ -37,7 +37,7 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     if name == "tokenizer":
         return _train_tokenizer(options, data)
     texts = CaptionTexts.load(data.prepared)
-    captions = CaptionData.of(texts, options.config.condition, device)
+    captions = CaptionData.of(texts, data.prepared.caption_counts, options.config.condition, device)
     tokenizer = load_tokenizer(options, data)
     tokens = load_tokens(options.run, tokenizer, data)
     codebooks = tokenizer.quantizer.codebooks

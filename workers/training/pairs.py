@@ -17,7 +17,7 @@ class Pairs:
     """Clips that have captions and are long enough."""
 
     def __init__(self, clips: Sequence[Clip], tokens: TokenData, captions: SentenceData, min_tokens: int) -> None:
-        usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (np.diff(captions.first) > 0)
+        usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (captions.count > 0)
         splits = np.array([c.split for c in clips])
         self.train = np.flatnonzero(usable & (splits == "train"))
         self.validation = np.flatnonzero(usable & (splits == "val"))

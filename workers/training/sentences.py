@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,34 +21,38 @@ class SentenceData:
 
     strings: Tensor  # (U, W) float16
     sentence: Tensor  # (K,) int64: string of each caption
-    first: NDArray[np.int64]  # (C + 1,): clip c has captions first[c] … first[c + 1] - 1
+    first: NDArray[np.int64]  # (C,): captions of clip c begin there; those of its acts alone follow them
+    count: NDArray[np.int64]  # (C,): captions of the whole clip
 
     @classmethod
-    def load(cls, texts: CaptionTexts, width: int, device: torch.device) -> Self:
-        """Put the captions on a device.
+    def of_sentences(cls, texts: CaptionTexts, counts: Sequence[int], width: int, device: torch.device) -> SentenceData:
+        """Put the captions on a device; `counts` are those of each whole clip.
 
         Raises:
             InvalidFile: texts of another encoder's width.
         """
-        return cls(**sentence_fields(texts, width, device))
+        return SentenceData(**sentence_fields(texts, counts, width, device))
 
     def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
         """One caption of each clip (B,) at random."""
-        low, high = self.first[clips], self.first[clips + 1]
-        chosen = low + np.floor(rng.random(len(clips)) * (high - low)).astype(np.int64)
+        chosen = self.first[clips] + np.floor(rng.random(len(clips)) * self.count[clips]).astype(np.int64)
         return torch.from_numpy(chosen).to(self.sentence.device)
+
+    def of_act(self, clips: NDArray[np.int64], act: NDArray[np.int64]) -> Tensor:
+        """The caption of act `act` (B,) alone, of clips that have several."""
+        return torch.from_numpy(self.first[clips] + self.count[clips] + act).to(self.sentence.device)
 
     def sentences(self, captions: Tensor) -> Tensor:
         """Sentence features (B, W)."""
         return self.strings[self.sentence[captions]].float()
 
     def captions_of(self, clips: Sequence[int]) -> Tensor:
-        """All captions of some clips."""
-        rows = np.concatenate([np.arange(self.first[c], self.first[c + 1]) for c in clips])
+        """All captions of some whole clips."""
+        rows = np.concatenate([self.first[c] + np.arange(self.count[c]) for c in clips])
         return torch.from_numpy(rows).to(self.sentence.device)
 
 
-def sentence_fields(texts: CaptionTexts, width: int, device: torch.device) -> dict[str, Any]:
+def sentence_fields(texts: CaptionTexts, counts: Sequence[int], width: int, device: torch.device) -> dict[str, Any]:
     """The fields of `SentenceData`, checked."""
     if texts.strings.shape[1] != width:
         raise InvalidFile(
@@ -59,7 +63,8 @@ def sentence_fields(texts: CaptionTexts, width: int, device: torch.device) -> di
     return {
         "strings": torch.from_numpy(np.asarray(texts.strings)).to(device),
         "sentence": torch.from_numpy(whole.astype(np.int64)).to(device),
-        "first": np.asarray(texts.first, np.int64),
+        "first": np.asarray(texts.first[:-1], np.int64),
+        "count": np.asarray(counts, np.int64),
     }
 
 

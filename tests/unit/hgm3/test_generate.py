@@ -10,13 +10,12 @@ import pytest
 import torch
 
 from shared.errors import InvalidBundle, InvalidInput
+from tests.support.prepared import text_features
 from workers.hgm3.bundle import random_bundle
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.decoding import condition_level
 from workers.hgm3.generate import Generated, Generator, Request, Settings
 from workers.hgm3.model import ACTION, MOTION, SPECIFIC
-
-from .conftest import text_features
 
 COUNT = 32
 FLAT = Settings(motion_steps=0, action_steps=0)

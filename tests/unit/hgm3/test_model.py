@@ -10,6 +10,7 @@ import torch
 
 from shared.motion.features import HUMANML3D_263
 from shared.nn.motion_tokenizer import biased_std
+from tests.support.prepared import graph, made_up_texts, swinging, text_features
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import PAPER, STARTER, TINY, named_config
 from workers.hgm3.data import CaptionData
@@ -26,8 +27,6 @@ from workers.hgm3.model import (
 from workers.hgm3.tokenizer import Tokenizer
 from workers.training.joints import heading_joints, world_joints
 from workers.training.tokenizing import tokenizer_loss
-
-from .conftest import made_up_texts, swinging, text_features
 
 CPU = torch.device("cpu")
 
@@ -193,10 +192,8 @@ def test_the_residual_transformer_predicts_each_samples_own_level(compact: bool)
 
 
 def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
-    texts = made_up_texts(12)
-    data = CaptionData.of(texts, TINY.condition, CPU)
-    from .conftest import graph
-
+    texts = made_up_texts([2] * 6)
+    data = CaptionData.of(texts, [2] * 6, TINY.condition, CPU)
     for k in range(12):
         g = graph(k % 4, (k % 4 > 0) * (k % 5))
         slots = g.slots(8, 16)
@@ -207,8 +204,8 @@ def test_captions_in_slots_equal_the_graphs_own_slots_and_adjacency() -> None:
 
 
 def test_text_statistics_weigh_a_string_by_how_often_it_occurs() -> None:
-    texts = made_up_texts(12)
-    data = CaptionData.of(texts, TINY.condition, CPU)
+    texts = made_up_texts([2] * 6)
+    data = CaptionData.of(texts, [2] * 6, TINY.condition, CPU)
     mean, std = data.statistics(range(6), TINY.condition)
     rows = texts.strings[texts.node_string[texts.node_level == 1]].astype("f8")
     torch.testing.assert_close(mean[ACTION], torch.from_numpy(rows.mean(0)).float(), atol=1e-5, rtol=1e-4)

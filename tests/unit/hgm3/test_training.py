@@ -11,6 +11,7 @@ import torch
 
 from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
+from tests.support.prepared import text_features
 from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import TINY, HGM3Config, named_config
 from workers.hgm3.data import CaptionData
@@ -27,8 +28,6 @@ from workers.training.staging import TrainOptions
 from workers.training.texts import CaptionTexts
 from workers.training.tokenizing import TokenizerStage
 
-from .conftest import text_features
-
 CPU = torch.device("cpu")
 
 
@@ -44,7 +43,7 @@ def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedSta
     tokens = TokenData.encode(tokenizer, data)
     for start, length in zip(tokens.starts.flatten().tolist(), tokens.lengths.flatten().tolist(), strict=True):
         tokens.tokens[start : start + length, 0] = torch.arange(length) * 3 % config.tokenizer.codes  # can be learnt
-    captions = CaptionData.of(CaptionTexts.load(prepared), config.condition, CPU)
+    captions = CaptionData.of(CaptionTexts.load(prepared), prepared.caption_counts, config.condition, CPU)
     return MaskedStage(config, prepared.clips, tokens, captions)
 
 

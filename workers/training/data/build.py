@@ -125,7 +125,14 @@ class FolderWriter:
         shutil.rmtree(self.work, ignore_errors=True)
 
     def add(
-        self, part: Part, joints: NDArray[np.floating], acts: Sequence[Facts], *, name: str, spliced: tuple[str, ...]
+        self,
+        part: Part,
+        joints: NDArray[np.floating],
+        acts: Sequence[Facts],
+        *,
+        name: str,
+        spliced: tuple[str, ...],
+        seams: tuple[int, ...] = (),
     ) -> None:
         """Encode and append one clip; joints (T, 22, 3)."""
         placed = LAYOUT.canonicalize(joints)
@@ -158,6 +165,10 @@ class FolderWriter:
                     side=acts[0].side,
                 ),
                 captions=captions(acts, name, 2 if spliced and len(acts) == 1 else 3),
+                seams=seams,
+                act_captions=tuple(
+                    captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(acts) if len(acts) > 1
+                ),
             )
         )
         self.frames += len(features)
@@ -270,7 +281,7 @@ def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None =
         for split, parts in by_split.items():
             for made in compose(parts, split):
                 ids = tuple(part.id for part in made.parts)
-                writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids)
+                writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids, seams=made.seams)
                 if progress:
                     progress(len(writer.clips), total)
         return writer.finish(packs, left_out)

@@ -78,12 +78,14 @@ class Composed:
         parts: the clips it was made of, in order.
         joints: (T, 22, 3).
         facts: one an act.
+        seams: first frame of each act but the first.
     """
 
     name: str
     parts: tuple[Part, ...]
     joints: Array
     facts: tuple[Facts, ...]
+    seams: tuple[int, ...] = ()
 
 
 def core(part: Part) -> tuple[int, int]:
@@ -386,7 +388,7 @@ def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> C
         if measured is None:
             return None
         facts.append(measured)
-    return Composed(name, tuple(parts), joints, tuple(facts))
+    return Composed(name, tuple(parts), joints, tuple(facts), tuple(seams[1:-1]))
 
 
 def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:

@@ -82,7 +82,8 @@ class Clip(BaseModel):
 
     `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
     its first part. `acts` are the acts in order, as the caption grammar calls them, `sides` the measured side of each:
-    left, right, both, or empty.
+    left, right, both, or empty. Where several acts were joined, `seams` are the first frames of all but
+    the first act, and `act_captions` say each act alone.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -101,3 +102,5 @@ class Clip(BaseModel):
     sides: tuple[str, ...] = ()
     measured: Measured
     captions: tuple[str, ...]
+    seams: tuple[int, ...] = ()
+    act_captions: tuple[str, ...] = ()

@@ -81,6 +81,11 @@ class PreparedData:
         """Layout of the features."""
         return layout(self.manifest.layout)
 
+    @property
+    def caption_counts(self) -> list[int]:
+        """Captions of each whole clip."""
+        return [len(clip.captions) for clip in self.clips]
+
     @cached_property
     def _by_split(self) -> dict[str, tuple[Clip, ...]]:
         return {split: tuple(clip for clip in self.clips if clip.split == split) for split in SPLITS}
