@@ -241,26 +241,33 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
 
 
 def train_stage(
+    model: Literal["hgm3", "mogo"],
     name: str,
     data: Path,
     run: Path,
     *,
     config: str,
-    mask: Literal["hard", "random"] | None,
     steps: int | None,
     minutes: float | None,
+    mask: Literal["hard", "random"] | None = None,
     **options: Any,
 ) -> dict[str, float]:
-    """Train one stage of HGM³; its metrics. See `workers.training.staging.TrainOptions` for the options."""
+    """Train one stage of a model; its metrics. See `workers.training.staging.TrainOptions` for the options."""
     try:
-        from workers.hgm3.config import named_config
-        from workers.hgm3.train import train_stage as train
+        from workers.hgm3 import config as hgm3_config
+        from workers.hgm3 import train as hgm3
+        from workers.mogo import config as mogo_config
+        from workers.mogo import train as mogo
         from workers.training.budget import Budget
         from workers.training.staging import TrainOptions
     except ImportError as error:
         raise needs_extra("worker", error) from error
     budget = Budget(steps, minutes)
-    return train(name, TrainOptions(data, run, named_config(config, mask=mask), budget, **options))
+    if model == "hgm3":
+        return hgm3.train_stage(
+            name, TrainOptions(data, run, hgm3_config.named_config(config, mask=mask), budget, **options)
+        )
+    return mogo.train_stage(name, TrainOptions(data, run, mogo_config.named_config(config), budget, **options))
 
 
 def assemble_bundle(

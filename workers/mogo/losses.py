@@ -1,33 +1,18 @@
-"""What MOGO's two networks are trained on (eq. 6 and eq. 11)."""
+"""What MOGO's networks are trained on beside what all tokenizers are (eq. 6 and eq. 11)."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import torch.nn.functional as F
 from torch import Tensor
 
-from shared.nn.quantizer import Quantized
-from workers.mogo.config import MOGOConfig
+from workers.mogo.config import TokenizerConfig
 from workers.mogo.model import NOT_ASKED
 from workers.mogo.tokenizer import Tokenizer
-from workers.training.tokenizing import TokenizerLoss, tokenizer_loss
 
 
-def mosa_loss(
-    model: Tokenizer, config: MOGOConfig, features: Tensor, lengths: Tensor | None = None, fraction: float = 1.0
-) -> tuple[TokenizerLoss, Quantized]:
-    """Eq. 6 plus HGM³'s terms on the joints (ours).
-
-    Args:
-        model: the tokenizer.
-        config: weights of the terms.
-        features: (B, T, D) in their own units.
-        lengths: (B,) frames, or None where every window is full.
-        fraction: of the budget used.
-    """
-    loss, quantized = tokenizer_loss(model, config, features, lengths, fraction)
-    return replace(loss, total=loss.total + config.tokenizer.regularizer * model.quantizer.regularizer()), quantized
+def scale_penalty(model: Tokenizer, config: TokenizerConfig) -> Tensor:
+    """The last term of eq. 6: what holds scales at one and biases at zero; added to `tokenizer_loss`."""
+    return config.regularizer * model.quantizer.regularizer()
 
 
 def sequence_loss(logits: Tensor, targets: Tensor) -> tuple[Tensor, Tensor]:

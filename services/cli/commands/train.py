@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -13,6 +13,8 @@ from services.cli import console
 app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
 hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
 app.add_typer(hgm3, name="hgm3")
+mogo = typer.Typer(help="MOGO: tokenizer, then transformer. No bundle yet.", no_args_is_help=True)
+app.add_typer(mogo, name="mogo")
 
 
 class Mask(StrEnum):
@@ -36,7 +38,18 @@ Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
 
 
-def _stage(name: str, what: str) -> None:
+def _run(model: Literal["hgm3", "mogo"], stage: str, as_json: bool, **chosen: Any) -> None:
+    from services.cli import roles
+
+    metrics = roles.train_stage(model, stage, **chosen)
+    if as_json:
+        console.result_json(metrics)
+    else:
+        for metric, value in metrics.items():
+            console.result(f"{metric} = {value:g}")
+
+
+def _hgm3_stage(name: str, what: str) -> None:
     """Add the command of one stage."""
 
     def command(
@@ -54,37 +67,48 @@ def _stage(name: str, what: str) -> None:
         bf16: Bf16 = True,
         as_json: console.Json = False,
     ) -> None:
-        from services.cli import roles
-
-        metrics = roles.train_stage(
-            name,
-            data,
-            run,
-            config=config,
+        _run(
+            "hgm3", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
+            resume=resume, warm=warm, device=device, threads=threads, bf16=bf16,
             mask=None if mask is None else mask.value,
-            steps=steps,
-            minutes=max_minutes,
-            seed=seed,
-            resume=resume,
-            warm=warm,
-            device=device,
-            threads=threads,
-            bf16=bf16,
-        )
-        if as_json:
-            console.result_json(metrics)
-        else:
-            for metric, value in metrics.items():
-                console.result(f"{metric} = {value:g}")
+        )  # fmt: skip
 
     hgm3.command(name, help=what)(command)
 
 
-_stage("tokenizer", "Train the residual VQ-VAE.")
-_stage("masked", "Train the masked transformer, with hard token mining.")
-_stage("residual", "Train the residual transformer.")
-_stage("length", "Train the length estimator.")
-_stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on.")
+def _mogo_stage(name: str, what: str) -> None:
+    """Add the command of one stage."""
+
+    def command(
+        data: Data,
+        run: Run,
+        config: Config = "starter",
+        steps: Steps = None,
+        max_minutes: Minutes = None,
+        seed: Seed = 0,
+        resume: Resume = False,
+        warm: Warm = False,
+        device: Device = "auto",
+        threads: Threads = 0,
+        bf16: Bf16 = True,
+        as_json: console.Json = False,
+    ) -> None:
+        _run(
+            "mogo", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
+            resume=resume, warm=warm, device=device, threads=threads, bf16=bf16,
+        )  # fmt: skip
+
+    mogo.command(name, help=what)(command)
+
+
+_hgm3_stage("tokenizer", "Train the residual VQ-VAE.")
+_hgm3_stage("masked", "Train the masked transformer, with hard token mining.")
+_hgm3_stage("residual", "Train the residual transformer.")
+_hgm3_stage("length", "Train the length estimator.")
+_hgm3_stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on.")
+_mogo_stage("tokenizer", "Train the MoSA-VQ.")
+_mogo_stage("transformer", "Train the RQHC-Transformer.")
+_mogo_stage("all", "Both stages one after another, --max-minutes for them together; called again, it goes on.")
 
 
 @hgm3.command()

@@ -9,10 +9,11 @@ import pytest
 import torch
 
 from workers.mogo.config import TINY
-from workers.mogo.losses import mosa_loss, sequence_loss
+from workers.mogo.losses import scale_penalty, sequence_loss
 from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import Tokenizer
+from workers.training.tokenizing import tokenizer_loss
 
 from .networks import columns, prompts
 
@@ -23,12 +24,11 @@ def test_the_tokenizer_is_held_to_identity_by_gamma() -> None:
     torch.manual_seed(0)
     model = Tokenizer(TINY).eval()
     model.quantizer.codebooks.normal_()
-    features = torch.randn(2, 16, TINY.features)
     free = replace(TINY, tokenizer=replace(TINY.tokenizer, regularizer=0.0))
     held = replace(TINY, tokenizer=replace(TINY.tokenizer, regularizer=3.0))
     for scale in model.quantizer.scales:
         scale.data.fill_(1.5)
-    gap = mosa_loss(model, held, features)[0].total - mosa_loss(model, free, features)[0].total
+    gap = scale_penalty(model, held.tokenizer) - scale_penalty(model, free.tokenizer)
     assert float(gap.detach()) == pytest.approx(3 * LEVELS * 0.25, rel=1e-3)
 
 
@@ -40,9 +40,9 @@ def test_the_tokenizer_learns_to_give_motion_back() -> None:
     optimizer = torch.optim.Adam(model.parameters(), lr=2e-3)
     losses: list[float] = []
     for _ in range(120):
-        loss, _ = mosa_loss(model, TINY, clips, torch.tensor([24, 24, 20, 16]), fraction=0.0)
+        loss, _ = tokenizer_loss(model, TINY, clips, torch.tensor([24, 24, 20, 16]), fraction=0.0)
         optimizer.zero_grad()
-        loss.total.backward()
+        (loss.total + scale_penalty(model, TINY.tokenizer)).backward()
         optimizer.step()
         losses.append(float(loss.features))
     assert sum(losses[-10:]) < 0.6 * sum(losses[:10])

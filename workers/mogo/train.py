@@ -1,0 +1,69 @@
+"""Training MOGO: the MoSA-VQ tokenizer, then the RQHC-Transformer on its tokens."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import torch
+
+from workers.mogo.config import MOGOConfig
+from workers.mogo.losses import scale_penalty
+from workers.mogo.stage_transformer import TransformerStage
+from workers.mogo.tokenizer import Tokenizer
+from workers.training.loop import choose_device, start_process_group
+from workers.training.motions import MotionData, load_tokens
+from workers.training.sentences import SentenceData
+from workers.training.staging import Recipe, TrainOptions, finish, train_all, use_threads
+from workers.training.texts import CaptionTexts
+from workers.training.tokenizing import TokenizerStage
+
+RECIPE = Recipe(
+    read=MOGOConfig.from_dict,
+    built_from={
+        "tokenizer": ("layout", "features", "joints", "tokenizer"),
+        "transformer": ("tokenizer", "condition", "max_frames", "transformer", "depth"),
+    },
+    shares={"tokenizer": 0.4, "transformer": 0.6},
+)
+
+
+def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    """Train one stage and write its part; returns its metrics. `all` is both.
+
+    Raises:
+        NotFound: the tokenizer has not finished, or captions have no text features.
+        InvalidInput: no such stage, or parts of another configuration.
+    """
+    if name == "all":
+        return train_all(RECIPE, train_stage, options)
+    RECIPE.check_name(name)
+    start_process_group()
+    use_threads(options.threads)
+    data = MotionData.load(options.prepared, choose_device(options.device))
+    torch.manual_seed(options.seed)
+    return _train_tokenizer(options, data) if name == "tokenizer" else _train_transformer(options, data)
+
+
+def _train_tokenizer(options: TrainOptions[MOGOConfig], data: MotionData) -> dict[str, float]:
+    tokenizer = Tokenizer(options.config)
+    config = options.config
+    stage = TokenizerStage(config, data, tokenizer, lambda: scale_penalty(tokenizer, config.tokenizer))
+    metrics = RECIPE.train(stage, options) | stage.test()
+    finish(stage.module, options, stage.name, metrics, data.sha256)
+    return metrics
+
+
+def _train_transformer(options: TrainOptions[MOGOConfig], data: MotionData) -> dict[str, float]:
+    device = data.features.device
+    tokenizer = Tokenizer(options.config).to(device)
+    tokenizer.load_state_dict(RECIPE.part("tokenizer", options.config, options.run).state)
+    tokens = load_tokens(options.run, tokenizer.eval().requires_grad_(False), data)
+    texts, width = CaptionTexts.load(data.prepared), options.config.condition.text_width
+    captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
+    torch.manual_seed(options.seed)
+    clips, sha256 = data.prepared.clips, data.sha256
+    data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
+    stage = TransformerStage(options.config, clips, tokens, captions)
+    metrics = RECIPE.train(stage, options)
+    finish(stage.module, options, stage.name, metrics, sha256)
+    return metrics
