@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from torch import Tensor
 
-from shared.bundles import Bundle, DataSource
+from shared.bundles import Bundle
 from shared.errors import InvalidInput
-from workers.hgm3.bundle import load_networks, write_bundle
+from shared.nn.bundling import write_generator
+from workers.hgm3.bundle import MODEL, load_networks
 from workers.hgm3.config import HGM3Config
-from workers.training.data.prepared import PreparedData
+from workers.training.assembly import gather
 from workers.training.parts import Part, save_part
 from workers.training.staging import Recipe
-from workers.training.texts import CaptionTexts
 
 T = TypeVar("T")
 
@@ -31,7 +30,6 @@ RECIPE = Recipe(
     shares={"tokenizer": 0.42, "masked": 0.38, "residual": 0.18, "length": 0.02},
     most_steps={"length": 1000},  # beyond them validation loss rises again (3.17 → 3.52)
 )
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def assemble(
@@ -43,8 +41,8 @@ def assemble(
         NotFound: a stage has not finished.
         InvalidInput: parts of different configurations.
     """
-    data = PreparedData.open(prepared)
-    parts = {name: RECIPE.part(name, config, run) for name in RECIPE.stages}
+    gathered = gather(prepared, run, RECIPE, config)
+    parts = gathered.parts
     masked = parts["masked"].state
     states = {
         "tokenizer": dict(parts["tokenizer"].state),
@@ -54,26 +52,10 @@ def assemble(
         "length": parts["length"].state,
     }
     statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
-    metrics = {f"{stage}/{k}": v for stage, part in parts.items() for k, v in part.metrics.items()}
-    sha256 = data.manifest.files  # the data's own hashes
-    licences = sorted({source.licence for source in data.manifest.sources})
-    sources = tuple(
-        DataSource(name=s.name, licence=s.licence, credit=s.credit, sha256=sha256["features.npy"].sha256)
-        for s in data.manifest.sources
-    )
-    return write_bundle(
-        bundle,
-        config,
-        states,
-        statistics,
-        text=CaptionTexts.load(data).spec,
-        card=card,
-        overwrite=overwrite,
-        licence=_terms(licences),
-        data=sources,
-        metrics=metrics,
-        training={"commit": _commit(), "budgets": {name: part.budget for name, part in parts.items()}},
-    )
+    return write_generator(
+        bundle, MODEL, config, states, statistics,
+        text=gathered.text, card=card, overwrite=overwrite, **gathered.manifest,
+    )  # fmt: skip
 
 
 def take_apart(bundle: Bundle, run: Path) -> HGM3Config:
@@ -118,18 +100,3 @@ def _under(state: Mapping[str, T], prefix: str) -> dict[str, T]:
 
 def _over(state: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {prefix + name: value for name, value in state.items()}
-
-
-def _terms(licences: Sequence[str]) -> str:
-    """The strictest terms of the sources, as an SPDX name."""
-    return "CC-BY-NC-4.0" if any("NC" in licence for licence in licences) else licences[0]
-
-
-def _commit() -> str | None:
-    try:
-        found = subprocess.run(
-            ["git", "rev-parse", "HEAD"], cwd=REPOSITORY, capture_output=True, text=True, check=True, timeout=10
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return found.stdout.strip()

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
-from shared.bundles import Bundle, BundleWriter, TextSpec
+from shared.bundles import Bundle, TextSpec
 from shared.errors import InvalidBundle
 from shared.motion.features import layout
+from shared.nn.bundling import fill, write_generator
 from shared.nn.motion_tokenizer import biased_std
 from workers.hgm3.config import HGM3Config, named_config
 from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
 from workers.hgm3.tokenizer import Tokenizer
 
 MODEL = "hgm3"
-NOT_STORED = ("quantizer.sums", "mean", "std")
-"""Of the tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""
 
 
 @dataclass(frozen=True)
@@ -51,50 +48,6 @@ class Networks:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def write_bundle(
-    path: Path,
-    config: HGM3Config,
-    parts: Mapping[str, Mapping[str, Tensor]],
-    statistics: tuple[NDArray[np.float32], NDArray[np.float32]],
-    *,
-    text: TextSpec,
-    card: str | None = None,
-    overwrite: bool = False,
-    **manifest: Any,
-) -> Bundle:
-    """Write a bundle from the parts' state dicts.
-
-    Args:
-        path: the bundle's folder; its last name is the bundle's.
-        config: what the networks are built from.
-        parts: state dict of each part; those of the codebooks' training are left out.
-        statistics: mean and std (D,) that the tokenizer normalises with.
-        text: encoder, labeller and caps.
-        card: the model card.
-        overwrite: replace an existing bundle.
-        manifest: licence, data, metrics, training, random, version.
-    """
-    features = layout(config.layout)
-    with BundleWriter(path, overwrite=overwrite) as writer:
-        for name, state in parts.items():
-            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in NOT_STORED})
-        writer.add_statistics(*statistics)
-        if card is not None:
-            writer.add_card(card)
-        return writer.finish(
-            name=path.name,
-            kind="generator",
-            model=MODEL,
-            config=config.name,
-            parameters=config.to_dict(),
-            skeleton=features.skeleton.name,
-            layout=config.layout,
-            fps=config.fps,
-            text=text,
-            **{"version": "1", **manifest},
-        )
-
-
 def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
     """Build and fill the networks of a bundle, float32, in evaluation mode.
 
@@ -106,27 +59,11 @@ def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
     config = HGM3Config.from_dict(bundle.manifest.parameters)
     networks = Networks.build(config)
     for name, network in networks.parts().items():
-        state = {k: torch.from_numpy(v) for k, v in bundle.tensors(name).items()}
-        missing, unexpected = _load(network, state, where=f"{bundle.path}: {name}")
-        missing = [k for k in missing if k not in NOT_STORED]
-        if missing or unexpected:
-            raise InvalidBundle(
-                f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unexpected[:3]}",
-                where=f"{bundle.path}: {name}",
-            )
-        network.eval().requires_grad_(False)
+        fill(network, bundle, name)
     mean, std = (torch.from_numpy(v) for v in bundle.statistics())
     networks.tokenizer.set_statistics(mean, std)
     networks.residual.set_codebooks(networks.tokenizer.quantizer.codebooks)
     return config, networks
-
-
-def _load(network: nn.Module, state: dict[str, Tensor], *, where: str) -> tuple[list[str], list[str]]:
-    try:
-        result = network.load_state_dict(state, strict=False)
-    except RuntimeError as error:  # a shape differs
-        raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
-    return list(result.missing_keys), list(result.unexpected_keys)
 
 
 def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int = 0) -> Bundle:
@@ -157,7 +94,9 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
         max_specifics=config.condition.max_specifics,
     )
     biased = biased_std(torch.from_numpy(std), config.tokenizer.feature_bias).numpy()
-    return write_bundle(path, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True)
+    return write_generator(
+        path, MODEL, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True
+    )
 
 
 def _standing(config: HGM3Config) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

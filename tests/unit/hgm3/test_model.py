@@ -295,7 +295,8 @@ def test_paper_sizes_are_the_published_ones() -> None:
 
 
 def test_the_starter_bundle_fits_in_16_megabytes() -> None:
-    from workers.hgm3.bundle import NOT_STORED, Networks
+    from shared.nn.bundling import NOT_STORED
+    from workers.hgm3.bundle import Networks
 
     networks = Networks.build(STARTER).parts()
     stored = [v for n in networks.values() for k, v in n.state_dict().items() if k not in NOT_STORED]

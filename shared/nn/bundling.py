@@ -1,0 +1,102 @@
+"""A generator's networks to a bundle, and a bundle's tensors back into networks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from shared.bundles import Bundle, BundleWriter, TextSpec
+from shared.errors import InvalidBundle
+from shared.motion.features import layout
+
+NOT_STORED = ("quantizer.sums", "mean", "std")
+"""Of a tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""
+
+
+class GeneratorConfig(Protocol):
+    """What a bundle's manifest says of a generator's configuration."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def layout(self) -> str: ...
+    @property
+    def fps(self) -> float: ...
+    def to_dict(self) -> dict[str, Any]: ...
+
+
+def write_generator(
+    path: Path,
+    model: str,
+    config: GeneratorConfig,
+    parts: Mapping[str, Mapping[str, Tensor]],
+    statistics: tuple[NDArray[np.float32], NDArray[np.float32]],
+    *,
+    text: TextSpec,
+    card: str | None = None,
+    overwrite: bool = False,
+    **manifest: Any,
+) -> Bundle:
+    """Write a bundle from the parts' state dicts.
+
+    Args:
+        path: the bundle's folder; its last name is the bundle's.
+        model: which network reads it.
+        config: what the networks are built from.
+        parts: state dict of each part; those of the codebooks' training are left out.
+        statistics: mean and std (D,) that the tokenizer normalises with.
+        text: encoder, labeller and caps.
+        card: the model card.
+        overwrite: replace an existing bundle.
+        manifest: licence, data, metrics, training, random, version.
+    """
+    with BundleWriter(path, overwrite=overwrite) as writer:
+        for name, state in parts.items():
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in NOT_STORED})
+        writer.add_statistics(*statistics)
+        if card is not None:
+            writer.add_card(card)
+        return writer.finish(
+            name=path.name,
+            kind="generator",
+            model=model,
+            config=config.name,
+            parameters=config.to_dict(),
+            skeleton=layout(config.layout).skeleton.name,
+            layout=config.layout,
+            fps=config.fps,
+            text=text,
+            **{"version": "1", **manifest},
+        )
+
+
+def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
+    """Load a part into its network, in place, and put that into evaluation mode for good.
+
+    Args:
+        network: built from the bundle's configuration.
+        bundle: verified.
+        part: name of the part.
+
+    Raises:
+        InvalidBundle: the tensors do not fit the network.
+    """
+    state = {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
+    where = f"{bundle.path}: {part}"
+    wanted = set(network.state_dict())
+    missing, unknown = sorted(wanted - set(state) - set(NOT_STORED)), sorted(set(state) - wanted)
+    if missing or unknown:
+        raise InvalidBundle(
+            f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unknown[:3]}", where=where
+        )
+    try:
+        network.load_state_dict(state, strict=False)
+    except RuntimeError as error:  # a shape differs
+        raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
+    network.eval().requires_grad_(False)
