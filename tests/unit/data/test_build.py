@@ -15,7 +15,7 @@ from workers.training.checks.judge import judge
 from workers.training.checks.rates import RealClip
 from workers.training.data import compose
 from workers.training.data.build import LAYOUT, build, swap_sides, windows
-from workers.training.data.compose import Counts
+from workers.training.data.compose import Counts, held_longer
 from workers.training.data.inspect import summarize
 from workers.training.data.pack import JointsPack, PackClip
 from workers.training.data.prepared import PreparedData
@@ -115,6 +115,26 @@ def test_sequences_show_their_acts_in_order(data):
         verdicts.append(judge(data.joints(clip), 20.0, expected).passed)
     assert len(made) == 15
     assert np.mean(verdicts) > 0.8
+
+
+def test_sequences_say_where_each_act_begins_and_each_act_alone(data):
+    for clip in data.clips:
+        several = len(clip.acts) > 1
+        assert len(clip.seams) == (len(clip.acts) - 1 if several else 0)
+        assert len(clip.act_captions) == (len(clip.acts) if several else 0)
+        edges = [0, *clip.seams, clip.length]
+        assert all(b - a >= 15 for a, b in zip(edges, edges[1:], strict=False))
+        assert not set(clip.act_captions) & set(clip.captions)
+
+
+def test_a_hand_is_held_longer_without_a_jump_and_unchanged_around():
+    joints = raiser("left", 4.0)
+    longer = held_longer(joints, 25, 55, 60)
+    assert longer.shape == (len(joints) + 60, 22, 3)
+    assert np.array_equal(longer[:25], joints[:25])
+    assert np.array_equal(longer[-(len(joints) - 56) :], joints[56:])
+    steps = np.linalg.norm(np.diff(longer, axis=0), axis=-1).max()
+    assert steps <= np.linalg.norm(np.diff(joints, axis=0), axis=-1).max() + 1e-9
 
 
 def test_retimed_clips_reach_lengths_that_were_not_captured(data):
