@@ -271,24 +271,29 @@ def train_stage(
 
 
 def assemble_bundle(
+    model: Literal["hgm3", "mogo"],
     data: Path,
     run: Path,
     output: Path,
     *,
     config: str,
-    mask: Literal["hard", "random"] | None,
     card: Path | None,
     overwrite: bool,
+    mask: Literal["hard", "random"] | None = None,
 ) -> str:
     """Write the bundle of a run; its exact reference."""
     try:
-        from workers.hgm3.assembly import assemble
-        from workers.hgm3.config import named_config
+        from workers.hgm3 import assembly as hgm3
+        from workers.hgm3 import config as hgm3_config
+        from workers.mogo import assembly as mogo
+        from workers.mogo import config as mogo_config
     except ImportError as error:
         raise needs_extra("worker", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
-    made = assemble(data, run, output, named_config(config, mask=mask), card=text, overwrite=overwrite)
-    return made.reference
+    if model == "hgm3":
+        chosen = hgm3_config.named_config(config, mask=mask)
+        return hgm3.assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
+    return mogo.assemble(data, run, output, mogo_config.named_config(config), card=text, overwrite=overwrite).reference
 
 
 def take_bundle_apart(bundle: str, run: Path) -> str:

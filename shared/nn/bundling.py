@@ -100,3 +100,17 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     except RuntimeError as error:  # a shape differs
         raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
     network.eval().requires_grad_(False)
+
+
+def standing(name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean and std (D,) of features of a layout around the rest pose: statistics for random weights."""
+    features = layout(name)
+    rest = features.skeleton.offsets.astype(np.float64).copy()
+    for joint, parent in enumerate(features.skeleton.parents):
+        if parent >= 0:
+            rest[joint] += rest[parent]
+    rest[:, 1] -= rest[:, 1].min()
+    mean = features.encode(np.repeat(rest[None], 3, 0))[0]
+    std = np.full(features.dim, 0.05, np.float32)
+    std[:4] = 0.01
+    return mean.astype(np.float32), std

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
 from shared.bundles import Bundle, TextSpec
 from shared.errors import InvalidBundle
-from shared.motion.features import layout
-from shared.nn.bundling import fill, write_generator
+from shared.nn.bundling import fill, standing, write_generator
 from shared.nn.motion_tokenizer import biased_std
 from workers.hgm3.config import HGM3Config, named_config
 from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
@@ -86,7 +83,7 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
         parts = {name: network.state_dict() for name, network in networks.parts().items()}
     finally:
         torch.set_rng_state(generator_state)
-    mean, std = _standing(config)
+    mean, std = standing(config.layout)
     text = TextSpec(
         encoder="minilm" if config.condition.text_width == 384 else "clip-vit-b32",
         width=config.condition.text_width,
@@ -97,17 +94,3 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
     return write_generator(
         path, MODEL, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True
     )
-
-
-def _standing(config: HGM3Config) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Mean and std (D,) of features around the rest pose."""
-    features = layout(config.layout)
-    rest = features.skeleton.offsets.astype(np.float64).copy()
-    for joint, parent in enumerate(features.skeleton.parents):
-        if parent >= 0:
-            rest[joint] += rest[parent]
-    rest[:, 1] -= rest[:, 1].min()
-    mean = features.encode(np.repeat(rest[None], 3, 0))[0]
-    std = np.full(features.dim, 0.05, np.float32)
-    std[:4] = 0.01
-    return mean.astype(np.float32), std

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -16,13 +15,13 @@ from torch import Tensor
 from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
+from shared.nn.devices import choose_device, fast_bf16
 from shared.nn.sampling import uniform
 from shared.text.features import TextFeatures
 from workers.hgm3.bundle import Networks, load_networks
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import HGM3Config, InferenceConfig
 from workers.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
-from workers.training.loop import choose_device
 
 BUCKET = 8
 """Tokens; an item is padded to a multiple of this, never to its batch's longest."""
@@ -147,7 +146,7 @@ class Generator:
         chosen = choose_device(device)
         verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
         config, networks = load_networks(verified)
-        dtype = dtype or (torch.bfloat16 if _fast_bf16(chosen) else torch.float32)
+        dtype = dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
         for part in networks.parts().values():
             part.to(chosen)
         if dtype != torch.float32:
@@ -291,11 +290,3 @@ class _Watcher:
         keep = [r not in dropped for r in self.rows]
         self.rows = [r for r in self.rows if r not in dropped]
         return torch.tensor(keep)
-
-
-def _fast_bf16(device: torch.device) -> bool:
-    """Whether bfloat16 matrices pay: CUDA, and CPUs with the instruction."""
-    if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
-    check: Callable[[], bool] | None = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
-    return os.environ.get("MAREY_BF16", "1") != "0" and check is not None and check()

@@ -6,13 +6,14 @@ import dataclasses
 
 import torch
 
+from shared.nn.devices import choose_device
 from workers.hgm3.assembly import RECIPE
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_residual import LengthStage, ResidualStage
 from workers.hgm3.tokenizer import Tokenizer
-from workers.training.loop import choose_device, start_process_group
+from workers.training.loop import start_process_group
 from workers.training.motions import MotionData, load_tokens
 from workers.training.staging import TrainOptions, finish, train_all, use_threads
 from workers.training.texts import CaptionTexts

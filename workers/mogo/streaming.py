@@ -23,6 +23,8 @@ from workers.mogo.attention import RelativeAttention
 from workers.mogo.config import InferenceConfig
 from workers.mogo.model import RQHCTransformer
 
+NEVER = 2**62
+"""More frames than any session makes."""
 TOKEN_STREAM = 4
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""
 
@@ -34,7 +36,7 @@ class StreamState:
     seeds: Tensor  # (S,) int64
     made: Tensor  # (S,) int64 frames drawn so far
     skipped: Tensor  # (S,) int64 frames that were made before the cache begins
-    may_end: Tensor  # (S,) bool: the session may draw END; others run until they are stopped
+    ends_from: Tensor  # (S,) int64: frames after which the session may draw END; NEVER: it runs until it is stopped
     ended: Tensor  # (S,) bool: it drew END, and from then on columns of -1
     last: Tensor  # (S, V) int64, the newest column; -1 before the first
     opening: Tensor  # (S, L, w) states of position 0, from which frame 1 is drawn
@@ -51,7 +53,7 @@ class StreamState:
             seeds=whole[0],
             made=whole[1],
             skipped=whole[2],
-            may_end=whole[3].bool(),
+            ends_from=whole[3] + NEVER,
             ended=whole[3].bool(),
             last=torch.full((sessions, model.levels), -1, device=device),
             opening=torch.zeros(sessions, lanes, t.width, device=device),
@@ -104,14 +106,14 @@ class Streams:
         pack_linears(self.model, dtype)
 
     def start(
-        self, sentence: Tensor, seed: int, *, may_end: bool = False, past: Tensor | None = None, skipped: int = 0
+        self, sentence: Tensor, seed: int, *, ends_from: int = NEVER, past: Tensor | None = None, skipped: int = 0
     ) -> int:
         """A new session; its first frame comes with the next step.
 
         Args:
             sentence: (W,) sentence features.
             seed: of its random numbers.
-            may_end: END may be drawn (no length was asked for).
+            ends_from: END may be drawn after so many frames (no length was asked for).
             past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
                 What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
             skipped: frames that were made before `past`.
@@ -131,7 +133,7 @@ class Streams:
         mine["seeds"].fill_(seed)
         mine["skipped"].fill_(skipped + before - len(past))
         mine["made"].fill_(skipped + before)
-        mine["may_end"].fill_(may_end)
+        mine["ends_from"].fill_(ends_from)
         mine["ended"].fill_(False)
         mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
         self._read(row, sentence, past)
@@ -266,7 +268,8 @@ class Streams:
         config, active = self.config, len(logits)
         guided = logits[:, 0] if self.branches == 1 else guide(logits[:, 0], logits[:, 1], config.guidance)
         if level == 0:
-            guided[:, self.model.end] = guided[:, self.model.end].where(self.state.may_end[:active], -torch.inf)
+            may_end = self.state.made[:active] >= self.state.ends_from[:active]
+            guided[:, self.model.end] = guided[:, self.model.end].where(may_end, -torch.inf)
         return sample_top_k(
             guided,
             noise,

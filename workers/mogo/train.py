@@ -6,25 +6,18 @@ import dataclasses
 
 import torch
 
+from shared.nn.devices import choose_device
+from workers.mogo.assembly import RECIPE
 from workers.mogo.config import MOGOConfig
 from workers.mogo.losses import scale_penalty
 from workers.mogo.stage_transformer import TransformerStage
 from workers.mogo.tokenizer import Tokenizer
-from workers.training.loop import choose_device, start_process_group
+from workers.training.loop import start_process_group
 from workers.training.motions import MotionData, load_tokens
 from workers.training.sentences import SentenceData
-from workers.training.staging import Recipe, TrainOptions, finish, train_all, use_threads
+from workers.training.staging import TrainOptions, finish, train_all, use_threads
 from workers.training.texts import CaptionTexts
 from workers.training.tokenizing import TokenizerStage
-
-RECIPE = Recipe(
-    read=MOGOConfig.from_dict,
-    built_from={
-        "tokenizer": ("layout", "features", "joints", "tokenizer"),
-        "transformer": ("tokenizer", "condition", "max_frames", "transformer", "depth"),
-    },
-    shares={"tokenizer": 0.4, "transformer": 0.6},
-)
 
 
 def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:

@@ -93,24 +93,6 @@ class RunOptions:
     quiet: bool = False
 
 
-def choose_device(name: str) -> torch.device:
-    """`auto` (CUDA where there is one), `cpu`, `cuda`, `cuda:1`.
-
-    Raises:
-        InvalidInput: the device is not there.
-    """
-    if name == "auto":
-        local = int(os.environ.get("LOCAL_RANK", "0"))
-        return torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
-    try:
-        device = torch.device(name)
-    except RuntimeError as error:
-        raise InvalidInput(f"{name!r} is no device", hint="Use auto, cpu, cuda or cuda:N.") from error
-    if device.type == "cuda" and not torch.cuda.is_available():
-        raise InvalidInput("there is no CUDA device here", where=name, hint="Use --device cpu or auto.")
-    return device
-
-
 def start_process_group() -> None:
     """Join the other processes when started by torchrun; otherwise nothing."""
     if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not dist.is_initialized():

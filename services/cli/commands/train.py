@@ -13,7 +13,7 @@ from services.cli import console
 app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
 hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
 app.add_typer(hgm3, name="hgm3")
-mogo = typer.Typer(help="MOGO: tokenizer, then transformer. No bundle yet.", no_args_is_help=True)
+mogo = typer.Typer(help="MOGO: tokenizer, transformer, then `bundle`; no worker serves it yet.", no_args_is_help=True)
 app.add_typer(mogo, name="mogo")
 
 
@@ -111,29 +111,37 @@ _mogo_stage("transformer", "Train the RQHC-Transformer.")
 _mogo_stage("all", "Both stages one after another, --max-minutes for them together; called again, it goes on.")
 
 
-@hgm3.command()
-def bundle(
+Output = Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")]
+Card = Annotated[Path | None, typer.Option("--card", help="The model card to put in.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a bundle that is there.")]
+
+
+@hgm3.command("bundle")
+def hgm3_bundle(
     data: Data,
     run: Run,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")],
+    output: Output,
     config: Config = "starter",
     mask: Masking = None,
-    card: Annotated[Path | None, typer.Option("--card", help="The model card to put in.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a bundle that is there.")] = False,
+    card: Card = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write the bundle from the parts of a run."""
     from services.cli import roles
 
-    made = roles.assemble_bundle(
-        data,
-        run,
-        output,
-        config=config,
-        mask=None if mask is None else mask.value,
-        card=card,
-        overwrite=overwrite,
-    )
+    chosen = None if mask is None else mask.value
+    made = roles.assemble_bundle("hgm3", data, run, output, config=config, card=card, overwrite=overwrite, mask=chosen)
     console.result(made)
+
+
+@mogo.command("bundle")
+def mogo_bundle(
+    data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
+) -> None:
+    """Write the bundle from the parts of a run."""
+    from services.cli import roles
+
+    console.result(roles.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
 
 
 @hgm3.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from pathlib import Path
 
@@ -123,7 +124,7 @@ def test_sequences_say_where_each_act_begins_and_each_act_alone(data):
         assert len(clip.seams) == (len(clip.acts) - 1 if several else 0)
         assert len(clip.act_captions) == (len(clip.acts) if several else 0)
         edges = [0, *clip.seams, clip.length]
-        assert all(b - a >= 15 for a, b in zip(edges, edges[1:], strict=False))
+        assert all(b - a >= 15 for a, b in itertools.pairwise(edges))
         assert not set(clip.act_captions) & set(clip.captions)
 
 

@@ -79,7 +79,7 @@ def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
         optimizer.step()
     streams = Streams(model, 2)
     for row in range(2):
-        streams.start(prompts(2)[row, 0], row, may_end=True)
+        streams.start(prompts(2)[row, 0], row, ends_from=0)
     drawn = torch.stack([torch.stack(list(streams.step().values())) for _ in range(19)], 1)  # (2, 19, V)
     for row, length in enumerate((18, 11)):
         assert torch.equal(drawn[row, :length], tokens[row, :length])

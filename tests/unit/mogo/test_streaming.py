@@ -130,7 +130,7 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
         assert torch.equal(after[name][..., 1:, :], before[name][..., 1:, :])
         for level in range(TINY.tokenizer.levels):
             assert not torch.equal(after[name][:, level, :, 0], before[name][:, level, :, 0])
-    for name in ("seeds", "made", "skipped", "may_end", "ended", "last"):
+    for name in ("seeds", "made", "skipped", "ends_from", "ended", "last"):
         assert torch.equal(after[name], before[name])
     assert all(torch.equal(part, other[name]) for name, part in streams.save(beside).items())
     fresh = Streams(transformer(config), 1)
@@ -226,7 +226,7 @@ def test_a_stream_never_ends_and_a_clip_ends_when_END_is_drawn() -> None:
     model = transformer()
     model.head.bias.data[-1] = 100.0  # END is all but certain
     streams = Streams(model, 2)
-    endless, clip = streams.start(said(1), 1), streams.start(said(1), 1, may_end=True)
+    endless, clip = streams.start(said(1), 1), streams.start(said(1), 1, ends_from=0)
     found = run(streams, 5)
     assert (found[endless] >= 0).all()
     assert (found[endless] < TINY.tokenizer.codes).all()

@@ -1,0 +1,36 @@
+"""Which device, and what it does fast."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import torch
+
+from shared.errors import InvalidInput
+
+
+def choose_device(name: str) -> torch.device:
+    """`auto` (CUDA where there is one), `cpu`, `cuda`, `cuda:1`.
+
+    Raises:
+        InvalidInput: the device is not there.
+    """
+    if name == "auto":
+        local = int(os.environ.get("LOCAL_RANK", "0"))
+        return torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+    try:
+        device = torch.device(name)
+    except RuntimeError as error:
+        raise InvalidInput(f"{name!r} is no device", hint="Use auto, cpu, cuda or cuda:N.") from error
+    if device.type == "cuda" and not torch.cuda.is_available():
+        raise InvalidInput("there is no CUDA device here", where=name, hint="Use --device cpu or auto.")
+    return device
+
+
+def fast_bf16(device: torch.device) -> bool:
+    """Whether bfloat16 matrices pay: CUDA, and CPUs with the instruction."""
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported()
+    check: Callable[[], bool] | None = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
+    return os.environ.get("MAREY_BF16", "1") != "0" and check is not None and check()

@@ -1,0 +1,93 @@
+"""Bundles of MOGO, and whole motions drawn from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.bundles import Bundle
+from shared.errors import InvalidBundle, InvalidInput
+from tests.support.prepared import text_features, write_prepared
+from workers.hgm3.bundle import random_bundle as hgm3_bundle
+from workers.mogo.assembly import assemble
+from workers.mogo.bundle import random_bundle
+from workers.mogo.config import TINY
+from workers.mogo.generate import MIN_FRAMES, Generator, Request, Settings
+from workers.mogo.train import train_stage
+from workers.training.budget import Budget
+from workers.training.staging import TrainOptions
+
+
+@pytest.fixture(scope="session")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
+    return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu")
+
+
+def test_a_motion_does_not_depend_on_those_beside_it(generator: Generator) -> None:
+    requests = [Request(text_features(k), seed=k, frames=16 + k) for k in range(8)]
+    together = generator.generate(requests)
+    for request, made in zip(requests, together, strict=True):
+        (alone,) = generator.generate([request])
+        assert made.tokens.shape == (TINY.tokenizer.levels, request.frames)
+        assert np.array_equal(alone.tokens, made.tokens)
+        assert np.array_equal(alone.features, made.features)
+
+
+def test_more_requests_than_sessions_are_all_made(generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    requests = [Request(text_features(0), seed=k, frames=16) for k in range(5)]
+    wanted = [made.tokens for made in generator.generate(requests)]
+    monkeypatch.setattr("workers.mogo.generate.MAX_SESSIONS", 2)
+    found = [made.tokens for made in generator.generate(requests)]
+    assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
+
+
+def test_an_open_length_is_the_models_within_its_limits(generator: Generator) -> None:
+    lengths = {made.features.shape[0] for made in generator.generate([Request(text_features(1), k) for k in range(40)])}
+    assert all(MIN_FRAMES <= length <= TINY.max_frames for length in lengths)
+    assert len(lengths) > 1
+
+
+def test_prompt_seed_and_settings_make_a_difference(generator: Generator) -> None:
+    made = [
+        generator.generate([Request(text_features(text), seed, 20)], Settings(temperature=heat))[0].tokens
+        for text, seed, heat in ((0, 0, None), (1, 0, None), (0, 1, None), (0, 0, 0.1))
+    ]
+    assert all(not np.array_equal(made[0], other) for other in made[1:])
+
+
+@pytest.mark.parametrize(
+    ("request_of", "where"),
+    [
+        (lambda: Request(text_features(0), 0, 15), "frames"),
+        (lambda: Request(text_features(0), 0, 25), "frames"),
+        (lambda: Request(text_features(0), -1, 20), "seed"),
+        (lambda: Request(text_features(0, width=512), 0, 20), "a person moves"),
+    ],
+)
+def test_a_request_out_of_range_is_refused(generator: Generator, request_of, where: str) -> None:
+    with pytest.raises(InvalidInput) as error:
+        generator.generate([request_of()])
+    assert error.value.where == where
+
+
+@pytest.mark.parametrize("settings", [Settings(top_k=0.0), Settings(temperature=-1.0), Settings(guidance=101.0)])
+def test_settings_out_of_range_are_refused(generator: Generator, settings: Settings) -> None:
+    with pytest.raises(InvalidInput):
+        generator.generate([Request(text_features(0), 0, 20)], settings)
+
+
+def test_a_run_becomes_a_bundle_that_generates(tmp_path: Path) -> None:
+    data = write_prepared(tmp_path / "prepared")
+    for stage in ("tokenizer", "transformer"):
+        train_stage(stage, TrainOptions(data, tmp_path / "run", TINY, Budget(steps=2), device="cpu", quiet=True))
+    bundle = assemble(data, tmp_path / "run", tmp_path / "trained", TINY, card="# card")
+    assert not bundle.manifest.random
+    made = Generator.load(Bundle.open(tmp_path / "trained"), device="cpu").generate([Request(text_features(0), 1, 20)])
+    assert np.isfinite(made[0].features).all()
+
+
+def test_a_bundle_of_another_model_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidBundle, match="of hgm3, not of mogo"):
+        Generator.load(hgm3_bundle(tmp_path / "other"), device="cpu")

@@ -1,0 +1,39 @@
+"""From the parts of a run to a bundle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shared.bundles import Bundle
+from shared.nn.bundling import write_generator
+from workers.mogo.bundle import MODEL
+from workers.mogo.config import MOGOConfig
+from workers.training.assembly import gather
+from workers.training.staging import Recipe
+
+RECIPE = Recipe(
+    read=MOGOConfig.from_dict,
+    built_from={
+        "tokenizer": ("layout", "features", "joints", "tokenizer"),
+        "transformer": ("tokenizer", "condition", "max_frames", "transformer", "depth"),
+    },
+    shares={"tokenizer": 0.4, "transformer": 0.6},
+)
+
+
+def assemble(
+    prepared: Path, run: Path, bundle: Path, config: MOGOConfig, *, card: str | None = None, overwrite: bool = False
+) -> Bundle:
+    """Write the bundle from the parts of a run.
+
+    Raises:
+        NotFound: a stage has not finished.
+        InvalidInput: parts of different configurations.
+    """
+    gathered = gather(prepared, run, RECIPE, config)
+    states = {name: dict(part.state) for name, part in gathered.parts.items()}
+    statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
+    return write_generator(
+        bundle, MODEL, config, states, statistics,
+        text=gathered.text, card=card, overwrite=overwrite, **gathered.manifest,
+    )  # fmt: skip

@@ -1,0 +1,60 @@
+"""MOGO's networks as one bundle: assembling, loading, and a random one for the machinery's tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from shared.bundles import Bundle, TextSpec
+from shared.errors import InvalidBundle
+from shared.nn.bundling import fill, standing, write_generator
+from workers.mogo.config import MOGOConfig, named_config
+from workers.mogo.model import RQHCTransformer
+from workers.mogo.tokenizer import Tokenizer
+
+MODEL = "mogo"
+
+
+def load_networks(bundle: Bundle) -> tuple[MOGOConfig, Tokenizer, RQHCTransformer]:
+    """Build and fill the networks of a bundle, float32, in evaluation mode.
+
+    Raises:
+        InvalidBundle: of another model, or its tensors do not fit its configuration.
+    """
+    if bundle.manifest.model != MODEL:
+        raise InvalidBundle(f"is a bundle of {bundle.manifest.model}, not of {MODEL}", where=str(bundle.path))
+    config = MOGOConfig.from_dict(bundle.manifest.parameters)
+    tokenizer, transformer = Tokenizer(config), RQHCTransformer(config)
+    fill(tokenizer, bundle, "tokenizer")
+    fill(transformer, bundle, "transformer")
+    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
+    tokenizer.set_statistics(mean, std)
+    return config, tokenizer, transformer
+
+
+def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int = 0) -> Bundle:
+    """A real bundle with random weights: it exercises everything and generates nonsense (manifest `random` = true).
+
+    Statistics are those of a person standing still, so that joints stay in sight.
+    """
+    path = Path(path)
+    config = named_config(config) if isinstance(config, str) else config
+    generator_state = torch.get_rng_state()
+    torch.manual_seed(seed)
+    try:
+        tokenizer, transformer = Tokenizer(config), RQHCTransformer(config)
+        tokenizer.quantizer.codebooks.normal_()
+        tokenizer.quantizer.initialized.fill_(True)
+        for layer in transformer.modules():
+            if isinstance(layer, nn.Linear):  # louder than training starts with, so that prompts make a difference
+                nn.init.normal_(layer.weight, std=0.1)
+        parts = {"tokenizer": tokenizer.state_dict(), "transformer": transformer.state_dict()}
+    finally:
+        torch.set_rng_state(generator_state)
+    width = config.condition.text_width
+    text = TextSpec(encoder="minilm" if width == 384 else "t5-base", width=width)
+    return write_generator(
+        path, MODEL, config, parts, standing(config.layout), text=text, random=True, licence="MIT", overwrite=True
+    )
