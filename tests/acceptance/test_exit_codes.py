@@ -57,7 +57,7 @@ def test_a_wrong_key_is_5(elsewhere: Marey) -> None:
 def test_cancelled_items_are_6_and_a_timeout_is_7_and_an_interrupt_130(marey: Marey, paused: str) -> None:
     marey("jobs", "wait", paused, "--timeout", 0.5).refused(7, paused, "the time allowed has passed")
     waiting = marey.start("jobs", "watch", paused)
-    time.sleep(1.5)
+    time.sleep(3.0)  # until it watches
     waiting.send_signal(signal.SIGINT)
     assert waiting.wait(10) == 130
     marey("jobs", "cancel", paused).ok()

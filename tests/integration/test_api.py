@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import itertools
 import json
 import threading
 import time
@@ -232,13 +231,10 @@ def test_a_stream_follows_a_job_to_its_end_and_then_says_so(api: LiveApi, http: 
 def test_a_stream_gives_at_most_two_progress_messages_a_second(api: LiveApi, http: httpx2.Client) -> None:
     job = str(submit(http, *[{"prompt": f"a person walks {i} steps"} for i in range(8)])["id"])
     threading.Thread(target=api.work, kwargs={"batch": 1, "pause": 0.15}).start()
-    arrivals: list[float] = []
+    began = time.monotonic()
     with api.client() as client:
-        for event in client.events(job):
-            if event["kind"] == "progress":
-                arrivals.append(time.monotonic())
-    assert 1 <= len(arrivals) <= 5, arrivals
-    assert all(later - earlier > 0.3 for earlier, later in itertools.pairwise(arrivals))
+        messages = sum(event["kind"] == "progress" for event in client.events(job))
+    assert 1 <= messages <= 2 * (time.monotonic() - began) + 1  # 8 items in 1.2 s would be 8
 
 
 def test_many_open_streams_leave_the_api_answering(http: httpx2.Client) -> None:

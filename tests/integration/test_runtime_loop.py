@@ -310,10 +310,10 @@ def test_loading_a_bundle_may_take_longer_than_a_stall(
 ) -> None:
     class SlowToLoad(ToyHandler):
         def load(self, bundle: str) -> None:
-            time.sleep(2.0)
+            time.sleep(4.0)
 
     job = submit_toys(engine, ["walk"] * 3)
-    loop = make_loop(folder_store, SlowToLoad(), rules=Policy(lease=0.4, stall=0.4))
+    loop = make_loop(folder_store, SlowToLoad(), rules=Policy(lease=2.0, stall=0.4))
     thread = threading.Thread(target=loop.run)
     thread.start()
     wait(lambda: job_row(engine, job).leased == 3)
