@@ -107,7 +107,8 @@ class ResidualStage:
 
 
 class LengthStage:
-    """Number of tokens from the sentence; clips at their own lengths."""
+    """Number of tokens from the sentence, as it is natural: looped and held clips are as long as they were drawn to be,
+    and a hand that stays up for long looks like a wave."""
 
     name = "length"
 
@@ -115,7 +116,7 @@ class LengthStage:
         self.config = config
         self.optimisation = config.train_length
         self.captions = captions
-        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
         self.lengths = tokens.lengths[:, 0].clamp(max=config.max_tokens)
         self.module = LengthEstimator(config).to(tokens.tokens.device)
         mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)

@@ -14,10 +14,20 @@ from workers.training.sentences import SentenceData
 
 
 class Pairs:
-    """Clips that have captions and are long enough."""
+    """Clips that have captions and are long enough; with `natural`, but those made longer or shorter than captured."""
 
-    def __init__(self, clips: Sequence[Clip], tokens: TokenData, captions: SentenceData, min_tokens: int) -> None:
+    def __init__(
+        self,
+        clips: Sequence[Clip],
+        tokens: TokenData,
+        captions: SentenceData,
+        min_tokens: int,
+        *,
+        natural: bool = False,
+    ) -> None:
         usable = (tokens.lengths[:, 0].cpu().numpy() >= min_tokens) & (captions.count > 0)
+        if natural:
+            usable &= [len(clip.acts) > 1 or not clip.spliced for clip in clips]
         splits = np.array([c.split for c in clips])
         self.train = np.flatnonzero(usable & (splits == "train"))
         self.validation = np.flatnonzero(usable & (splits == "val"))
