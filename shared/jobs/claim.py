@@ -88,14 +88,14 @@ def claim(
     lanes = [_Lane(row.job_id, row.batch_key, row.waited) for row in found]
     contended: list[_Lane] = []
     for lane in _preferred_first(lanes, prefer_batch_key, rules.patience):
-        job = lock_job(conn, lane.job, skip_locked=True)
-        if job is None:
-            contended.append(lane)
-        elif (taken := _take(conn, job, queue, lane.batch_key, worker, limit, rules)) is not None:
+        taken, locked = _try_lane(conn, lane, queue, worker, limit, rules, skip_locked=True)
+        if taken is not None:
             return taken
+        if not locked:
+            contended.append(lane)
     for lane in contended:  # only lanes that others are changing right now: wait for them
-        job = lock_job(conn, lane.job)
-        if job is not None and (taken := _take(conn, job, queue, lane.batch_key, worker, limit, rules)) is not None:
+        taken, _ = _try_lane(conn, lane, queue, worker, limit, rules, skip_locked=False)
+        if taken is not None:
             return taken
     return None
 
@@ -167,6 +167,24 @@ def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, patience: float
     return ordered
 
 
+def _try_lane(
+    conn: sa.Connection, lane: _Lane, queue: str, worker: str, limit: int, rules: Policy, *, skip_locked: bool
+) -> tuple[Claim | None, bool]:
+    """What was taken of a lane, and whether its job could be locked.
+
+    Where nothing was taken the job is free again: two workers that each kept one job and waited for the other's would
+    wait for ever.
+    """
+    savepoint = conn.begin_nested()
+    job = lock_job(conn, lane.job, skip_locked=skip_locked)
+    taken = None if job is None else _take(conn, job, queue, lane.batch_key, worker, limit, rules)
+    if taken is None:
+        savepoint.rollback()
+    else:
+        savepoint.commit()
+    return taken, job is not None
+
+
 def _take(
     conn: sa.Connection, job: LockedJob, queue: str, batch_key: str, worker: str, limit: int, rules: Policy
 ) -> Claim | None:
@@ -192,7 +210,6 @@ def _take(
         solo = True
         rows = conn.execute(PICK, of_lane | {"solo": True, "limit": 1}).mappings().all()
     if not rows:
-        conn.execute(sa.delete(schema.lease).where(schema.lease.c.token == token))
         return None
     if solo:
         conn.execute(sa.update(schema.lease).where(schema.lease.c.token == token).values(solo=True))

@@ -50,7 +50,7 @@ from tests.servers.jobs import (
 PROCESSES = multiprocessing.get_context("fork")  # eight imports would take longer than the test
 
 
-def claim_everything(url: str, worker: str, gate: Barrier, found: SimpleQueue[list[UUID]]) -> None:
+def claim_everything(url: str, worker: str, gate: Barrier, found: SimpleQueue[list[bytes]]) -> None:
     """A worker process that claims until nothing is left."""
     engine = create_engine(url)
     claimed: list[UUID] = []
@@ -61,7 +61,7 @@ def claim_everything(url: str, worker: str, gate: Barrier, found: SimpleQueue[li
         if taken is None:
             break
         claimed += [item.id for item in taken.items]
-    found.put(claimed)
+    found.put([item.bytes for item in claimed])
 
 
 def nothing_for(engine: sa.Engine, queue: str = "hgm3") -> bool:
@@ -79,10 +79,10 @@ def test_eight_processes_claim_a_thousand_items_and_no_item_twice(engine: sa.Eng
     ]
     for process in processes:
         process.start()
-    shares = [found.get() for _ in processes]
-    for process in processes:
-        process.join(10)
+    for process in processes:  # before their results: who failed puts none
+        process.join(120)
     assert [process.exitcode for process in processes] == [0] * 8
+    shares = [found.get() for _ in processes]
     claimed = Counter(item for share in shares for item in share)
     assert len(claimed) == 1000
     assert set(claimed.values()) == {1}
