@@ -21,16 +21,7 @@ from workers.hgm3.model import LEVELS, GraphBatch, LossPredictor, MaskedTransfor
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
-from workers.training.pairs import Pairs
-
-
-def pieces_of(lengths: Tensor) -> list[Tensor]:
-    """Rows (B,) of a batch in four pieces of alike length, each padded to its own longest: same sum, less padding.
-
-    One piece on an accelerator, which waits for launches rather than for padding.
-    """
-    order = torch.argsort(lengths, stable=True)
-    return list(order.chunk(min(4, len(order)))) if lengths.device.type == "cpu" else [order]
+from workers.training.pairs import Pairs, pieces_of
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,10 @@ from shared.nn.losses import token_losses
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData
 from workers.hgm3.model import LengthEstimator, ResidualTransformer
-from workers.hgm3.stage_masked import pieces_of
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
-from workers.training.pairs import Pairs
+from workers.training.pairs import Pairs, pieces_of
 
 
 class ResidualStage:

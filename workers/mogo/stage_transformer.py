@@ -21,13 +21,12 @@ from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
-from workers.training.pairs import Pairs
+from workers.training.pairs import Pairs, pieces_of
 from workers.training.sentences import SentenceData, text_statistics
 
 MIN_FRAMES = 16
 CROPPED, STEERED = 0.4, 0.7
 """Share of the clips that are cropped, and of the clips of several acts that are steered."""
-PIECES = 4
 
 
 @dataclass(frozen=True)
@@ -48,10 +47,8 @@ class Sample:
         return Sample(**{**fields, "tokens": fields["tokens"][:, :size]})
 
     def pieces(self) -> Iterator[Sample]:
-        """A few pieces of alike length, each padded to its own longest: same sum, less padding."""
-        order = torch.argsort(self.lengths, stable=True)
-        for rows in order.chunk(min(PIECES, len(order))):
-            yield self.select(rows)
+        """In `pieces_of` alike length, each padded to its own longest."""
+        return map(self.select, pieces_of(self.lengths))
 
 
 @dataclass(frozen=True)
