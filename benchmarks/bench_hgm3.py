@@ -22,8 +22,9 @@ import torch
 from benchmarks.harness import measure, table
 from shared.text.features import TextFeatures
 from shared.text.graph import Edge, Node, SemanticGraph
+from workers.generating.port import Request
 from workers.hgm3.bundle import random_bundle
-from workers.hgm3.generate import Generator, Request, Settings
+from workers.hgm3.generate import Generator, Settings
 
 THREADS = 2
 FRAMES = 196

@@ -3,12 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar, cast, get_type_hints
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from typing import Any, Self, TypeVar, cast, get_type_hints
 
 from shared.errors import InvalidInput
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Base of what decides a model's shapes and training."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values, for manifests and checkpoints."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Rebuild a configuration from `to_dict`'s output (lists become tuples).
+
+        Raises:
+            InvalidInput: an unknown field.
+        """
+        return build_config(cls, values)
+
+
+def named(configs: Mapping[str, T], name: str) -> T:
+    """One of several configurations.
+
+    Raises:
+        InvalidInput: there is none of that name.
+    """
+    if name not in configs:
+        raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(configs)}.")
+    return configs[name]
 
 
 def build_config(kind: type[T], values: Mapping[str, Any], where: str = "config") -> T:

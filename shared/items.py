@@ -29,17 +29,22 @@ MAX_TAGS, MAX_TAG_LENGTH = 20, 64
 
 COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
 FIELDS = (*COLUMNS, "settings")
+OUTPUT_FPS = "fps"
+"""The one setting of an item that is not the network's: the frame rate of its files."""
 SETTINGS = {
     "steps": (1, 100),
     "guidance": (0.0, 100.0),
     "temperature": (0.0, 100.0),
     "top_k": (0.001, 1.0),
+    "upper_temperature": (0.0, 100.0),
+    "upper_top_k": (0.001, 1.0),
     "residual_guidance": (0.0, 100.0),
     "residual_temperature": (0.0, 100.0),
     "residual_top_k": (0.001, 1.0),
-    "fps": (1.0, 240.0),
+    OUTPUT_FPS: (1.0, 240.0),
 }
-"""Settings of sampling, and the frame rate of the files, each with its range. One with whole bounds is whole."""
+"""Settings of sampling, each with its range; which of them a model has, its bundle says. One with whole bounds is
+whole."""
 
 NAME = re.compile(r"[^\W_][\w .()+=@,-]{0,99}", re.ASCII)
 """A name becomes a file name on the client: plain characters, no separators, no leading dot or dash."""

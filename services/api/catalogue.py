@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from shared.bundles import Bundle, TextSpec, choose_bundle, list_bundles
 from shared.errors import InvalidBundle, InvalidInput
+from shared.items import OUTPUT_FPS, SETTINGS
 from shared.settings import Settings
 from shared.text.keys import resolve
 
@@ -29,6 +31,10 @@ class Offer:
     def check_seconds(self, seconds: float | None) -> None:
         """See `check_seconds`."""
         check_seconds(self.bundle, seconds)
+
+    def check_settings(self, names: Iterable[str]) -> None:
+        """See `check_settings`."""
+        check_settings(self.bundle, names)
 
 
 class Catalogue:
@@ -91,3 +97,16 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
     if seconds is not None and not low <= seconds <= high:
         name = bundle.manifest.name
         raise InvalidInput(f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {name}")
+
+
+def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
+    """Nothing, if the model has all these settings.
+
+    Raises:
+        InvalidInput: it has not.
+    """
+    known = [name for name in SETTINGS if name == OUTPUT_FPS or name in bundle.manifest.parameters["inference"]]
+    for name in names:
+        if name not in known:
+            model = bundle.manifest.name
+            raise InvalidInput(f"{name!r} is not a setting of {model}; known are {', '.join(known)}")

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -18,13 +19,25 @@ if TYPE_CHECKING:
     from shared.motion.clip import MotionClip
     from shared.runtime.handler import Role
     from shared.settings import Settings
+    from workers.generating.port import Generator
     from workers.training.data.pack import JointsPack
 
-HANDLERS = {"hgm3": "workers.hgm3.handler:create_handler", "text": "services.text.handler:create_handler"}
+HANDLERS = {
+    "hgm3": "workers.hgm3.handler:create_handler",
+    "mogo": "workers.mogo.handler:create_handler",
+    "text": "services.text.handler:create_handler",
+}
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
-GENERATORS = frozenset({"hgm3"})
-DEFAULT_ROLES = "hgm3+text"
-"""One child that generates, and parses prompts when there are any: two would fight for the cores."""
+GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
+"""Where each model's `Generator` is."""
+
+
+def default_roles(config: Settings) -> str:
+    """One child for every model that has a bundle here, and for prompts: two would fight for the cores."""
+    from shared.bundles import list_bundles
+
+    here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
+    return "+".join([*([model for model in GENERATORS if model in here] or ["hgm3"]), "text"])
 
 
 def parse_roles(text: str) -> list[tuple[str, ...]]:
@@ -84,14 +97,15 @@ class OneShot:
         """
         try:
             from shared.text.pipeline import TextPipeline
-            from workers.hgm3.generate import Generator
+
+            kind = import_module(GENERATORS[bundle.manifest.model]).Generator
         except ImportError as error:
             raise needs_extra("worker", error) from error
         if bundle.manifest.text is None:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
         self._text = TextPipeline.load(bundle.manifest.text)
-        self._generator = Generator.load(bundle, device=config.device, threads=threads_of(config, 1))
+        self._generator: Generator[Any] = kind.load(bundle, device=config.device, threads=threads_of(config, 1))
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
         """Each motion with the seconds it took, in the order given.
@@ -99,22 +113,23 @@ class OneShot:
         Raises:
             InvalidInput: a length this bundle cannot make; before anything is made.
         """
-        from workers.hgm3.export import finish, split_settings
-        from workers.hgm3.generate import MAX_ROWS, Request
+        from workers.generating.export import finish, split_settings
+        from workers.generating.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
-        fps = self._generator.config.fps
+        fps = self._generator.limits.fps
         requests = [
             Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps))
             for w, text in zip(wanted, features, strict=True)
         ]
-        self._generator.frames(requests)
+        requests = [self._generator.settled(request) for request in requests]
         start = 0
         for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
             rows = list(group)
-            settings, output_fps = split_settings(rows[0].settings)
-            for low in range(0, len(rows), MAX_ROWS):
-                batch = requests[start + low : start + min(low + MAX_ROWS, len(rows))]
+            values, output_fps = split_settings(rows[0].settings)
+            settings, size = self._generator.settings(values), self._generator.batch
+            for low in range(0, len(rows), size):
+                batch = requests[start + low : start + min(low + size, len(rows))]
                 began = time.monotonic()
                 made = self._generator.generate(batch, settings)
                 elapsed = (time.monotonic() - began) / len(batch)
@@ -249,6 +264,7 @@ def train_stage(
     config: str,
     steps: int | None,
     minutes: float | None,
+    rate: float | None = None,
     mask: Literal["hard", "random"] | None = None,
     **options: Any,
 ) -> dict[str, float]:
@@ -259,15 +275,16 @@ def train_stage(
         from workers.mogo import config as mogo_config
         from workers.mogo import train as mogo
         from workers.training.budget import Budget
+        from workers.training.optimisation import with_learning_rate
         from workers.training.staging import TrainOptions
     except ImportError as error:
         raise needs_extra("worker", error) from error
     budget = Budget(steps, minutes)
     if model == "hgm3":
-        return hgm3.train_stage(
-            name, TrainOptions(data, run, hgm3_config.named_config(config, mask=mask), budget, **options)
-        )
-    return mogo.train_stage(name, TrainOptions(data, run, mogo_config.named_config(config), budget, **options))
+        chosen = with_learning_rate(hgm3_config.named_config(config, mask=mask), name, rate)
+        return hgm3.train_stage(name, TrainOptions(data, run, chosen, budget, **options))
+    mogos = with_learning_rate(mogo_config.named_config(config), name, rate)
+    return mogo.train_stage(name, TrainOptions(data, run, mogos, budget, **options))
 
 
 def assemble_bundle(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -100,6 +100,28 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     except RuntimeError as error:  # a shape differs
         raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
     network.eval().requires_grad_(False)
+
+
+def random_parts(
+    build: Callable[[], Mapping[str, nn.Module]], loud: Collection[str], seed: int
+) -> dict[str, dict[str, Tensor]]:
+    """State dicts of networks with random weights, the same for the same seed.
+
+    Args:
+        build: makes the networks, by part; one is the `tokenizer`, whose codebooks are drawn as well.
+        loud: parts whose matrices are louder than training starts with, so that prompts make a difference.
+        seed: torch's own generator stays as it was.
+    """
+    with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]
+        torch.manual_seed(seed)  # pyright: ignore[reportUnknownMemberType]
+        networks = build()
+        quantizer: Any = networks["tokenizer"].quantizer
+        quantizer.codebooks.normal_()
+        quantizer.initialized.fill_(True)
+        for layer in (layer for name in loud for layer in networks[name].modules()):
+            if isinstance(layer, nn.Linear):
+                nn.init.normal_(layer.weight, std=0.1)
+        return {name: network.state_dict() for name, network in networks.items()}
 
 
 def standing(name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -17,16 +17,19 @@ from shared.nn.packed import PackedLinear, can_pack, pack_linears
 
 SEQUENCE_MULTIPLE = 16
 """Sequences padded to a multiple of this give the same bits however much padding follows (see `pad_length`)."""
+PACKED_MULTIPLE = 8
+"""What is enough after `Transformer.lower`: packed products give a row the same bits beside any others, and attention
+pads its own rows and keys on to `SEQUENCE_MULTIPLE`."""
 
 
-def pad_length(size: int) -> int:
+def pad_length(size: int, multiple: int = SEQUENCE_MULTIPLE) -> int:
     """`size` rounded up to a multiple of 16.
 
     A softmax over keys sums in vectors of 16 lanes and treats a last incomplete vector apart. Where all readable keys
     lie in whole vectors, masked keys behind them add exact zeros: measured with torch 2.13 on AVX-512, float32 and
     bfloat16, outputs are equal bit by bit.
     """
-    return -(-size // SEQUENCE_MULTIPLE) * SEQUENCE_MULTIPLE
+    return -(-size // multiple) * multiple
 
 
 def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
@@ -67,6 +70,12 @@ def _attention(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, r
     return torch.bmm(weights, value).view(batch, heads, size, width)
 
 
+def _whole(rows: Tensor) -> Tensor:
+    """(B, H, S, D), S rounded up to a multiple of 16 with zeros."""
+    missing = -rows.shape[2] % SEQUENCE_MULTIPLE
+    return F.pad(rows, (0, 0, 0, missing)) if missing else rows
+
+
 class Attention(nn.Module):
     """Multi-head self-attention."""
 
@@ -77,6 +86,7 @@ class Attention(nn.Module):
             raise ValueError(f"width {width} does not divide into {heads} heads")
         self.heads = heads
         self.dropout = dropout
+        self.packed = False
         self.qkv = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
 
@@ -85,12 +95,16 @@ class Attention(nn.Module):
         batch, size, width = x.shape
         qkv = self.qkv(x).view(batch, size, 3, self.heads, width // self.heads)
         query, key, value = qkv.permute(2, 0, 3, 1, 4)  # each (B, H, S, w / H)
-        query = query[:, :, :rows]
         rate = self.dropout if self.training else 0.0
-        if x.device.type == "cpu":
-            mixed = _attention(query, key, value, mask, rate)
-        else:
+        if x.device.type != "cpu":
             mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=rate)
+        elif self.packed and mask is not None:
+            query, key, value = (_whole(part) for part in (query, key, value))
+            mixed = _attention(query, key, value, F.pad(mask, (0, key.shape[2] - size)), rate)
+        else:
+            mixed = _attention(query, key, value, mask, rate)
+        # Not before: float32 products of few rows add in another order on some processors.
+        mixed = mixed[:, :, : size if rows is None else rows]
         return self.out(mixed.transpose(1, 2).reshape(batch, -1, width))
 
 
@@ -122,6 +136,7 @@ class Block(nn.Module):
         """Pack the matrices for inference on a CPU, GELU into the first of the feed-forward."""
         if isinstance(self.wide, nn.Linear):
             self.wide, self.gelu = PackedLinear(self.wide, dtype, many=True, gelu=True), nn.Identity()
+        self.attention.packed = True
         pack_linears(self, dtype, many=True)
 
     def _feedforward(self, x: Tensor) -> Tensor:
@@ -152,6 +167,7 @@ class Transformer(nn.Module):
         self.norm = nn.LayerNorm(width) if norm_first else nn.Identity()
         self.dropout = dropout
         self.dtype = torch.float32
+        self.multiple = SEQUENCE_MULTIPLE  # of rows, for bits that do not depend on padding
 
     def forward(self, x: Tensor, valid: Tensor | None, rows: int | None = None) -> Tensor:
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
@@ -176,6 +192,7 @@ class Transformer(nn.Module):
             for block in self.blocks:
                 if isinstance(block, Block):
                     block.pack(dtype)
+            self.multiple = PACKED_MULTIPLE
 
 
 def sinusoidal_positions(size: int, width: int) -> Tensor:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from shared.bundles import Bundle
 from shared.errors import InvalidBundle
@@ -36,9 +37,7 @@ class LightLabeller:
         self.sha256 = sha256
         self._network = network.eval()
         self._states = states
-        self._tags = network.config.tags
-        self._transitions = transition_scores(self._tags) + network.transitions.detach().double().numpy()
-        self._start = start_scores(self._tags)
+        self._decoder = Decoder(network.config.tags, network.transitions)
 
     @classmethod
     def load(cls, bundle: Bundle, *, minilm: Path | None = None) -> LightLabeller:
@@ -96,9 +95,19 @@ class LightLabeller:
         count = len(found)
         logits = network.tag_logits(hidden.expand(count, -1, -1), found, mask.expand(count, -1))
         emissions = torch.log_softmax(logits, dim=-1).double().numpy()
-        return [self._decode(scores, int(i)) for scores, i in zip(emissions, found, strict=True)]
+        return [self._decoder(scores, int(i)) for scores, i in zip(emissions, found, strict=True)]
 
-    def _decode(self, emissions: np.ndarray[tuple[int, int], np.dtype[np.float64]], predicate: int) -> Frame:
+
+class Decoder:
+    """Scores of tags to a frame: the best legal sequence under learned transitions."""
+
+    def __init__(self, tags: Sequence[str], transitions: torch.Tensor) -> None:
+        self._tags = tags
+        self._transitions = transition_scores(tags) + transitions.detach().double().numpy()
+        self._start = start_scores(tags)
+
+    def __call__(self, emissions: NDArray[np.float64], predicate: int) -> Frame:
+        """The frame of a predicate (word index) from (T, K) log-probabilities, which are changed."""
         emissions[predicate, 1:] = -1e9  # the predicate is no argument of itself; tag 0 is O
         path = viterbi(emissions, self._transitions, self._start)
         return Frame(predicate, spans_to_arguments([self._tags[tag] for tag in path]))

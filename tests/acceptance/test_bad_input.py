@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.marey import TINY, Marey
+from tests.support.marey import TINY, TINY_MOGO, Marey
 
 
 def nothing_new(marey: Marey, before: list[dict[str, object]]) -> None:
@@ -82,10 +82,18 @@ def test_a_length_this_model_cannot_make_names_its_range(marey: Marey, offline: 
     assert not (tmp_path / "out").exists()
 
 
+def test_a_setting_that_only_another_model_has_is_refused_by_name(marey: Marey, offline: Marey, tmp_path: Path) -> None:
+    line = json.dumps({"prompt": "a person waves", "model": "mogo", "settings": {"steps": 12}})
+    marey("submit", "-f", "-", stdin=line).refused(2, "line 1: settings", "'steps'", TINY_MOGO, "upper_top_k")
+    ran = offline("generate", "-f", "-", "-o", tmp_path / "out", stdin=line)
+    ran.refused(2, "line 1: settings", "'steps'", TINY_MOGO)
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_unknown_model_names_the_known_ones(marey: Marey, offline: Marey) -> None:
-    marey("submit", "a person waves", "--model", "mogo").refused(2, "line 1: model", "'mogo'", TINY)
-    offline("generate", "a person waves", "--model", "mogo").refused(3, "'mogo'", TINY)
-    marey("models", "show", "mogo").refused(3, "'mogo'", TINY)
+    marey("submit", "a person waves", "--model", "nomo").refused(2, "line 1: model", "'nomo'", TINY)
+    offline("generate", "a person waves", "--model", "nomo").refused(3, "'nomo'", TINY)
+    marey("models", "show", "nomo").refused(3, "'nomo'", TINY)
 
 
 @pytest.mark.parametrize("name", ["../../etc/x", "/etc/x", "a/b", "..\\x", ".ssh", "con"])
@@ -155,8 +163,8 @@ def test_damaged_weights(offline: Marey, models: Path, tmp_path: Path) -> None:
 def test_a_foreign_bundle_and_no_bundle_at_all(offline: Marey, models: Path, tmp_path: Path) -> None:
     bundle = damaged(models, tmp_path)
     manifest = json.loads((bundle / "manifest.json").read_text())
-    (bundle / "manifest.json").write_text(json.dumps({**manifest, "model": "mogo"}))
-    offline("generate", "a person waves", "--bundle", bundle).refused(2, "mogo")
+    (bundle / "manifest.json").write_text(json.dumps({**manifest, "model": "nomo"}))
+    offline("generate", "a person waves", "--bundle", bundle).refused(2, "nomo")
     (bundle / "manifest.json").write_text("{}")
     offline("generate", "a person waves", "--bundle", bundle).refused(2, "not a manifest this version reads")
     offline("generate", "a person waves", "--bundle", tmp_path).refused(2, "not a model bundle")

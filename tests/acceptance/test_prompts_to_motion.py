@@ -10,7 +10,7 @@ import pytest
 
 from shared.motion.bvh import read_bvh
 from shared.motion.clip import load_npz
-from tests.support.marey import TINY, Marey
+from tests.support.marey import TINY, TINY_MOGO, Marey
 
 FIELDS = ["job", "item", "motion", "name", "prompt", "variant", "model", "bundle", "licence", "seed", "state", "error",
           "frames", "fps", "elapsed", "files"]  # fmt: skip
@@ -66,6 +66,20 @@ def test_a_one_shot_makes_the_same_tokens_as_the_queue(
     ours, theirs = load_npz(made[0]["files"]["npz"]), load_npz(line["files"]["npz"])
     # Each motion is decoded by itself, so equal tokens are equal numbers, in a batch of one or two.
     np.testing.assert_array_equal(ours.features, theirs.features)
+
+
+def test_another_model_makes_motions_by_the_same_queue_and_alone(marey: Marey, offline: Marey, tmp_path: Path) -> None:
+    table = "prompt,model,seconds,seed\na person walks,mogo,1,3\nsomeone waves,mogo,,\n"
+    queued = marey("submit", "-f", "-", "--fetch", tmp_path / "a", "--json", stdin=table).ok().lines
+    alone = offline(
+        "generate", "a person walks", "--model", "mogo", "--seed", 3, "--seconds", 1, "-o", tmp_path / "b", "--json"
+    ).ok().lines  # fmt: skip
+    assert [line["model"] for line in (*queued, *alone)] == ["mogo"] * 3
+    assert {str(line["bundle"]).partition("@")[0] for line in queued} == {TINY_MOGO}
+    ours, theirs = load_npz(alone[0]["files"]["npz"]), load_npz(queued[0]["files"]["npz"])
+    assert ours.frames == 20
+    np.testing.assert_array_equal(ours.features, theirs.features)
+    assert read_bvh(queued[1]["files"]["bvh"]).frames == queued[1]["frames"]
 
 
 def test_fetching_again_changes_nothing_and_a_foreign_file_is_not_touched(marey: Marey, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = (sys.executable, "-m", "services.cli")
 START_SECONDS = 90.0
 TINY = "hgm3-tiny"
+TINY_MOGO = "mogo-tiny"
 
 
 @dataclass(frozen=True)
@@ -154,10 +155,12 @@ def serving(marey: Marey) -> Iterator[Serving]:
 
 
 def tiny_models(folder: Path) -> Path:
-    """A folder of models: HGM³ with random weights, and the labeller that comes with the product."""
-    from workers.hgm3.bundle import random_bundle
+    """A folder of models: HGM³ and MOGO with random weights, and the labeller that comes with the product."""
+    from workers.hgm3 import bundle as hgm3
+    from workers.mogo import bundle as mogo
 
-    random_bundle(folder / TINY)
+    hgm3.random_bundle(folder / TINY)
+    mogo.random_bundle(folder / TINY_MOGO)
     shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "srl-light")
     return folder
 

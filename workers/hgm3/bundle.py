@@ -10,7 +10,7 @@ from torch import nn
 
 from shared.bundles import Bundle, TextSpec
 from shared.errors import InvalidBundle
-from shared.nn.bundling import fill, standing, write_generator
+from shared.nn.bundling import fill, random_parts, standing, write_generator
 from shared.nn.motion_tokenizer import biased_std
 from workers.hgm3.config import HGM3Config, named_config
 from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
@@ -70,19 +70,7 @@ def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config
-    generator_state = torch.get_rng_state()
-    torch.manual_seed(seed)
-    try:
-        networks = Networks.build(config)
-        networks.tokenizer.quantizer.codebooks.normal_()
-        networks.tokenizer.quantizer.initialized.fill_(True)
-        for name in ("masked", "predictor", "residual"):
-            for layer in getattr(networks, name).modules():
-                if isinstance(layer, nn.Linear):  # louder than training starts with, so that prompts make a difference
-                    nn.init.normal_(layer.weight, std=0.1)
-        parts = {name: network.state_dict() for name, network in networks.parts().items()}
-    finally:
-        torch.set_rng_state(generator_state)
+    parts = random_parts(lambda: Networks.build(config).parts(), ("masked", "predictor", "residual"), seed)
     mean, std = standing(config.layout)
     text = TextSpec(
         encoder="minilm" if config.condition.text_width == 384 else "clip-vit-b32",

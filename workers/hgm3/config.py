@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, Self
+from dataclasses import dataclass, replace
+from typing import Literal
 
-from shared.configs import build_config
-from shared.errors import InvalidInput
+from shared.configs import ModelConfig, named
 from workers.training.optimisation import StageConfig
 
 
@@ -96,7 +94,7 @@ class InferenceConfig:
 
 
 @dataclass(frozen=True)
-class HGM3Config:
+class HGM3Config(ModelConfig):
     """Everything that decides shapes and training of one bundle."""
 
     name: str = "paper"
@@ -132,19 +130,6 @@ class HGM3Config:
     def min_tokens(self) -> int:
         """Shortest clip in tokens."""
         return -(-self.min_frames // self.tokenizer.frames_per_token)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values, for manifests and checkpoints."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Rebuild a configuration from `to_dict`'s output (lists become tuples).
-
-        Raises:
-            InvalidInput: an unknown field.
-        """
-        return build_config(cls, values)
 
 
 PAPER = HGM3Config()
@@ -205,7 +190,5 @@ def named_config(name: str, *, mask: Literal["hard", "random"] | None = None) ->
     Raises:
         InvalidInput: no such configuration.
     """
-    if name not in CONFIGS:
-        raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(CONFIGS)}.")
-    config = CONFIGS[name]
+    config = named(CONFIGS, name)
     return config if mask is None else replace(config, mining=replace(config.mining, mask=mask))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -17,7 +17,7 @@ from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
 from shared.nn.devices import choose_device, fast_bf16
 from shared.nn.sampling import uniform
-from shared.text.features import TextFeatures
+from workers.generating.port import Control, Limits, NoControl, Request, read_settings
 from workers.hgm3.bundle import Networks, load_networks
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import HGM3Config, InferenceConfig
@@ -27,16 +27,6 @@ BUCKET = 8
 """Tokens; an item is padded to a multiple of this, never to its batch's longest."""
 MAX_ROWS = 32
 """Items a forward; beyond it a larger batch gains nothing on a CPU and costs memory."""
-MAX_SEED = 2**31 - 1
-
-
-@dataclass(frozen=True)
-class Request:
-    """One motion to make."""
-
-    text: TextFeatures
-    seed: int
-    frames: int | None = None  # at the model's fps; None = the length estimator decides
 
 
 @dataclass(frozen=True)
@@ -91,27 +81,6 @@ class Generated:
     decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
 
 
-class Control(Protocol):
-    """What a caller may do while a batch is decoded."""
-
-    def progress(self, done: int, total: int) -> None:
-        """Called after each step of the batch."""
-        ...
-
-    def dropped(self) -> set[int]:
-        """Indices of requests to leave out from now on (cancelled)."""
-        ...
-
-
-class _NoControl:
-    def progress(self, done: int, total: int) -> None:
-        """Nobody listens."""
-
-    def dropped(self) -> set[int]:
-        """Nobody is left out."""
-        return set()
-
-
 class Generator:
     """A loaded bundle. Not thread-safe; one a process."""
 
@@ -124,6 +93,8 @@ class Generator:
         self.device = device
         self.dtype = dtype
         self.layout: FeatureLayout = layout(config.layout)
+        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
+        self.batch = MAX_ROWS
 
     @classmethod
     def load(
@@ -175,30 +146,40 @@ class Generator:
         settings = settings or Settings()
         inference = settings.inference(self.config.inference)
         options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress)
-        frames = self.frames(requests)
+        frames = [self.frames(request) for request in requests]
         results: list[Generated | None] = [None] * len(requests)
         groups = self._groups(frames)
-        watcher = _Watcher(control or _NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
+        watcher = _Watcher(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
         for rows in groups:
             self._group(rows, requests, frames, inference, options, watcher, results)
         return results
 
-    def frames(self, requests: Sequence[Request]) -> list[int]:
-        """Feature frames of each request: as asked, or drawn from the length estimator with the item's seed."""
-        low, high = self.config.min_frames, self.config.max_frames
-        for request in requests:
-            if request.frames is not None and not low <= request.frames <= high:
-                seconds = f"{low / self.config.fps:g} to {high / self.config.fps:g} seconds"
-                raise InvalidInput(
-                    f"{request.frames} frames is out of range: this bundle makes {seconds}", where="frames"
-                )
-            if not 0 <= request.seed <= MAX_SEED:
-                raise InvalidInput(f"{request.seed} must lie between 0 and {MAX_SEED}", where="seed")
-        frames = [r.frames if r.frames is not None else 0 for r in requests]
-        open_rows = [i for i, r in enumerate(requests) if r.frames is None]
-        for row in open_rows:  # one by one: a matrix product of another height may round differently
-            frames[row] = self._estimate(requests[row])
-        return frames
+    def settings(self, values: Mapping[str, Any]) -> Settings:
+        """An item's settings, checked. Raises InvalidInput."""
+        settings = read_settings(Settings, values, InferenceConfig.__dataclass_fields__)
+        settings.inference(self.config.inference)
+        return settings
+
+    def described(self, settings: Settings) -> dict[str, Any]:
+        """Everything that decides how tokens are drawn."""
+        return asdict(settings.inference(self.config.inference))
+
+    def settled(self, request: Request) -> Request:
+        """The request with the length that the estimator draws with its seed, where none was asked for."""
+        return replace(request, frames=self.frames(request))
+
+    def frames(self, request: Request) -> int:
+        """Feature frames: as asked, or drawn from the length estimator. Raises InvalidInput out of range."""
+        self.limits.check(request)
+        return self._estimate(request) if request.frames is None else request.frames
+
+    def bucket(self, request: Request) -> int:
+        """Tokens, rounded up: those of one forward."""
+        return self._bucket(self.frames(request))
+
+    def _bucket(self, frames: int) -> int:
+        tokens = -(-frames // self.frames_per_token)
+        return -(-tokens // BUCKET) * BUCKET
 
     def _estimate(self, request: Request) -> int:
         """Frames from the middle third of the estimated distribution (ours): seeds differ, extremes do not come."""
@@ -214,8 +195,7 @@ class Generator:
         """Rows of one bucket each, at most MAX_ROWS."""
         buckets: dict[int, list[int]] = defaultdict(list)
         for row, count in enumerate(frames):
-            tokens = -(-count // self.frames_per_token)
-            buckets[-(-tokens // BUCKET) * BUCKET].append(row)
+            buckets[self._bucket(count)].append(row)
         return [rows[i : i + MAX_ROWS] for _, rows in sorted(buckets.items()) for i in range(0, len(rows), MAX_ROWS)]
 
     def _group(

@@ -195,9 +195,10 @@ class SequenceModel(nn.Module):
         readable = torch.cat([valid, visible], 1)  # (B, n + S)
         first = torch.cat([wanted, torch.zeros_like(visible)], 1)
         order = torch.argsort(2 - readable.long() - first.long(), dim=1, stable=True)
-        rows = pad_length(int(wanted.sum(1).max()) if trim else size)
         longest = int(readable.sum(1).max()) if trim else size + slots
-        place = torch.arange(max(pad_length(longest), rows), device=order.device)
+        length = pad_length(longest, self.transformer.multiple)
+        rows = min(pad_length(int(wanted.sum(1).max()) if trim else size), length)
+        place = torch.arange(length, device=order.device)
         order = order[:, place.clamp(max=size + slots - 1)]  # (B, Q)
         readable = readable.gather(1, order) & (place < size + slots)
         x = x.gather(1, order[..., None].expand(-1, -1, x.shape[-1]))

@@ -26,9 +26,10 @@ import numpy as np
 from shared.errors import InvalidBundle, InvalidInput, MareyError
 from shared.text.features import TextFeatures
 from shared.text.pipeline import TextPipeline
+from workers.generating.export import finish
+from workers.generating.port import Request
 from workers.hgm3.config import InferenceConfig
-from workers.hgm3.export import finish
-from workers.hgm3.generate import MAX_ROWS, Generator, Request, Settings
+from workers.hgm3.generate import MAX_ROWS, Generator, Settings
 from workers.training.checks.judge import judge, straightness
 from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
 from workers.training.checks.quality import Quality, quality

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
-from torch import nn
 
 from shared.bundles import Bundle, TextSpec
 from shared.errors import InvalidBundle
-from shared.nn.bundling import fill, standing, write_generator
+from shared.nn.bundling import fill, random_parts, standing, write_generator
 from workers.mogo.config import MOGOConfig, named_config
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.tokenizer import Tokenizer
@@ -41,18 +40,9 @@ def random_bundle(path: Path | str, config: str | MOGOConfig = "tiny", seed: int
     """
     path = Path(path)
     config = named_config(config) if isinstance(config, str) else config
-    generator_state = torch.get_rng_state()
-    torch.manual_seed(seed)
-    try:
-        tokenizer, transformer = Tokenizer(config), RQHCTransformer(config)
-        tokenizer.quantizer.codebooks.normal_()
-        tokenizer.quantizer.initialized.fill_(True)
-        for layer in transformer.modules():
-            if isinstance(layer, nn.Linear):  # louder than training starts with, so that prompts make a difference
-                nn.init.normal_(layer.weight, std=0.1)
-        parts = {"tokenizer": tokenizer.state_dict(), "transformer": transformer.state_dict()}
-    finally:
-        torch.set_rng_state(generator_state)
+    parts = random_parts(
+        lambda: {"tokenizer": Tokenizer(config), "transformer": RQHCTransformer(config)}, ("transformer",), seed
+    )
     width = config.condition.text_width
     text = TextSpec(encoder="minilm" if width == 384 else "t5-base", width=width)
     return write_generator(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Self
+from dataclasses import dataclass
 
-from shared.configs import build_config
-from shared.errors import InvalidInput
+from shared.configs import ModelConfig, named
 from shared.nn.scaled_quantizer import Scale
 from workers.training.optimisation import StageConfig
 
@@ -80,7 +77,7 @@ class InferenceConfig:
 
 
 @dataclass(frozen=True)
-class MOGOConfig:
+class MOGOConfig(ModelConfig):
     """Everything that decides the shapes of one bundle."""
 
     name: str = "paper"
@@ -88,6 +85,7 @@ class MOGOConfig:
     features: int = 263  # D
     joints: int = 22
     fps: float = 20.0
+    min_frames: int = 16  # shortest motion; a drawn end is not listened to before
     max_frames: int = 196  # longest training sequence: no relative distance beyond it is ever learnt
     corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
     tokenizer: TokenizerConfig = TokenizerConfig()
@@ -98,19 +96,6 @@ class MOGOConfig:
     windows: tuple[int, ...] = (64,)  # frames; the tokenizer's training windows
     train_tokenizer: StageConfig = StageConfig(batch=256, ema=0.0)
     train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values, for manifests and checkpoints."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Rebuild a configuration from `to_dict`'s output (lists become tuples).
-
-        Raises:
-            InvalidInput: an unknown field.
-        """
-        return build_config(cls, values)
 
 
 PAPER = MOGOConfig()
@@ -149,6 +134,4 @@ def named_config(name: str) -> MOGOConfig:
     Raises:
         InvalidInput: no such configuration.
     """
-    if name not in CONFIGS:
-        raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(CONFIGS)}.")
-    return CONFIGS[name]
+    return named(CONFIGS, name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -13,27 +14,15 @@ from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
 from shared.nn.devices import choose_device, fast_bf16
-from shared.text.features import TextFeatures
+from workers.generating.port import Control, Limits, NoControl, Request, read_settings
 from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import Tokenizer
 
-MIN_FRAMES = 16
-"""Shortest motion; a drawn end is not listened to before."""
 MAX_SESSIONS = 32
 """Motions drawn side by side."""
-MAX_SEED = 2**31 - 1
-
-
-@dataclass(frozen=True)
-class Request:
-    """One motion to make."""
-
-    text: TextFeatures
-    seed: int
-    frames: int | None = None  # at the model's fps; None = the model ends it
 
 
 @dataclass(frozen=True)
@@ -83,8 +72,10 @@ class Generator:
         """Put a generator together; most callers want `load`."""
         self.bundle, self.config = bundle, config
         self.tokenizer, self.transformer = tokenizer, transformer
-        self.dtype = dtype
+        self.device, self.dtype = transformer.head.weight.device, dtype
         self.layout: FeatureLayout = layout(config.layout)
+        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
+        self.batch = MAX_SESSIONS
 
     @classmethod
     def load(
@@ -110,9 +101,30 @@ class Generator:
         dtype = dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
         return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
 
+    def settings(self, values: Mapping[str, Any]) -> Settings:
+        """An item's settings, checked. Raises InvalidInput."""
+        settings = read_settings(Settings, values, Settings.__dataclass_fields__)
+        settings.inference(self.config.inference)
+        return settings
+
+    def described(self, settings: Settings) -> dict[str, Any]:
+        """Everything that decides how tokens are drawn."""
+        return asdict(settings.inference(self.config.inference))
+
+    def settled(self, request: Request) -> Request:
+        """The request itself, checked: an open length is decided while it is drawn."""
+        self.limits.check(request)
+        return request
+
+    def bucket(self, request: Request) -> int:
+        """One for all: sessions of any length go side by side."""
+        return 1
+
     @torch.inference_mode()
-    def generate(self, requests: Sequence[Request], settings: Settings | None = None) -> list[Generated]:
-        """Make one motion a request.
+    def generate(
+        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+    ) -> list[Generated | None]:
+        """Make one motion a request; None where `control` dropped it.
 
         The tokens of an item do not depend on the others, on their number or order.
 
@@ -120,51 +132,74 @@ class Generator:
             InvalidInput: a length or seed out of range, or features of another encoder.
         """
         inference = (settings or Settings()).inference(self.config.inference)
+        control = control or NoControl()
         for request in requests:
-            self._check(request)
-        columns: dict[int, list[torch.Tensor]] = {row: [] for row in range(len(requests))}
-        waiting = list(range(len(requests)))[::-1]
-        streams = Streams(self.transformer, min(MAX_SESSIONS, len(requests)), inference, dtype=self.dtype)
-        playing: dict[int, int] = {}  # session to request
-        while waiting or playing:
-            while waiting and len(playing) < streams.capacity:
-                row = waiting.pop()
-                playing[self._start(streams, requests[row])] = row
-            for session, column in streams.step().items():
-                row = playing[session]
-                ended = bool(column[0] < 0)
-                if not ended:
-                    columns[row].append(column)
-                if ended or len(columns[row]) == (requests[row].frames or self.config.max_frames):
-                    streams.stop(session)
-                    del playing[session]
-        return [self._decode(torch.stack(columns[row])) for row in range(len(requests))]
-
-    def _start(self, streams: Streams, request: Request) -> int:
-        sentence = torch.from_numpy(request.text.nodes[0].astype(np.float32)).to(self.transformer.head.weight.device)
-        if request.frames is not None:
-            return streams.start(sentence, request.seed)
-        return streams.start(sentence, request.seed, ends_from=MIN_FRAMES)
+            self.limits.check(request)
+        drawing = _Drawing(self, requests, inference)
+        while drawing.step(control.dropped()):
+            control.progress(drawing.done, drawing.total)
+        control.progress(drawing.total, drawing.total)
+        return [None if columns is None else self._decode(torch.stack(columns)) for columns in drawing.columns]
 
     def _decode(self, tokens: torch.Tensor) -> Generated:
         """One by one: a convolution rounds differently in another batch, files would differ."""
         features = self.tokenizer.decode(tokens[None])[0]
         return Generated(tokens.T.cpu().numpy().astype(np.int16), features.cpu().numpy())
 
-    def _check(self, request: Request) -> None:
-        longest, fps = self.config.max_frames, self.config.fps
-        if request.frames is not None and not min(MIN_FRAMES, longest) <= request.frames <= longest:
-            raise InvalidInput(
-                f"{request.frames} frames is out of range: this bundle makes {MIN_FRAMES / fps:g} to "
-                f"{longest / fps:g} seconds",
-                where="frames",
-            )
-        if not 0 <= request.seed <= MAX_SEED:
-            raise InvalidInput(f"{request.seed} must lie between 0 and {MAX_SEED}", where="seed")
-        if request.text.nodes.shape[1] != self.config.condition.text_width:
-            raise InvalidInput(
-                f"text features are {request.text.nodes.shape[1]} wide, this bundle reads "
-                f"{self.config.condition.text_width}",
-                where=request.text.prompt[:60],
-                hint="They come from another encoder. Parse the prompt again for this bundle.",
-            )
+
+class _Drawing:
+    """Requests on their way through the sessions of one `Streams`."""
+
+    def __init__(self, generator: Generator, requests: Sequence[Request], inference: InferenceConfig) -> None:
+        self.requests = requests
+        self.limit = generator.config.max_frames
+        self.columns: list[list[torch.Tensor] | None] = [[] for _ in requests]  # None: dropped
+        self.total = sum(request.frames or self.limit for request in requests)
+        self.waiting = list(range(len(requests)))[::-1]
+        self.playing: dict[int, int] = {}  # session to request
+        self.streams = Streams(
+            generator.transformer, max(1, min(MAX_SESSIONS, len(requests))), inference, dtype=generator.dtype
+        )
+        self._device, self._ends_from = generator.device, generator.config.min_frames
+
+    @property
+    def done(self) -> int:
+        """Frames drawn."""
+        return sum(len(columns or ()) for columns in self.columns)
+
+    def step(self, dropped: set[int]) -> bool:
+        """Draw one frame of every session; False when there is none left."""
+        self._leave_out(dropped)
+        while self.waiting and len(self.playing) < self.streams.capacity:
+            row = self.waiting.pop()
+            self.playing[self._start(self.requests[row])] = row
+        if not self.playing:
+            return False
+        for session, column in self.streams.step().items():
+            row = self.playing[session]
+            columns = self.columns[row]
+            assert columns is not None
+            ended = bool(column[0] < 0)
+            if not ended:
+                columns.append(column)
+            if ended or len(columns) == (self.requests[row].frames or self.limit):
+                self._stop(session)
+        return True
+
+    def _leave_out(self, dropped: set[int]) -> None:
+        self.waiting = [row for row in self.waiting if row not in dropped]
+        for session, row in list(self.playing.items()):
+            if row in dropped:
+                self._stop(session)
+        for row in dropped:
+            self.columns[row] = None
+
+    def _start(self, request: Request) -> int:
+        sentence = torch.from_numpy(request.text.nodes[0].astype(np.float32)).to(self._device)
+        if request.frames is not None:
+            return self.streams.start(sentence, request.seed)
+        return self.streams.start(sentence, request.seed, ends_from=self._ends_from)
+
+    def _stop(self, session: int) -> None:
+        self.streams.stop(session)
+        del self.playing[session]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
@@ -29,6 +30,8 @@ class FitConfig:
     grammar: int = 1000  # silver sentences
     gold_weight: float = 2.0
     grammar_weight: float = 0.7
+    taught_weight: float = 0.5  # of captions that teachers labelled
+    taught_steps: int = 1600  # where there are such
     predicate_weight: float = 2.0
     average: float = 0.995
 
@@ -88,10 +91,13 @@ def fit(
     config: FitConfig,
     seed: int,
     progress: Callable[[int, float], None] | None = None,
+    *,
+    taught: Sequence[Example] = (),
 ) -> LightNetwork:
     """Train a head on `gold`, its variants and the grammar; the weights are an average over the run.
 
     Args:
+        taught: captions that teachers labelled.
         progress: called with the step and its loss.
     """
     torch.manual_seed(seed)
@@ -100,8 +106,10 @@ def fit(
     average = [weight.detach().clone() for weight in network.parameters()]
     allowed = torch.tensor(transition_scores(network_config.tags), dtype=torch.float32)
     optimizer = torch.optim.AdamW(network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
-    for step, batch in enumerate(_batches(gold, states, network_config, config, rng)):
-        done = step / config.steps
+    steps = config.taught_steps if taught else config.steps
+    batches = _batches(gold, taught, states, network_config, config, rng)
+    for step, batch in enumerate(itertools.islice(batches, steps)):
+        done = step / steps
         for parameters in optimizer.param_groups:
             parameters["lr"] = config.learning_rate * _schedule(done)
         loss = _loss(network, batch, allowed, config.predicate_weight)
@@ -126,26 +134,27 @@ def _schedule(done: float) -> float:
 
 
 def _batches(
-    gold: Sequence[Example], states: WordStates, network: LightConfig, config: FitConfig, rng: random.Random
+    gold: Sequence[Example],
+    taught: Sequence[Example],
+    states: WordStates,
+    network: LightConfig,
+    config: FitConfig,
+    rng: random.Random,
 ) -> Iterator[SentenceBatch]:
     augmenter = Augmenter(gold, rng)
     pool = [(example, config.gold_weight) for example in gold]
     pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in gold]
     pool += [(augmenter.noise(sentence(rng)), config.grammar_weight) for _ in range(config.grammar)]
+    pool += [(augmenter.noise(example), config.taught_weight) for example in taught]
     encoded = [encode(example, states, network.tags) for example, _ in pool]
     weights = [weight for _, weight in pool]
-    made = 0
     while True:
         drawn = rng.choices(encoded, weights, k=16 * config.batch)
         lengths = sorted((len(item) + rng.uniform(-1.5, 1.5), n) for n, item in enumerate(drawn))
         order = [drawn[n] for _, n in lengths]  # sentences of like length together: little padding
         chunks = [order[i : i + config.batch] for i in range(0, len(order), config.batch)]
         rng.shuffle(chunks)
-        for chunk in chunks:
-            if made == config.steps:
-                return
-            made += 1
-            yield collate(chunk)
+        yield from map(collate, chunks)
 
 
 def collate(items: Sequence[Encoded]) -> SentenceBatch:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
+
+from shared.configs import ModelConfig
+from shared.errors import InvalidInput
+
+C = TypeVar("C", bound=ModelConfig)
 
 
 @dataclass(frozen=True)
@@ -20,3 +25,19 @@ class StageConfig:
     betas: tuple[float, float] = (0.9, 0.99)
     clip: float = 1.0
     ema: float = 0.999  # of the weights that are validated and shipped
+
+
+def with_learning_rate(config: C, stage: str, rate: float | None) -> C:
+    """A model's configuration with another learning rate for one stage; None leaves it as it is.
+
+    Raises:
+        InvalidInput: the stage has none, or the rate is no rate.
+    """
+    if rate is None:
+        return config
+    name = f"train_{stage}"
+    if not hasattr(config, name):
+        raise InvalidInput("is for one stage at a time", where="--learning-rate")
+    if not 0 < rate <= 1:
+        raise InvalidInput(f"{rate:g} is not in (0, 1]", where="--learning-rate")
+    return replace(config, **{name: replace(getattr(config, name), learning_rate=rate)})

@@ -132,6 +132,8 @@ def _offer(line: int, item: Item, catalogue: Catalogue) -> Offer | Problem:
         offer = catalogue.offer(item.model)
         field = "seconds"
         offer.check_seconds(item.seconds)
+        field = "settings"
+        offer.check_settings(item.settings)
     except MareyError as error:
         if error.status >= 500:
             raise

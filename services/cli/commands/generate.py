@@ -86,9 +86,9 @@ def _check(items: Iterable[Item], bundle: Bundle) -> None:
 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
-        InvalidItems: a length it cannot make.
+        InvalidItems: a length it cannot make, a setting it has not.
     """
-    from services.api.catalogue import check_seconds
+    from services.api.catalogue import check_seconds, check_settings
     from services.cli.roles import GENERATORS
 
     if bundle.manifest.model not in GENERATORS:
@@ -99,10 +99,11 @@ def _check(items: Iterable[Item], bundle: Bundle) -> None:
         )
     problems: list[Problem] = []
     for line, item in enumerate(items, 1):
-        try:
-            check_seconds(bundle, item.seconds)
-        except InvalidInput as error:
-            problems.append(Problem(line, "seconds", error.message))
+        for field, check in (("seconds", check_seconds), ("settings", check_settings)):
+            try:
+                check(bundle, getattr(item, field))
+            except InvalidInput as error:
+                problems.append(Problem(line, field, error.message))
     if problems:
         raise InvalidItems(problems)
 

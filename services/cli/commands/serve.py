@@ -6,18 +6,21 @@ from typing import Annotated
 
 import typer
 
-from services.cli.roles import DEFAULT_ROLES
-
 
 def serve(
     roles: Annotated[
-        str, typer.Option("--with", help="Workers: + joins queues in one child, a comma separates children.")
-    ] = DEFAULT_ROLES,
+        str | None,
+        typer.Option(
+            "--with",
+            help="Workers: + joins queues in one child, a comma separates children. "
+            "None given = one child for prompts and every model that has a bundle here.",
+        ),
+    ] = None,
     port: Annotated[int | None, typer.Option("--port", help="Port of the API; 0 = any that is free.")] = None,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
-    from services.cli.roles import needs_extra, parse_roles
+    from services.cli.roles import default_roles, needs_extra, parse_roles
 
     try:
         from services.cli.supervisor import Supervisor, any_port
@@ -30,11 +33,11 @@ def serve(
     if port is not None:
         changes["port"] = port or any_port(host or settings().host)
     config: Settings = settings().model_copy(update=changes)
-    Supervisor(config, parse_roles(roles)).run()
+    Supervisor(config, parse_roles(roles or default_roles(config))).run()
 
 
 def worker(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues to serve: hgm3, text, or hgm3+text.")],
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues to serve: hgm3, mogo, text, or hgm3+text.")],
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
     from services.cli.roles import needs_extra, parse_roles, role_of

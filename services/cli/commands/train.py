@@ -13,7 +13,7 @@ from services.cli import console
 app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
 hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
 app.add_typer(hgm3, name="hgm3")
-mogo = typer.Typer(help="MOGO: tokenizer, transformer, then `bundle`; no worker serves it yet.", no_args_is_help=True)
+mogo = typer.Typer(help="MOGO: tokenizer, transformer, then `bundle`.", no_args_is_help=True)
 app.add_typer(mogo, name="mogo")
 
 
@@ -35,6 +35,7 @@ Warm = Annotated[bool, typer.Option("--warm", help="Start from the stage's finis
 Masking = Annotated[Mask | None, typer.Option("--mask", help="hard or random; none given = as the configuration says.")]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
+Rate = Annotated[float | None, typer.Option("--learning-rate", help="None given = as the configuration says.")]
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
 
 
@@ -61,6 +62,7 @@ def _hgm3_stage(name: str, what: str) -> None:
         seed: Seed = 0,
         resume: Resume = False,
         warm: Warm = False,
+        learning_rate: Rate = None,
         mask: Masking = None,
         device: Device = "auto",
         threads: Threads = 0,
@@ -69,7 +71,7 @@ def _hgm3_stage(name: str, what: str) -> None:
     ) -> None:
         _run(
             "hgm3", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
-            resume=resume, warm=warm, device=device, threads=threads, bf16=bf16,
+            resume=resume, warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16,
             mask=None if mask is None else mask.value,
         )  # fmt: skip
 
@@ -88,6 +90,7 @@ def _mogo_stage(name: str, what: str) -> None:
         seed: Seed = 0,
         resume: Resume = False,
         warm: Warm = False,
+        learning_rate: Rate = None,
         device: Device = "auto",
         threads: Threads = 0,
         bf16: Bf16 = True,
@@ -95,7 +98,7 @@ def _mogo_stage(name: str, what: str) -> None:
     ) -> None:
         _run(
             "mogo", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
-            resume=resume, warm=warm, device=device, threads=threads, bf16=bf16,
+            resume=resume, warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16,
         )  # fmt: skip
 
     mogo.command(name, help=what)(command)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
 from workers.training.checks.prompts import evaluation_prompts
-from workers.training.data.captions import captions, grammar, joined_caption, long_caption, seeded, short_caption
+from workers.training.data.captions import PAIR, captions, grammar, joined_caption, long_caption, seeded, short_caption
 from workers.training.data.describe import ACTS, STYLE_NAMES, describe
 from workers.training.data.english import conjugate, gerund, third, with_adjective
 
@@ -121,15 +121,18 @@ def plain(text: str) -> str:
     return re.sub(r"[^a-z ]", "", text.lower().replace("-", " ")).strip()
 
 
+def open_fields(phrase: str) -> list[dict[str, str]]:
+    """Every way to fill the fields of a phrase that have words of their own."""
+    words = grammar()
+    tables = {"pace": words.pace, "height": words.height, "lasting": words.lasting, "pair": {"": PAIR}}
+    named = {name: sum(table.values(), ()) for name, table in tables.items() if f"{{{name}}}" in phrase}
+    return [dict(zip(named, values, strict=True)) for values in itertools.product(*named.values())]
+
+
 def trained_phrases() -> set[str]:
     """All phrases of the grammar, in all forms, sides and hands, without their measured numbers."""
     out = set()
     words = grammar()
-    measured = [
-        {"pace": pace, "height": height}
-        for pace in sum(words.pace.values(), ())
-        for height in sum(words.height.values(), ())
-    ]
     phrases = [p for act in words.acts.values() for p in (*act.phrases, *act.nouns, *act.whole)]
     phrases += [p for act in words.acts.values() for rows in act.manners.values() for p in rows]
     for phrase in phrases:
@@ -137,11 +140,12 @@ def trained_phrases() -> set[str]:
             for his in ("his", "her", "their", "the"):
                 values = {"side": side, "hands": hands, "arms": hands.replace("hand", "arm"), "it": "it", "is": "is"}
                 values |= {"hands_his": hands if side == "both" else f"{his} {hands}", "other": "left"}
-                values |= {"degrees": "90", "metres": "5", "steps": "5"}
+                values |= {"degrees": "90", "metres": "5", "steps": "5", "seconds": "5"}
+                values |= {"one": f"{side} one", "one_side": side}
                 for sided in (f"{side}-handed", f"with the {side}", "with both hands"):
                     for angle in ("a right angle", "90 degrees", "ninety degrees", "a quarter of a circle"):
                         some = values | {"sided": sided, "right_angle": angle}
-                        for more in measured if "{pace}" in phrase or "{height}" in phrase else measured[:1]:
+                        for more in open_fields(phrase):
                             filled = phrase.format(**some, **more).replace("the both ", "both ")
                             out |= {plain(conjugate(filled, form)) for form in ("third", "gerund", "base")}
                         if "{right_angle}" not in phrase:
@@ -162,6 +166,7 @@ def joined_phrases() -> set[str]:
                 hands = f"{side} hands" if side == "both" else f"{side} hand"
                 values |= {f"{name}_hands": hands, f"{name}_arms": hands.replace("hand", "arm"), f"{name}_side": side}
                 values |= {f"{name}_sided": "with both hands" if side == "both" else f"{side}-handed"}
+                values |= {f"{name}_one": f"{side} one", f"{name}_it": "it", f"{name}_pair": "two hands"}
             filled = phrase.format(**values).replace("the both ", "both ")
             out |= {plain(conjugate(filled, form)) for form in ("third", "gerund", "base")}
     return out

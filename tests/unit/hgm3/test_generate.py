@@ -11,10 +11,11 @@ import torch
 
 from shared.errors import InvalidBundle, InvalidInput
 from tests.support.prepared import text_features
+from workers.generating.port import Request
 from workers.hgm3.bundle import random_bundle
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.decoding import condition_level
-from workers.hgm3.generate import Generated, Generator, Request, Settings
+from workers.hgm3.generate import Generated, Generator, Settings
 from workers.hgm3.model import ACTION, MOTION, SPECIFIC
 
 COUNT = 32
@@ -106,8 +107,8 @@ def test_features_have_the_frames_asked_for(generator: Generator) -> None:
 
 def test_an_open_length_is_drawn_with_the_seed_and_stays_in_range(generator: Generator) -> None:
     asked = [Request(text_features(0), seed) for seed in range(40)]
-    frames = generator.frames(asked)
-    assert frames == generator.frames(asked)
+    frames = [generator.frames(request) for request in asked]
+    assert frames == [generator.frames(request) for request in asked]
     assert len(set(frames)) > 5
     assert all(16 <= f <= 196 for f in frames)
 

@@ -12,10 +12,11 @@ import torch
 from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
 from tests.support.prepared import text_features
+from workers.generating.port import Request
 from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import TINY, HGM3Config, named_config
 from workers.hgm3.data import CaptionData
-from workers.hgm3.generate import Generator, Request
+from workers.hgm3.generate import Generator
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.tokenizer import Tokenizer
 from workers.hgm3.train import train_stage

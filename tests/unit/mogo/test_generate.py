@@ -10,11 +10,12 @@ import pytest
 from shared.bundles import Bundle
 from shared.errors import InvalidBundle, InvalidInput
 from tests.support.prepared import text_features, write_prepared
+from workers.generating.port import Request
 from workers.hgm3.bundle import random_bundle as hgm3_bundle
 from workers.mogo.assembly import assemble
 from workers.mogo.bundle import random_bundle
 from workers.mogo.config import TINY
-from workers.mogo.generate import MIN_FRAMES, Generator, Request, Settings
+from workers.mogo.generate import Generator, Settings
 from workers.mogo.train import train_stage
 from workers.training.budget import Budget
 from workers.training.staging import TrainOptions
@@ -45,7 +46,7 @@ def test_more_requests_than_sessions_are_all_made(generator: Generator, monkeypa
 
 def test_an_open_length_is_the_models_within_its_limits(generator: Generator) -> None:
     lengths = {made.features.shape[0] for made in generator.generate([Request(text_features(1), k) for k in range(40)])}
-    assert all(MIN_FRAMES <= length <= TINY.max_frames for length in lengths)
+    assert all(TINY.min_frames <= length <= TINY.max_frames for length in lengths)
     assert len(lengths) > 1
 
 
@@ -63,7 +64,7 @@ def test_prompt_seed_and_settings_make_a_difference(generator: Generator) -> Non
         (lambda: Request(text_features(0), 0, 15), "frames"),
         (lambda: Request(text_features(0), 0, 25), "frames"),
         (lambda: Request(text_features(0), -1, 20), "seed"),
-        (lambda: Request(text_features(0, width=512), 0, 20), "a person moves"),
+        (lambda: Request(text_features(0, width=512), 0, 20), "text"),
     ],
 )
 def test_a_request_out_of_range_is_refused(generator: Generator, request_of, where: str) -> None:
@@ -91,3 +92,37 @@ def test_a_run_becomes_a_bundle_that_generates(tmp_path: Path) -> None:
 def test_a_bundle_of_another_model_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidBundle, match="of hgm3, not of mogo"):
         Generator.load(hgm3_bundle(tmp_path / "other"), device="cpu")
+
+
+class Dropper:
+    """Drops request 1 after three frames, and request 2 before it begins."""
+
+    def __init__(self) -> None:
+        self.steps: list[tuple[int, int]] = []
+
+    def progress(self, done: int, total: int) -> None:
+        self.steps.append((done, total))
+
+    def dropped(self) -> set[int]:
+        return {1, 2} if len(self.steps) >= 3 else set()
+
+
+def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(
+    generator: Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("workers.mogo.generate.MAX_SESSIONS", 2)
+    requests = [Request(text_features(k), seed=k, frames=20) for k in range(4)]
+    whole = generator.generate(requests)
+    control = Dropper()
+    made = generator.generate(requests, control=control)
+    assert made[1] is made[2] is None
+    for row in (0, 3):
+        assert np.array_equal(made[row].tokens, whole[row].tokens)
+    assert control.steps[-1][0] == control.steps[-1][1]
+
+
+@pytest.mark.parametrize(("values", "where"), [({"steps": 5}, "steps"), ({"upper_top_k": 0.0}, "upper_top_k")])
+def test_an_items_settings_are_checked_by_name(generator: Generator, values: dict[str, float], where: str) -> None:
+    with pytest.raises(InvalidInput) as error:
+        generator.settings(values)
+    assert error.value.where == where

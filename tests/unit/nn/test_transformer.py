@@ -42,6 +42,23 @@ def test_more_padding_and_another_batch_change_no_bit() -> None:
 
 
 @torch.inference_mode()
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_more_padding_and_another_batch_change_no_bit_after_packing(dtype: torch.dtype) -> None:
+    model = transformer()
+    model.lower(dtype)
+    x = torch.randn(3, 48, 32)
+    valid = torch.arange(48)[None] < torch.tensor([[23], [24], [13]])
+    whole = model(x, valid)
+    cut = model(x[:, :24], valid[:, :24])
+    alone = model(x[2:, :32], valid[2:, :32])
+    wanted = model(x[:, :24], valid[:, :24], 16)
+    for row, size in enumerate((23, 24, 13)):
+        assert torch.equal(whole[row, :size], cut[row, :size])
+        assert torch.equal(whole[row, :16], wanted[row, :16]) or size < 16
+    assert torch.equal(whole[2, :13], alone[0, :13])
+
+
+@torch.inference_mode()
 def test_post_norm_equals_the_reference_encoder_layer_of_torch() -> None:
     model = transformer(norm_first=False)
     x = torch.randn(2, 9, 32)

@@ -16,12 +16,13 @@ from shared.text.encoders import find_weights
 from shared.text.light import LightLabeller, WordStates
 from shared.text.light_network import LightConfig
 from shared.text.roles import Argument, Frame
-from workers.training.labeller import cross_validate, pack
+from workers.training.labeller import Recipe, cross_validate, pack
 from workers.training.labeller_card import card
 from workers.training.labeller_data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
 from workers.training.labeller_fit import FitConfig, fit, tag_set
 from workers.training.labeller_grammar import Example, sentence
 from workers.training.labeller_score import Scores
+from workers.training.labeller_teach import Teachers, read_captions
 
 WALK = Example(
     ("A", "person", "slowly", "walks", "forward."),
@@ -157,7 +158,8 @@ def test_a_small_head_learns_two_sentences_and_survives_its_bundle(
 
     gold = tmp_path / "gold.json"
     gold.write_text("[]")
-    bundle = pack(tmp_path / "srl-tiny", head, find_weights("minilm"), gold, config, 0, None)
+    recipe = Recipe(states, tiny, config, 0)
+    bundle = pack(tmp_path / "srl-tiny", head, find_weights("minilm"), gold, recipe, None)
     again = LightLabeller.load(Bundle.open(bundle.path))
     assert again.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
     assert again.sha256 == bundle.weights_sha256
@@ -183,9 +185,32 @@ def test_cross_validation_never_scores_a_caption_it_trained_on(
         return fit(examples, *rest)  # type: ignore[arg-type]
 
     monkeypatch.setattr("workers.training.labeller.fit", spy)
-    result = cross_validate(gold, states, tiny, FitConfig(steps=1, batch=2, variants=0, grammar=0), 2, 0)
+    recipe = Recipe(states, tiny, FitConfig(steps=1, batch=2, variants=0, grammar=0), 0)
+    result = cross_validate(gold, recipe, 2)
     everything = {example.words for example in gold}
     assert result.scores.predicates.wanted == 6
     assert trained[0] | trained[1] == everything
     assert not trained[0] & trained[1]
     assert "2-fold" in card(result)
+
+
+def test_teachers_label_what_they_are_sure_of_and_a_head_learns_from_it(tiny: LightConfig, states: WordStates) -> None:
+    config = FitConfig(steps=120, taught_steps=120, batch=8, variants=0, grammar=0)
+    heads = [fit([WALK, WAVE], states, tiny, config, seed) for seed in (1, 2)]
+    teachers = Teachers(heads, states)
+    assert teachers.label([WALK.words, WAVE.words]) == [WALK, WAVE]
+    lone = LightLabeller(heads[0], states, "")
+    frames, certainty = Teachers(heads[:1], states).frames(WAVE.words)
+    assert frames == lone.frames(WAVE.words)
+    assert 0 < certainty <= 0.5
+    pupil = fit([WALK], states, tiny, config, 3, taught=teachers.label([WAVE.words]))
+    assert LightLabeller(pupil, states, "").label([WAVE.words]) == [WAVE.frames]
+
+
+def test_captions_for_teachers_are_single_sentences_that_nobody_labelled(tmp_path: Path) -> None:
+    file = tmp_path / "captions.json"
+    file.write_text(json.dumps(["He bows.", "he bows", "Someone waves his left hand!", "He runs. He stops.", "x"]))
+    assert read_captions(file, [WAVE.words]) == [("He", "bows.")]
+    file.write_text("3")
+    with pytest.raises(InvalidFile):
+        read_captions(file, [])

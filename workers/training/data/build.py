@@ -271,7 +271,7 @@ def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None =
     """
     left_out: dict[str, str] = {}
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
-    total = 2 * sum(len(pack.clips) for pack in packs) + sum(c.pairs + c.triples + c.retimed for c in COUNTS.values())
+    total = 2 * sum(len(pack.clips) for pack in packs) + sum(sum(vars(counts).values()) for counts in COUNTS.values())
     with FolderWriter(out) as writer:
         for part in parts_of(packs, left_out):
             by_split[part.source.split].append(part)

@@ -19,6 +19,10 @@ from workers.training.data.english import conjugate, number, sentence, with_adje
 _FIELD = re.compile(r"{(\w+)}")
 _HIS = re.compile(r"\b(he|man|guy|boy|gentleman|grandfather|fellow|schoolboy|sportsman)\b")
 _HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b")
+PAIR = (  # what is said of both hands as two
+    "two hands", "two arms", "the two hands", "the left and the right hand", "the left and the right arm",
+    "both of the hands", "one hand and the other", "the hands on both sides",
+)  # fmt: skip
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
 RIGHT_ANGLE = 16.0  # degrees about 90 within which a turn is called a right angle
@@ -89,6 +93,7 @@ class Grammar:
     details: dict[str, Detail]
     pace: dict[str, tuple[str, ...]]
     height: dict[str, tuple[str, ...]]
+    lasting: dict[str, tuple[str, ...]]
     styles: dict[str, Style]
     joins: Joins
 
@@ -105,6 +110,7 @@ def grammar() -> Grammar:
         },
         pace={name: tuple(rows) for name, rows in table["pace"].items()},
         height={name: tuple(rows) for name, rows in table["height"].items()},
+        lasting={name: tuple(rows) for name, rows in table["lasting"].items()},
         styles={
             name: Style(**{key: tuple(rows[key]) for key in ("after", "adjective", "sentence", "who")})
             for name, rows in table["styles"].items()
@@ -152,6 +158,13 @@ def height_of(facts: Facts) -> str | None:
     return "shoulder_high" if -0.18 < peak < 0.1 else None
 
 
+def lasting_of(facts: Facts) -> str | None:
+    """short or long, for gestures that are."""
+    if facts.act not in ("raise", "wave"):
+        return None
+    return "short" if facts.gait.duration < 3.5 else "long" if facts.gait.duration > 5.5 else None
+
+
 def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
     """What the braces of phrases may be filled with; what was not measured is absent."""
     words = rng.random() < 0.5
@@ -174,7 +187,10 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
         out |= {"sided": "with both hands" if both else rng.choice([f"{facts.side}-handed", f"with the {facts.side}"])}
         out |= {"arms": hands.replace("hand", "arm"), "wrists": hands, "hands": hands}
         out |= {"hands_his": hands if facts.side == "both" else f"{pronoun} {hands}"}
-        if facts.side != "both":
+        if both:
+            out["pair"] = rng.choice(PAIR)
+        else:
+            out |= {"one": f"{facts.side} one", "one_side": facts.side}
             out["other"] = "right" if facts.side == "left" else "left"
         if facts.act == "wave":
             swings = max(h.swings for h in facts.hands) // 2
@@ -185,6 +201,8 @@ def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
         out["pace"] = rng.choice(g.pace[pace])
     if height := height_of(facts):
         out["height"] = rng.choice(g.height[height])
+    if lasting := lasting_of(facts):
+        out["lasting"] = rng.choice(g.lasting[lasting])
     return out
 
 

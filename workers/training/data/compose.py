@@ -48,6 +48,13 @@ SEQUENCE_WEIGHTS: dict[str, float] = {
 }
 SIDED = ("wave", "raise", "turn")
 OTHER_SIDE_SHARE = 0.15  # how often one of these is followed by itself with another side
+# Ways that prompts ask for more often than drawing by weight gives them.
+REVERSALS = {"walk": "walk_back", "walk_back": "walk", "run": "walk"}
+REVERSAL_SHARE = 0.2
+# Gestures at lengths at which they were not captured (raises take 1 to 5 s, waves 5 to 8): without them a
+# model takes the length for the act, and a raise of 6 s becomes a wave. Frames.
+SLOW_RAISES = range(100, LIMIT + 1)
+QUICK_WAVES = range(36, 91)
 _STRAIGHT = ("walk", "run", "walk_back")
 _CANDIDATES = 8  # clips among which the best seam is taken
 _WORST_SEAM = 0.6  # mean squared metres, see splice.seam_costs; a bow into a run has 0.4 and looks well
@@ -61,10 +68,12 @@ class Counts:
     pairs: int
     triples: int
     retimed: int
+    slow_raises: int = 0
+    quick_waves: int = 0
 
 
 COUNTS: dict[str, Counts] = {
-    "train": Counts(pairs=3400, triples=500, retimed=2200),
+    "train": Counts(pairs=3400, triples=500, retimed=2200, slow_raises=700, quick_waves=350),
     "val": Counts(pairs=60, triples=10, retimed=0),
     "test": Counts(pairs=200, triples=40, retimed=0),
 }
@@ -186,6 +195,9 @@ class Composer:
             if acts and acts[-1] in SIDED and rng.random() < OTHER_SIDE_SHARE:
                 acts.append(acts[-1])
                 continue
+            if acts and acts[-1] in REVERSALS and rng.random() < REVERSAL_SHARE:
+                acts.append(REVERSALS[acts[-1]])
+                continue
             act = rng.choices(self.acts, [SEQUENCE_WEIGHTS[a] for a in self.acts])[0]
             if not acts or act != acts[-1] or act in SIDED:
                 acts.append(act)
@@ -210,6 +222,14 @@ class Composer:
 
     # -- one act, another length ------------------------------------------------------------------------------------
 
+    def gesture(self, name: str, act: str, lengths: range) -> Composed | None:
+        """A gesture of one of these lengths, done once."""
+        if act not in self.by_act:
+            return None
+        rng = seeded("retimed", name)
+        part = self._draw_first(rng, act)
+        return self._measured_again(name, part, _stretch(part, rng.choice(lengths), rng, repeat_share=0))
+
     def retimed(self, name: str) -> Composed | None:
         """One act, longer or shorter than it was captured."""
         rng = seeded("retimed", name)
@@ -225,6 +245,10 @@ class Composer:
             made = _stretch(part, target, rng)
         else:
             made = _crop(part, max(target, 70), rng)
+        return self._measured_again(name, part, made)
+
+    @staticmethod
+    def _measured_again(name: str, part: Part, made: tuple[Array, tuple[Part, ...], int] | None) -> Composed | None:
         if made is None or len(made[0]) <= MIN_FRAMES:
             return None
         joints, used, repeats = made
@@ -281,12 +305,14 @@ def _loop(part: Part, target: int) -> tuple[Array, tuple[Part, ...], int] | None
     return joints[:target], (part,) * 2, 1
 
 
-def _stretch(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[Part, ...], int] | None:
+def _stretch(
+    part: Part, target: int, rng: random.Random, *, repeat_share: float = 0.35
+) -> tuple[Array, tuple[Part, ...], int] | None:
     """A gesture at another length: held or waved longer or shorter, done again, or with more standing around it."""
     a, b = core(part)
     whole = part.joints.astype(np.float64)
     last = len(whole) - 1
-    if last - b >= 4 and a >= 1 and rng.random() < 0.35 and target > 1.4 * (b - a):
+    if last - b >= 4 and a >= 1 and rng.random() < repeat_share and target > 1.4 * (b - a):
         joints, repeats = whole, 1
         while len(joints) + (b - a) < target and repeats < 4:
             i, j, cost = best_cut(part, range(b, last + 1), part, range(a + 1))
@@ -303,7 +329,9 @@ def _stretch(part: Part, target: int, rng: random.Random) -> tuple[Array, tuple[
     if part.facts.act == "raise" and target > len(whole):
         return held_longer(whole, x, y, target - len(whole)), (part,) * 2, 1
     if target < len(whole):  # skip a piece of the hold
-        i, j, cost = best_cut(part, range(x, x + max((y - x) // 3, 1)), part, range(max(x, y - (y - x) // 3), y + 1))
+        third = max((y - x) // 3, 1)
+        leave, enter = range(max(x, 1), x + third + 1), range(max(x, y - third), min(y + 1, last))
+        i, j, cost = best_cut(part, leave, part, enter)
         joints = whole[: i + 1]
         return (join_clips(joints, whole[j:], FPS), (part,) * 2, 1) if cost < 0.1 and j - i > 8 else None
     third = max((y - x) // 3, 2)
@@ -401,6 +429,8 @@ def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
         ("S2", 2, counts.pairs, lambda name: composer.sequence(name, 2)),
         ("S3", 3, counts.triples, lambda name: composer.sequence(name, 3)),
         ("R", 1, counts.retimed, composer.retimed),
+        ("RR", 1, counts.slow_raises, lambda name: composer.gesture(name, "raise", SLOW_RAISES)),
+        ("RW", 1, counts.quick_waves, lambda name: composer.gesture(name, "wave", QUICK_WAVES)),
     )
     for letter, acts, wanted, make in makers:
         if len(composer.acts) < acts:

@@ -1,16 +1,19 @@
-"""From claimed items to files, with a tiny bundle of random weights."""
+"""From claimed items to files, with tiny bundles of random weights of each model."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from uuid import UUID, uuid4
 
 import numpy as np
 import pytest
 
+from shared.bundles import Bundle
 from shared.errors import InvalidFile, InvalidInput
 from shared.jobs import Claim, ClaimedItem, Stage
 from shared.motion.bvh import parse_bvh
@@ -19,8 +22,12 @@ from shared.runtime.handler import Batch, Done, Export, Failed, Outcome
 from shared.settings import Settings
 from shared.text.features import TextFeatures
 from shared.text.graph import build_graph
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.handler import Hgm3Handler
+from workers.generating.handler import GeneratorHandler
+from workers.hgm3 import bundle as hgm3
+from workers.hgm3.generate import Generator as Hgm3Generator
+from workers.mogo import bundle as mogo
+from workers.mogo.config import TINY
+from workers.mogo.generate import Generator as MogoGenerator
 
 
 class Control:
@@ -37,15 +44,31 @@ class Control:
         return self._dropped
 
 
+BUNDLES: dict[str, Callable[[Path, int], Bundle]] = {
+    "hgm3": lambda path, seed: hgm3.random_bundle(path, "tiny", seed),
+    "mogo": lambda path, seed: mogo.random_bundle(path, replace(TINY, max_frames=196), seed),
+}
+GENERATORS = {"hgm3": Hgm3Generator, "mogo": MogoGenerator}
+
+
+def handler_of(model: str) -> GeneratorHandler[Any]:
+    return GeneratorHandler(model, GENERATORS[model].load, 32, Settings(device="cpu", threads=1))
+
+
+@pytest.fixture(scope="module", params=list(BUNDLES))
+def model(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
-    found = random_bundle(tmp_path_factory.mktemp("models") / "hgm3-random", "tiny")
+def bundle(model: str, tmp_path_factory: pytest.TempPathFactory) -> str:
+    found = BUNDLES[model](tmp_path_factory.mktemp("models") / f"{model}-random", 0)
     return f"{found.path}@{found.weights_sha256[:12]}"
 
 
 @pytest.fixture(scope="module")
-def handler(bundle: str) -> Hgm3Handler:
-    made = Hgm3Handler(Settings(device="cpu", threads=1))
+def handler(model: str, bundle: str) -> GeneratorHandler[Any]:
+    made = handler_of(model)
     made.load(bundle)
     return made
 
@@ -66,13 +89,13 @@ def make_item(
     )  # fmt: skip
 
 
-def make_batch(handler: Hgm3Handler, *items: ClaimedItem) -> Batch:
-    width = handler.generator.config.condition.text_width
+def make_batch(handler: GeneratorHandler[Any], *items: ClaimedItem) -> Batch:
+    width = handler.generator.limits.text_width
     claim = Claim(uuid4(), "default", uuid4(), "hgm3", Stage.GENERATE, "k", "b", solo=False, items=items)
     return Batch(claim, items, {item.text_key: text_blob(item.prompt, width) for item in items})
 
 
-def run(handler: Hgm3Handler, batch: Batch, control: Control | None = None) -> dict[UUID, Outcome]:
+def run(handler: GeneratorHandler[Any], batch: Batch, control: Control | None = None) -> dict[UUID, Outcome]:
     outcomes: dict[UUID, Outcome] = {}
     for bucket in handler.buckets(batch):
         for outcome in handler.run(Batch(batch.claim, tuple(bucket), batch.features), control or Control()):
@@ -90,15 +113,16 @@ def clip_of(outcome: Outcome) -> MotionClip:
     return parse_npz(next(file.content for file in export_of(outcome).files if file.format == "npz"))
 
 
-def test_every_item_is_in_one_bucket_and_a_bucket_has_one_padded_length(handler: Hgm3Handler) -> None:
+def test_every_item_is_in_one_bucket_and_one_of_hgm3_has_one_padded_length(handler: GeneratorHandler[Any]) -> None:
     seconds = [2.0, 9.8, 2.1, 6.0, 9.7, 2.0]
     batch = make_batch(handler, *(make_item("a person walks", n, s) for n, s in enumerate(seconds)))
     buckets = handler.buckets(batch)
     assert sorted(item.seed for bucket in buckets for item in bucket) == list(range(6))
-    assert sorted(sorted(item.seed for item in bucket) for bucket in buckets) == [[0, 2, 5], [1, 4], [3]]
+    together = [[0, 2, 5], [1, 4], [3]] if handler.queue == "hgm3" else [[0, 1, 2, 3, 4, 5]]
+    assert sorted(sorted(item.seed for item in bucket) for bucket in buckets) == together
 
 
-def test_the_files_hold_the_motion_and_where_it_comes_from(handler: Hgm3Handler, bundle: str) -> None:
+def test_the_files_hold_the_motion_and_where_it_comes_from(handler: GeneratorHandler[Any], bundle: str) -> None:
     item = make_item("a person waves", 7, 2.5, {"guidance": 3.0})
     export = export_of(run(handler, make_batch(handler, item))[item.id])
     files = {file.format: file.content for file in export.files}
@@ -118,7 +142,7 @@ def test_the_files_hold_the_motion_and_where_it_comes_from(handler: Hgm3Handler,
     assert manifest == export.manifest
 
 
-def test_the_frame_rate_of_the_files_is_the_items(handler: Hgm3Handler) -> None:
+def test_the_frame_rate_of_the_files_is_the_items(handler: GeneratorHandler[Any]) -> None:
     item = make_item("a person waves", 7, 2.5, {"fps": 60.0})
     clip = clip_of(run(handler, make_batch(handler, item))[item.id])
     assert clip.fps == 60.0
@@ -126,7 +150,7 @@ def test_the_frame_rate_of_the_files_is_the_items(handler: Hgm3Handler) -> None:
     assert clip.frames == 148  # as long as 50 frames at 20 a second: 2.45 s and one frame
 
 
-def test_an_items_motion_does_not_depend_on_its_batch(handler: Hgm3Handler) -> None:
+def test_an_items_motion_does_not_depend_on_its_batch(handler: GeneratorHandler[Any]) -> None:
     items = [make_item(f"person number {n}", n, 2.0 + n % 3) for n in range(7)]
     batches = [items, items[4:5], items[::-1]]
     clips = [clip_of(run(handler, make_batch(handler, *batch))[items[4].id]) for batch in batches]
@@ -135,14 +159,14 @@ def test_an_items_motion_does_not_depend_on_its_batch(handler: Hgm3Handler) -> N
         assert clip.manifest == clips[0].manifest
 
 
-def test_without_seconds_the_seed_decides_the_length_and_other_items_do_not(handler: Hgm3Handler) -> None:
+def test_without_seconds_the_seed_decides_the_length_and_other_items_do_not(handler: GeneratorHandler[Any]) -> None:
     items = [make_item("a person runs", n, None) for n in range(4)]
     together = run(handler, make_batch(handler, *items))
     alone = run(handler, make_batch(handler, items[2]))
     assert export_of(together[items[2].id]).frames == export_of(alone[items[2].id]).frames
 
 
-def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: Hgm3Handler) -> None:
+def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: GeneratorHandler[Any]) -> None:
     items = [make_item("a person bows", n, 2.0) for n in range(3)]
     control = Control(items[1].id)
     outcomes = run(handler, make_batch(handler, *items), control)
@@ -151,25 +175,25 @@ def test_a_cancelled_item_has_no_outcome_and_steps_are_told(handler: Hgm3Handler
     assert control.steps[-1][0] == control.steps[-1][1]
 
 
-def test_when_everything_is_cancelled_nothing_is_made(handler: Hgm3Handler) -> None:
+def test_when_everything_is_cancelled_nothing_is_made(handler: GeneratorHandler[Any]) -> None:
     items = [make_item("a person bows", n, 2.0) for n in range(2)]
     assert run(handler, make_batch(handler, *items), Control(*(item.id for item in items))) == {}
 
 
-def test_broken_text_features_fail_their_item_alone(handler: Hgm3Handler) -> None:
+def test_broken_text_features_fail_their_item_alone(handler: GeneratorHandler[Any]) -> None:
     good, bad, narrow = (make_item(f"a person walks {n}", n, 2.0) for n in range(3))
     batch = make_batch(handler, good, bad, narrow)
     features = {**batch.features, bad.text_key: b"no tensors", narrow.text_key: text_blob(narrow.prompt, 3)}
     outcomes = run(handler, Batch(batch.claim, batch.items, features))
     assert isinstance(outcomes[good.id], Done)
-    for item in (bad, narrow):
+    for item, kind in ((bad, InvalidFile), (narrow, InvalidInput)):
         outcome = outcomes[item.id]
         assert isinstance(outcome, Failed)
-        assert isinstance(outcome.problem, InvalidFile)
+        assert isinstance(outcome.problem, kind)
         assert not outcome.retryable
 
 
-def test_a_length_the_model_cannot_make_fails_its_item_alone(handler: Hgm3Handler) -> None:
+def test_a_length_the_model_cannot_make_fails_its_item_alone(handler: GeneratorHandler[Any]) -> None:
     good, long = make_item("a person walks", 0, 2.0), make_item("a person walks", 1, 59.0)
     outcomes = run(handler, make_batch(handler, good, long))
     assert isinstance(outcomes[good.id], Done)
@@ -179,14 +203,17 @@ def test_a_length_the_model_cannot_make_fails_its_item_alone(handler: Hgm3Handle
     assert "seconds" in str(outcome.problem)
 
 
-def test_a_setting_out_of_range_is_told_by_its_name(handler: Hgm3Handler) -> None:
-    item = make_item("a person walks", 0, 2.0, {"steps": 1000})
-    with pytest.raises(InvalidInput, match="steps"):
+@pytest.mark.parametrize("settings", [{"guidance": 1000.0}, {"no_setting": 1.0}])
+def test_a_setting_out_of_range_or_unknown_is_told_by_its_name(
+    handler: GeneratorHandler[Any], settings: dict[str, float]
+) -> None:
+    item = make_item("a person walks", 0, 2.0, settings)
+    with pytest.raises(InvalidInput, match=next(iter(settings))):
         run(handler, make_batch(handler, item))
 
 
-def test_a_replaced_bundle_is_refused(bundle: str, tmp_path: Path) -> None:
-    other = random_bundle(tmp_path / "hgm3-random", "tiny", seed=1)
+def test_a_replaced_bundle_is_refused(model: str, bundle: str, tmp_path: Path) -> None:
+    other = BUNDLES[model](tmp_path / "replaced", 1)
     exact = bundle.rpartition("@")[2]
     with pytest.raises(Exception, match="replaced since"):
-        Hgm3Handler(Settings(device="cpu", threads=1)).load(f"{other.path}@{exact}")
+        handler_of(model).load(f"{other.path}@{exact}")

@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
 import torch
 
+from shared.items import OUTPUT_FPS
 from shared.motion.bvh_write import format_bvh
 from shared.motion.clip import MotionClip
 from shared.motion.finish import finish_motion
 from shared.runtime.handler import Export, ExportedFile
-from workers.hgm3.generate import Generated, Generator, Request, Settings
+from workers.generating.port import Generated, Generator, Request, S
 
-OUTPUT_FPS = "fps"
-"""The one setting of an item that is not the network's: the frame rate of its files."""
 MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
 
 
-def split_settings(values: Mapping[str, Any]) -> tuple[Settings, float | None]:
-    """An item's settings as the network's own and the output's frame rate (None = the model's).
-
-    Raises:
-        TypeError: a name that `shared.items` does not let through.
-    """
-    return Settings(**{k: v for k, v in values.items() if k != OUTPUT_FPS}), values.get(OUTPUT_FPS)
+def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
+    """An item's settings as the network's own and the output's frame rate (None = the model's)."""
+    return {k: v for k, v in values.items() if k != OUTPUT_FPS}, values.get(OUTPUT_FPS)
 
 
-def manifest_of(generator: Generator, request: Request, settings: Settings) -> dict[str, Any]:
+def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
     """Where a motion comes from: everything that decides it, nothing that differs between two equal runs."""
-    bundle, config = generator.bundle, generator.config
-    text = request.text
+    bundle, text = generator.bundle, request.text
     return {
         "prompt": text.prompt,
         "rewritten": text.rewritten,
@@ -43,12 +36,12 @@ def manifest_of(generator: Generator, request: Request, settings: Settings) -> d
         "random_weights": bundle.manifest.random,
         "licence": bundle.manifest.licence,
         "seed": request.seed,
-        "settings": asdict(settings.inference(config.inference)),
+        "settings": generator.described(settings),
         "software": software_of(generator),
     }
 
 
-def software_of(generator: Generator) -> dict[str, Any]:
+def software_of(generator: Generator[Any]) -> dict[str, Any]:
     """What equal tokens depend on besides the inputs: device kind, number type, threads, versions."""
     return {
         "marey": version("marey"),
@@ -60,10 +53,10 @@ def software_of(generator: Generator) -> dict[str, Any]:
 
 
 def finish(
-    generator: Generator,
+    generator: Generator[S],
     request: Request,
     generated: Generated,
-    settings: Settings,
+    settings: S,
     *,
     fps: float | None = None,
     clean: bool = True,
