@@ -7,7 +7,7 @@ they are in the second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from shared.motion.live_poses import LivePoses, PoseState
 from shared.motion.rotations import Array
 from shared.motion.rows import Rows
 from shared.motion.skeleton import Skeleton
+
+MEMORY = 40
+"""Frames after which poses and feet no longer show where they began."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,19 @@ class LiveMotion:
         """The state before the first frame."""
         poses = self._poses.start(streams)
         return LiveState(self._decoder.start(streams), poses, self._feet.start(streams), poses)
+
+    def after(self, features: Array) -> LiveState:
+        """The state of one stream behind frames that were made before, (T, D), T at least 1.
+
+        The root is followed through all of them; poses and feet, which forget, through the last `MEMORY` alone.
+        """
+        state = self.start()
+        early, late = features[:-MEMORY], features[-MEMORY:]
+        if len(early):
+            state = replace(state, root=self._decoder.run(early, state.root)[1])
+        for frame in late:
+            _, state = self.step(frame[None], state)
+        return state
 
     def step(self, features: Array, state: LiveState) -> tuple[LiveFrames, LiveState]:
         """The next frame of every stream.

@@ -120,10 +120,10 @@ class Generator:
         dtype = dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
         for part in networks.parts().values():
             part.to(chosen)
+        # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.
+        networks.masked.sequence.transformer.lower(dtype)
+        networks.residual.sequence.transformer.lower(dtype)
         if dtype != torch.float32:
-            # the encoder stays as it was in training: its tokens must not change
-            networks.masked.sequence.transformer.lower(dtype)
-            networks.residual.sequence.transformer.lower(dtype)
             networks.tokenizer.decoder.lower(dtype)
         return cls(verified, config, networks, chosen, dtype)
 

@@ -41,8 +41,9 @@ The weights are under Apache-2.0; MiniLM (all-MiniLM-L6-v2, Apache-2.0) is not p
 
     python -m workers.training.labeller --gold srl-kit-dev.json{option} -o models/srl-light
 """
-TAUGHT = """- Taught: {captions} other captions of KIT Motion-Language, labelled by several heads together that were trained
-  on the gold with different seeds (in cross-validation on the training folds alone), where these were in no doubt.
+TAUGHT = """- Taught: {captions} other captions of KIT Motion-Language, labelled by several heads together that were
+  trained on the gold with different seeds (in cross-validation on the training folds alone), where these were in no
+  doubt.
 """
 
 
