@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from shared.errors import InvalidFile
 from shared.text.encoders import WIDTHS, Encoding, weights_sha256
@@ -50,3 +53,7 @@ class ClipEncoder:
         output = self._model(**inputs)
         tokens = self._model.text_projection(output.last_hidden_state[0])
         return Encoding(output.text_embeds[0].numpy(), tokens.numpy(), offsets)
+
+    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """One by one: a product of other rows may round differently."""
+        return [self.encode(text).pooled for text in texts]

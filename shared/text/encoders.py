@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
@@ -59,7 +60,11 @@ class TextEncoder(Protocol):
         ...
 
     def encode(self, text: str) -> Encoding:
-        """Encode one text. One at a time: then a vector depends on its text alone, never on its batch."""
+        """Encode one text."""
+        ...
+
+    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """One vector (W,) a text, which depends on that text alone, never on those beside it."""
         ...
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from shared.text.encoders import WIDTHS, Encoding, weights_sha256
 from shared.text.minilm import MAX_TOKENS, MiniLM
 from shared.text.threads import one_thread
+
+MAX_TEXTS = 32
+"""Texts of one pass: more gain nothing, and the longest take 100 MB."""
 
 
 class MiniLMEncoder:
@@ -25,11 +29,23 @@ class MiniLMEncoder:
     @one_thread()
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 256 are left out."""
-        encoded = self._model.tokenizer.encode(text)
-        ids, offsets = encoded.ids, encoded.offsets
-        if len(ids) > MAX_TOKENS:
-            ids, offsets = [*ids[: MAX_TOKENS - 1], ids[-1]], [*offsets[: MAX_TOKENS - 1], (0, 0)]
+        ids, offsets = self._tokens(text)
         tokens: NDArray[np.float32] = self._model.states(ids)[-1].numpy()
         mean = tokens.mean(axis=0)
         norm = float(np.linalg.norm(mean))
         return Encoding(mean / norm, tokens / norm, tuple(offsets))
+
+    @one_thread()
+    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """Encode texts, the tokens of many in one pass."""
+        means: list[NDArray[np.float32]] = []
+        for low in range(0, len(texts), MAX_TEXTS):
+            states = self._model.last([self._tokens(text)[0] for text in texts[low : low + MAX_TEXTS]])
+            means += [tokens.numpy().mean(axis=0) for tokens in states]
+        return [mean / float(np.linalg.norm(mean)) for mean in means]
+
+    def _tokens(self, text: str) -> tuple[list[int], list[tuple[int, int]]]:
+        encoded = self._model.tokenizer.encode(text)
+        if len(encoded.ids) <= MAX_TOKENS:
+            return encoded.ids, encoded.offsets
+        return [*encoded.ids[: MAX_TOKENS - 1], encoded.ids[-1]], [*encoded.offsets[: MAX_TOKENS - 1], (0, 0)]

@@ -35,7 +35,7 @@ EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
 class TextPipeline:
     """Prompts in, graphs and features out.
 
-    A vector depends on its text alone (texts are encoded one by one), so features are equal in any batch.
+    A vector depends on its text alone, so features are equal in any batch.
     """
 
     def __init__(
@@ -125,25 +125,26 @@ class TextPipeline:
         over its words (`TextSpec.node_features`; the latter as in GraphMotion). Row 0 is always the pooled sentence.
         """
         if self.spec.node_features == "pooled":
-            rows = [self.pooled(node.text) for node in graph.nodes]
+            rows = self.pooled([node.text for node in graph.nodes])
         else:
             sentence = self.encoder.encode(_strip(graph.text))
             starts = _word_starts(graph)
             rows = [self._span(sentence, graph, starts, node) for node in graph.nodes]
         return np.stack(rows).astype(np.float16)
 
-    def pooled(self, text: str) -> NDArray[np.float32]:
-        """Pooled encoding (W,) of a text without the punctuation at its ends; the latest few thousand are kept."""
-        text = _strip(text)
-        vector = self._pooled.get(text)
-        if vector is None:
-            vector = self.encoder.encode(text).pooled
+    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """Pooled encodings (W,) of texts without the punctuation at their ends; the latest few thousand are kept."""
+        stripped = [_strip(text) for text in texts]
+        found = {text: self._pooled[text] for text in stripped if text in self._pooled}
+        missing = [text for text in dict.fromkeys(stripped) if text not in found]
+        if missing:
+            found.update(zip(missing, self.encoder.pooled(missing), strict=True))
+        for text, vector in found.items():
             self._pooled[text] = vector
-            if len(self._pooled) > CACHED_TEXTS:
-                self._pooled.popitem(last=False)
-        else:
             self._pooled.move_to_end(text)
-        return vector
+        while len(self._pooled) > CACHED_TEXTS:
+            self._pooled.popitem(last=False)
+        return [found[text] for text in stripped]
 
     def _graphs(self, texts: Sequence[str]) -> list[SemanticGraph]:
         frames = self.labeller.label([text.split() for text in texts])
@@ -155,7 +156,7 @@ class TextPipeline:
             return sentence.pooled
         last = node.words[-1]
         span = sentence.span(starts[node.words[0]], starts[last] + len(graph.words[last]))
-        return self.pooled(node.text) if span is None else span  # past the encoder's limit: its own text
+        return self.pooled([node.text])[0] if span is None else span  # past the encoder's limit: its own text
 
 
 def _word_starts(graph: SemanticGraph) -> list[int]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from shared.errors import InvalidFile
 from shared.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
@@ -49,3 +52,7 @@ class T5Encoder:
         offsets = tuple((int(a), int(b)) for a, b in inputs.pop("offset_mapping")[0].tolist())
         tokens = self._model(**inputs).last_hidden_state[0]
         return Encoding(tokens.mean(dim=0).numpy(), tokens.numpy(), offsets)
+
+    def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """One by one: a product of other rows may round differently."""
+        return [self.encode(text).pooled for text in texts]

@@ -79,7 +79,7 @@ def test_another_model_makes_motions_by_the_same_queue_and_alone(marey: Marey, o
     ours, theirs = load_npz(alone[0]["files"]["npz"]), load_npz(queued[0]["files"]["npz"])
     assert ours.frames == 20
     np.testing.assert_array_equal(ours.features, theirs.features)
-    assert read_bvh(queued[1]["files"]["bvh"]).frames == queued[1]["frames"]
+    assert len(read_bvh(queued[1]["files"]["bvh"]).joints()) == queued[1]["frames"]
 
 
 def test_fetching_again_changes_nothing_and_a_foreign_file_is_not_touched(marey: Marey, tmp_path: Path) -> None:

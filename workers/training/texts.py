@@ -174,7 +174,7 @@ def _readers(pipeline: TextPipeline, processes: int) -> Generator[tuple[Read, En
 
 
 def _encode(pipeline: TextPipeline, texts: Sequence[str]) -> NDArray[np.float16]:
-    return np.stack([pipeline.pooled(text) for text in texts]).astype(np.float16)
+    return np.stack(pipeline.pooled(texts)).astype(np.float16)
 
 
 _loaded: list[TextPipeline] = []  # in a process of the pool: its own pipeline

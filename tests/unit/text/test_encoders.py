@@ -174,3 +174,12 @@ def test_a_pipeline_on_clip_encodes_nodes_of_both_kinds(tiny_clip: Path) -> None
         pipeline = TextPipeline.load(spec, encoder_path=tiny_clip)
         assert pipeline.spec.encoder_sha256 == weights_sha256(tiny_clip)
         assert pipeline.features([LONG])[0].nodes.shape == (1, 512)
+
+
+def test_a_vector_does_not_depend_on_the_texts_beside_it(minilm: MiniLMEncoder) -> None:
+    texts = [TEXT, "left", "to the left hand side", "right", "she waves", "a person bows", " ".join(["walk"] * 400)] * 7
+    together = minilm.pooled(texts)
+    for text, vector in zip(texts[:7], together, strict=False):
+        np.testing.assert_allclose(vector, minilm.encode(text).pooled, atol=2e-6)
+        np.testing.assert_allclose(vector, minilm.pooled([text])[0], atol=2e-6)
+    assert minilm.pooled([]) == []

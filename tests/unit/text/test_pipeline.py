@@ -26,7 +26,7 @@ def pipeline() -> TextPipeline:
 def test_features_have_a_row_a_node_and_the_sentence_first(pipeline: TextPipeline) -> None:
     for features in pipeline.features(PROMPTS):
         assert features.nodes.shape == (len(features.graph.nodes), 384)
-        assert np.allclose(features.sentence, pipeline.pooled(features.graph.text), atol=1e-3)
+        assert np.allclose(features.sentence, pipeline.pooled([features.graph.text])[0], atol=1e-3)
 
 
 def test_features_are_equal_in_any_batch_and_order(pipeline: TextPipeline) -> None:
@@ -39,7 +39,7 @@ def test_features_are_equal_in_any_batch_and_order(pipeline: TextPipeline) -> No
 
 
 def test_punctuation_at_the_end_does_not_change_a_vector(pipeline: TextPipeline) -> None:
-    assert np.array_equal(pipeline.pooled("to the left."), pipeline.pooled("to the left"))
+    assert np.array_equal(*pipeline.pooled(["to the left.", "to the left"]))
 
 
 def test_span_features_are_the_sentence_s_own_states(pipeline: TextPipeline) -> None:
@@ -53,7 +53,7 @@ def test_span_features_are_the_sentence_s_own_states(pipeline: TextPipeline) -> 
     expected = sentence.span(9, 14)
     assert expected is not None
     assert np.allclose(features.nodes[node.id], expected, atol=1e-3)
-    assert not np.allclose(features.nodes[node.id], pipeline.pooled("walks"), atol=1e-2)
+    assert not np.allclose(features.nodes[node.id], pipeline.pooled(["walks"])[0], atol=1e-2)
 
 
 def test_the_key_is_known_without_a_model_and_changes_with_everything(pipeline: TextPipeline) -> None:

@@ -20,7 +20,7 @@ def test_every_caption_has_its_graph_and_each_text_is_encoded_once():
     assert texts.node_start[2] - texts.node_start[1] == texts.node_start[5] - texts.node_start[4] > 4
     assert (texts.node_string[: texts.node_start[2]] == texts.node_string[texts.node_start[3] :]).all()
     sentence = texts.strings[texts.node_string[texts.node_start[2]]]
-    assert np.array_equal(sentence, pipeline.pooled("a person bows deeply").astype(np.float16))
+    assert np.array_equal(sentence, pipeline.pooled(["a person bows deeply"])[0].astype(np.float16))
 
 
 def test_two_processes_read_captions_as_one_does():
