@@ -105,7 +105,7 @@ def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
     Raises:
         InvalidInput: it has not.
     """
-    known = [name for name in SETTINGS if name == OUTPUT_FPS or name in bundle.manifest.parameters["inference"]]
+    known = [name for name in SETTINGS if name == OUTPUT_FPS or name in bundle.manifest.parameters.get("inference", {})]
     for name in names:
         if name not in known:
             model = bundle.manifest.name
