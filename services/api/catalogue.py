@@ -105,8 +105,9 @@ def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
     Raises:
         InvalidInput: it has not.
     """
-    known = [name for name in SETTINGS if name == OUTPUT_FPS or name in bundle.manifest.parameters.get("inference", {})]
+    own = bundle.manifest.parameters.get("inference", {})
     for name in names:
-        if name not in known:
+        if name != OUTPUT_FPS and name not in own:
             model = bundle.manifest.name
+            known = [setting for setting in SETTINGS if setting == OUTPUT_FPS or setting in own]
             raise InvalidInput(f"{name!r} is not a setting of {model}; known are {', '.join(known)}")

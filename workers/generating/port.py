@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import Bundle
+from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidInput
+from shared.items import MAX_SEED
 from shared.motion.features import FeatureLayout
+from shared.nn.devices import choose_device, fast_bf16
 from shared.text.features import TextFeatures
-
-MAX_SEED = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,28 @@ class Limits:
                 where="text",
                 hint="They come from another encoder. Parse the prompt again for this bundle.",
             )
+
+
+def open_bundle(
+    bundle: Bundle | str, device: str, threads: int, dtype: torch.dtype | None
+) -> tuple[Bundle, torch.device, torch.dtype]:
+    """What every generator's `load` begins with: the verified bundle, its device and the type of its matrices.
+
+    Args:
+        bundle: a verified bundle, or its name or path.
+        device: `auto`, `cpu`, `cuda`, `cuda:N`.
+        threads: of torch; 0 leaves torch's own choice.
+        dtype: None = bfloat16 where the device multiplies it fast, else float32.
+
+    Raises:
+        NotFound, InvalidBundle, Refused: see `find_bundle`.
+        InvalidInput: no such device.
+    """
+    if threads > 0:
+        torch.set_num_threads(threads)
+    chosen = choose_device(device)
+    verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
+    return verified, chosen, dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
 
 
 class Control(Protocol):

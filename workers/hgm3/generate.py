@@ -12,12 +12,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.bundles import Bundle, find_bundle
+from shared.bundles import Bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
-from shared.nn.devices import choose_device, fast_bf16
 from shared.nn.sampling import uniform
-from workers.generating.port import Control, Limits, NoControl, Request, read_settings
+from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
 from workers.hgm3.bundle import Networks, load_networks
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import HGM3Config, InferenceConfig
@@ -112,12 +111,8 @@ class Generator:
             InvalidBundle: not HGM³, or damaged.
             InvalidInput: no such device.
         """
-        if threads > 0:
-            torch.set_num_threads(threads)
-        chosen = choose_device(device)
-        verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
+        verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
         config, networks = load_networks(verified)
-        dtype = dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
         for part in networks.parts().values():
             part.to(chosen)
         # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.

@@ -10,11 +10,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import Bundle, find_bundle
+from shared.bundles import Bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
-from shared.nn.devices import choose_device, fast_bf16
-from workers.generating.port import Control, Limits, NoControl, Request, read_settings
+from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
 from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
@@ -93,12 +92,8 @@ class Generator:
             InvalidBundle: not MOGO, or damaged.
             InvalidInput: no such device.
         """
-        if threads > 0:
-            torch.set_num_threads(threads)
-        chosen = choose_device(device)
-        verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
+        verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
         config, tokenizer, transformer = load_networks(verified)
-        dtype = dtype or (torch.bfloat16 if fast_bf16(chosen) else torch.float32)
         return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
 
     def settings(self, values: Mapping[str, Any]) -> Settings:
