@@ -97,6 +97,21 @@ class Unauthenticated(Refused):
     problem_type = "unauthenticated"
 
 
+class Busy(Refused):
+    """A quota or rate is used up for now.
+
+    Args:
+        seconds: when to ask again.
+    """
+
+    status = 429
+    problem_type = "busy"
+
+    def __init__(self, message: str, *, where: str | None = None, hint: str | None = None, seconds: int) -> None:
+        super().__init__(message, where=where, hint=hint)
+        self.seconds = seconds
+
+
 class ItemsFailed(MareyError):
     """The work ended, but some items failed, died or were cancelled."""
 

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 from collections import defaultdict
-from collections.abc import Callable, Collection, Sequence
-from typing import Any, TypeVar
+from collections.abc import Collection, Sequence
+from typing import Any
 from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput, NotFound
+from shared.errors import NotFound
 from shared.jobs import schema
 from shared.jobs.journal import among, no_such_job
+from shared.jobs.pages import cut_page, page_limit, read_cursor
 from shared.jobs.states import ItemState, JobControl, JobState, Stage
 from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionRow, Page, Problem
-
-LARGEST_PAGE = 1000
-Row = TypeVar("Row")
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
@@ -43,9 +39,9 @@ def list_jobs(
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
     if cursor is not None:
-        query = query.where(table.id < _read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(_limit(limit) + 1)).mappings().all()
-    return _page([_job(row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(table.id < read_cursor(cursor, UUID))
+    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_job(row) for row in rows], limit, lambda row: str(row.id))
 
 
 def list_items(
@@ -74,11 +70,11 @@ def list_items(
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
     if cursor is not None:
-        query = query.where(table.position > _read_cursor(cursor, int))
-    rows = conn.execute(query.order_by(table.position).limit(_limit(limit) + 1)).mappings().all()
+        query = query.where(table.position > read_cursor(cursor, int))
+    rows = conn.execute(query.order_by(table.position).limit(page_limit(limit) + 1)).mappings().all()
     items = [row["id"] for row in rows if row["state"] == ItemState.SUCCEEDED]
     by_item = {motion.item: motion for motion in _motions(conn, among(schema.motion.c.item_id, items))}
-    return _page([_item(row, by_item.get(row["id"])) for row in rows], limit, lambda row: str(row.position))
+    return cut_page([_item(row, by_item.get(row["id"])) for row in rows], limit, lambda row: str(row.position))
 
 
 def list_motions(
@@ -95,11 +91,11 @@ def list_motions(
         get_job(conn, tenant, job)
         wanted &= table.job_id == job
     if cursor is not None:
-        after = _read_cursor(cursor, UUID)
+        after = read_cursor(cursor, UUID)
         wanted &= table.id > after if job is not None else table.id < after
     order = table.id if job is not None else table.id.desc()
-    motions = _motions(conn, wanted, order=order, limit=_limit(limit) + 1)
-    return _page(motions, limit, lambda row: str(row.id))
+    motions = _motions(conn, wanted, order=order, limit=page_limit(limit) + 1)
+    return cut_page(motions, limit, lambda row: str(row.id))
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
@@ -127,7 +123,7 @@ def events_after(conn: sa.Connection, tenant: str, job: UUID, seq: int = 0, limi
         sa.select(table.job_id, table.seq, table.kind, table.item_id, table.reason, table.data, table.at)
         .where(table.job_id == job, table.seq > seq)
         .order_by(table.seq)
-        .limit(_limit(limit))
+        .limit(page_limit(limit))
     )
     return [EventRow(*row) for row in rows]
 
@@ -204,29 +200,3 @@ def _files(conn: sa.Connection, motions: Sequence[UUID]) -> dict[UUID, list[Moti
     for motion, *values in rows:
         files[motion].append(MotionFile(*values))
     return files
-
-
-# --- pages ---
-
-
-def _limit(limit: int) -> int:
-    if not 1 <= limit <= LARGEST_PAGE:
-        raise InvalidInput(f"{limit} is not between 1 and {LARGEST_PAGE}", where="limit")
-    return limit
-
-
-def _page(rows: Sequence[Row], limit: int, mark: Callable[[Row], str]) -> Page[Row]:
-    """The first `limit` rows of one more than asked for; the cursor is the mark of the last."""
-    kept = tuple(rows[:limit])
-    if len(rows) <= limit:
-        return Page(kept, None)
-    return Page(kept, base64.urlsafe_b64encode(mark(kept[-1]).encode()).decode().rstrip("="))
-
-
-def _read_cursor(cursor: str, kind: Callable[[str], Row]) -> Row:
-    try:
-        return kind(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
-    except (binascii.Error, ValueError) as error:
-        raise InvalidInput(
-            "this is no cursor of this listing", where="cursor", hint="Use the one the last page gave."
-        ) from error

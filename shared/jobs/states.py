@@ -95,6 +95,29 @@ def allowed(before: ItemState, after: ItemState) -> bool:
     return (before, after) in TRANSITIONS
 
 
+class StreamState(StrEnum):
+    """Where a live stream stands. `ENDED` and `FAILED` are final."""
+
+    WAITING = "waiting"
+    LIVE = "live"
+    PAUSED = "paused"
+    ENDED = "ended"
+    FAILED = "failed"
+
+
+STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
+    StreamState.WAITING: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.LIVE: frozenset({StreamState.PAUSED, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.PAUSED: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.ENDED: frozenset(),
+    StreamState.FAILED: frozenset(),
+}
+"""Allowed transitions of streams; the trigger `stream_transition` is the same table."""
+
+OPEN_STREAMS = frozenset({StreamState.WAITING, StreamState.LIVE, StreamState.PAUSED})
+"""States of streams that are not over."""
+
+
 class Counters(Protocol):
     """How many items of a job are in each state; the states add up to `total`."""
 

@@ -47,7 +47,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if job.fail_early is not None and not 0 <= job.fail_early <= 1:
         raise InvalidInput(f"{job.fail_early} is not a share between 0 and 1", where="fail_early")
     for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
-        _check_text(text, where)
+        check_text(text, where)
     identifier = new_id()
     earlier = _take_key(conn, job, identifier)
     if earlier is not None:
@@ -151,16 +151,20 @@ def _known_texts(conn: sa.Connection, keys: set[str]) -> set[str]:
 
 def _check_item(item: NewItem) -> None:
     where = f"items[{item.index}]"
-    _check_text(item.prompt, f"{where}.prompt")
-    _check_text(item.name, f"{where}.name")
+    check_text(item.prompt, f"{where}.prompt")
+    check_text(item.name, f"{where}.name")
     for tag in item.tags:
-        _check_text(tag, f"{where}.tags")
+        check_text(tag, f"{where}.tags")
     if not 0 <= item.seed < SEED_LIMIT:
         raise InvalidInput(f"{item.seed} is not a seed: 0 … {SEED_LIMIT - 1}", where=f"{where}.seed")
 
 
-def _check_text(text: str | None, where: str) -> None:
-    """Postgres holds any text but NUL and half surrogate pairs."""
+def check_text(text: str | None, where: str) -> None:
+    """Nothing, if Postgres can hold a text: any but NUL and half surrogate pairs.
+
+    Raises:
+        InvalidInput: it cannot.
+    """
     if text is None or (text.isascii() and "\0" not in text):
         return
     if "\0" in text:

@@ -131,7 +131,8 @@ class WordStates:
                 kept.append(token)
         hidden = self._minilm.states([encoded.ids[token] for token in kept])
         states = torch.stack([hidden[layer] for layer in self._layers], dim=1)
-        return torch.einsum("wt,tld->wld", _pooling(encoded.word_ids, encoded.tokens, kept, len(words)), states)
+        pooling = _pooling(encoded.word_ids, encoded.tokens, kept, len(words))
+        return (pooling @ states.flatten(1)).view(len(words), *states.shape[1:])
 
 
 def _pooling(owners: Sequence[int | None], pieces: Sequence[str], kept: Sequence[int], words: int) -> torch.Tensor:
