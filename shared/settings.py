@@ -34,6 +34,9 @@ class Settings(BaseSettings):
     queue_url: SecretStr | None = None
     """`redis://…` or `redis+socket://…`; unset = the embedded Valkey of `home`."""
 
+    streams_url: SecretStr | None = None
+    """Redis of the frame streams; unset = `queue_url`."""
+
     store: str | None = None
     """`s3://bucket` or a folder; unset = `home/assets`."""
 
@@ -67,13 +70,20 @@ class Settings(BaseSettings):
     drain_seconds: float = 300.0
     """A drain task claims nothing after this long and returns."""
 
+    live_slots: int = 4
+    """Live streams of one worker at once."""
+    streams_per_key: int = 4
+    """Open live streams of one API key."""
+    stream_idle_seconds: float = 60.0
+    """A live stream that nobody watches ends after this long."""
+
     log_level: str = "INFO"
     log_json: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _secrets_by_file(cls, values: dict[str, object]) -> dict[str, object]:
-        for name in ("database_url", "queue_url", "s3_access_key", "s3_secret_key"):
+        for name in ("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key"):
             path = os.environ.get(f"MAREY_{name.upper()}_FILE")
             if path and name not in values:
                 values[name] = Path(path).read_text(encoding="utf-8").strip()

@@ -12,7 +12,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from shared.errors import InvalidInput, MareyError, NotFound, Unauthenticated, Unreachable
+from shared.errors import Busy, InvalidInput, MareyError, NotFound, Unauthenticated, Unreachable
 from shared.items import InvalidItems
 
 TYPE_PREFIX = "urn:marey:problem:"
@@ -71,6 +71,8 @@ def problem_response(error: MareyError) -> JSONResponse:
         headers["WWW-Authenticate"] = 'Bearer realm="marey"'
     if isinstance(error, Unreachable):
         headers["Retry-After"] = RETRY_AFTER
+    if isinstance(error, Busy):
+        headers["Retry-After"] = str(error.seconds)
     return JSONResponse(
         body.model_dump(mode="json", exclude_none=True), error.status, headers=headers, media_type=MEDIA_TYPE
     )

@@ -1,0 +1,45 @@
+"""Who watches a stream: a key that API processes renew while a socket is open. A stream that nobody sees ends."""
+
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+from __future__ import annotations
+
+from typing import Any
+
+import redis
+
+from shared.streams.redis import reached, stream_key
+
+KEEP_MS = 10_000
+TOUCH_SECONDS = 3.0  # two may fail before the key is gone
+
+
+class Watch:
+    """The watchers of one stream.
+
+    Args:
+        client: as for `FrameStream`.
+        stream: its id.
+    """
+
+    def __init__(self, client: redis.Redis, stream: str) -> None:
+        self.stream = stream
+        self.key = stream_key(stream, "watch")
+        self._redis: Any = client
+
+    def touch(self) -> None:
+        """Somebody watches; to be called every 3 s.
+
+        Raises:
+            Unreachable: Redis does not answer.
+        """
+        with reached(self.stream):
+            self._redis.set(self.key, b"1", px=KEEP_MS)
+
+    def seen(self) -> bool:
+        """Whether somebody did within the last 10 s.
+
+        Raises:
+            Unreachable: Redis does not answer.
+        """
+        with reached(self.stream):
+            return bool(self._redis.exists(self.key))
