@@ -35,10 +35,20 @@ class LiveFrame:
 
 @dataclass
 class _Session:
-    """Frames shown, and the number of the prompt in force."""
+    """Frames shown, the number of the prompt in force, and what the session is called among the streams."""
 
     shown: int
     prompt: int
+    stream: int
+
+
+@dataclass(frozen=True)
+class _Paused:
+    """All that a session is, while it takes no part in steps."""
+
+    stream: dict[str, torch.Tensor]
+    decoded: DecoderState
+    body: LiveState
 
 
 class LiveRoom:
@@ -57,15 +67,33 @@ class LiveRoom:
         self.generator = generator
         inference = (settings or Settings()).inference(generator.config.inference)
         self.skeleton = generator.layout.skeleton
+        self.capacity = capacity
         self._streams = Streams(generator.transformer, capacity, inference, dtype=generator.dtype)
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # the session in each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)
         self._body = self._motion.start(0)
         self._sessions: dict[int, _Session] = {}
+        self._paused: dict[int, _Paused] = {}
+        self._started = 0
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self._sessions)
+
+    @property
+    def fps(self) -> float:
+        """Frames of a second."""
+        return self.generator.limits.fps
+
+    @property
+    def bundle(self) -> str:
+        """The exact bundle."""
+        return self.generator.bundle.reference
+
+    @property
+    def levels(self) -> int:
+        """V, codes of a frame."""
+        return self.generator.config.tokenizer.levels
 
     def start(self, text: TextFeatures, seed: int, *, past: NDArray[np.int16] | None = None, prompt: int = 0) -> int:
         """A new session, or one that another worker began.
@@ -83,6 +111,8 @@ class LiveRoom:
             InvalidInput: no room, features of another encoder, a seed out of range, or tokens that are none.
         """
         self.generator.limits.check(Request(text, seed))
+        if len(self) == self.capacity:  # paused ones keep their room
+            raise InvalidInput(f"all {self.capacity} sessions are taken", hint="Stop one first.")
         decoder = self.generator.tokenizer.decoder.start(1)
         body = self._motion.start(1)
         columns = None
@@ -90,43 +120,82 @@ class LiveRoom:
             columns = self._columns(past)
             features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
             body = self._motion.after(features[0].cpu().numpy())
-        session = self._streams.start(self._sentence(text), seed, past=columns)
-        self._rows.append(session)
-        self._decoded = DecoderState.join((self._decoded, decoder))
-        self._body = LiveState.join((self._body, body))
-        self._sessions[session] = _Session(0 if columns is None else len(columns), prompt)
-        return session
+        stream = self._streams.start(self._sentence(text), seed, past=columns)
+        self._started += 1
+        self._sessions[self._started] = _Session(0 if columns is None else len(columns), prompt, stream)
+        self._join(self._started, decoder, body)
+        return self._started
 
     def steer(self, session: int, text: TextFeatures) -> None:
         """Another prompt, in force from the next frame on.
 
         Raises:
-            InvalidInput: no such session, or features of another encoder.
+            InvalidInput: no such session, it is paused, or features of another encoder.
         """
         self.generator.limits.check(Request(text, 0))
-        self._streams.steer(session, self._sentence(text))
-        self._sessions[session].prompt += 1
+        about = self._playing(session)
+        self._streams.steer(about.stream, self._sentence(text))
+        about.prompt += 1
 
     def stop(self, session: int) -> None:
-        """Forget a session.
+        """Forget a session, paused or not.
 
         Raises:
             InvalidInput: there is none of that name.
         """
-        self._streams.stop(session)
-        kept = [row for row, name in enumerate(self._rows) if name != session]
-        self._rows = [self._rows[row] for row in kept]
-        self._decoded = self._decoded.select(torch.tensor(kept, dtype=torch.long))
-        self._body = self._body.take(kept)
+        if session not in self._paused:
+            self._streams.stop(self._playing(session).stream)
+            self._leave(session)
+        self._paused.pop(session, None)
         del self._sessions[session]
+
+    def pause(self, session: int) -> None:
+        """Leave a session out of the steps until `resume`; its room stays its own.
+
+        Raises:
+            InvalidInput: no such session, or it is paused.
+        """
+        about = self._playing(session)
+        row = self._rows.index(session)
+        decoded, body = self._decoded.select(torch.tensor([row])), self._body.take([row])
+        self._paused[session] = _Paused(self._streams.save(about.stream), decoded, body)
+        self._streams.stop(about.stream)
+        self._leave(session)
+
+    def resume(self, session: int) -> None:
+        """Let a paused session go on: with the very frames that it would have shown.
+
+        Raises:
+            InvalidInput: it is not paused.
+        """
+        if session not in self._paused:
+            raise InvalidInput(f"session {session} is not paused")
+        kept = self._paused.pop(session)
+        self._sessions[session].stream = self._streams.resume(kept.stream)
+        self._join(session, kept.decoded, kept.body)
+
+    def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
+        """The next frames of one session alone, at once; the others stand still meanwhile.
+
+        Raises:
+            InvalidInput: no such session, or it is paused.
+        """
+        self._playing(session)
+        others = [name for name in self._rows if name != session]
+        for name in others:
+            self.pause(name)
+        made = [self.step()[session] for _ in range(frames)]
+        for name in others:
+            self.resume(name)
+        return made
 
     @torch.inference_mode()
     def step(self) -> dict[int, LiveFrame]:
-        """The next frame of every session."""
+        """The next frame of every session that is not paused."""
         drawn = self._streams.step()
         if not drawn:
             return {}
-        columns = torch.stack([drawn[session] for session in self._rows])  # (S, V)
+        columns = torch.stack([drawn[self._sessions[session].stream] for session in self._rows])  # (S, V)
         features, self._decoded = self.generator.tokenizer.decode_next(columns[:, None], self._decoded)
         shown, self._body = self._motion.step(features[:, 0].cpu().numpy(), self._body)
         tokens = columns.cpu().numpy().astype(np.int16)
@@ -139,6 +208,24 @@ class LiveRoom:
             frames[session] = LiveFrame(frame, tokens[row])
             about.shown += 1
         return frames
+
+    def _playing(self, session: int) -> _Session:
+        if session not in self._sessions:
+            raise InvalidInput(f"there is no session {session}", hint="It was stopped, or never started.")
+        if session in self._paused:
+            raise InvalidInput(f"session {session} is paused", hint="Resume it first.")
+        return self._sessions[session]
+
+    def _join(self, session: int, decoded: DecoderState, body: LiveState) -> None:
+        self._rows.append(session)
+        self._decoded = DecoderState.join((self._decoded, decoded))
+        self._body = LiveState.join((self._body, body))
+
+    def _leave(self, session: int) -> None:
+        kept = [row for row, name in enumerate(self._rows) if name != session]
+        self._rows = [self._rows[row] for row in kept]
+        self._decoded = self._decoded.select(torch.tensor(kept, dtype=torch.long))
+        self._body = self._body.take(kept)
 
     def _sentence(self, text: TextFeatures) -> torch.Tensor:
         return torch.from_numpy(text.sentence.astype(np.float32)).to(self.generator.device)

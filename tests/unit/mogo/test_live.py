@@ -84,7 +84,8 @@ def test_a_session_goes_on_in_another_room_where_it_was(generator: Generator) ->
 
 
 def test_a_steer_counts_the_prompt_and_changes_what_follows(generator: Generator) -> None:
-    rooms = [LiveRoom(generator, 1) for _ in range(2)]
+    guided = Settings(guidance=10.0)  # random weights hear a prompt so softly that few draws would differ
+    rooms = [LiveRoom(generator, 1, guided) for _ in range(2)]
     sessions = [room.start(text_features(0), 4) for room in rooms]
     same = [run(room, session, 6) for room, session in zip(rooms, sessions, strict=True)]
     rooms[1].steer(sessions[1], text_features(1))
@@ -92,6 +93,39 @@ def test_a_steer_counts_the_prompt_and_changes_what_follows(generator: Generator
     assert all(np.array_equal(a.tokens, b.tokens) for a, b in zip(*same, strict=True))
     assert any(not np.array_equal(a.tokens, b.tokens) for a, b in zip(*later, strict=True))
     assert [made.frame.prompt for made in (*same[1], *later[1])] == [0] * 6 + [1] * 12
+
+
+def test_a_paused_session_goes_on_with_the_frames_it_would_have_shown(generator: Generator) -> None:
+    alone = LiveRoom(generator, 1)
+    wanted = run(alone, alone.start(text_features(1), 5), 12)
+    room = LiveRoom(generator, 2)
+    mine, other = room.start(text_features(1), 5), room.start(text_features(0), 2)
+    found = [room.step()[mine] for _ in range(4)]
+    room.pause(mine)
+    assert [set(room.step()) for _ in range(3)] == [{other}] * 3
+    with pytest.raises(InvalidInput, match="taken"):
+        room.start(text_features(2), 0)
+    for refused in (lambda: room.pause(mine), lambda: room.steer(mine, text_features(0)), lambda: room.resume(other)):
+        with pytest.raises(InvalidInput):
+            refused()
+    room.resume(mine)
+    found += [room.step()[mine] for _ in range(8)]
+    for made, expected in zip(found, wanted, strict=True):
+        assert made.frame.number == expected.frame.number
+        assert np.array_equal(made.tokens, expected.tokens)
+        np.testing.assert_allclose(made.frame.root, expected.frame.root, atol=1e-5)
+    room.pause(mine)
+    room.stop(mine)
+    assert len(room) == 1
+
+
+def test_a_session_that_catches_up_holds_the_others_where_they_are(generator: Generator) -> None:
+    room = LiveRoom(generator, 2)
+    other, mine = room.start(text_features(0), 2), room.start(text_features(1), 5)
+    room.step()
+    assert [made.frame.number for made in room.catch_up(mine, 6)] == [1, 2, 3, 4, 5, 6]
+    after = room.step()
+    assert (after[mine].frame.number, after[other].frame.number) == (7, 1)
 
 
 def test_frames_can_be_sent(generator: Generator) -> None:
