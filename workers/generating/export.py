@@ -25,7 +25,8 @@ def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | N
 
 def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
     """Where a motion comes from: everything that decides it, nothing that differs between two equal runs."""
-    bundle, text = generator.bundle, request.text
+    bundle, text, recording = generator.bundle, request.text, request.recording
+    streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
     return {
         "prompt": text.prompt,
         "rewritten": text.rewritten,
@@ -38,6 +39,7 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
         "seed": request.seed,
         "settings": generator.described(settings),
         "software": software_of(generator),
+        **streamed,
     }
 
 

@@ -13,6 +13,7 @@ from shared.errors import MareyError
 from shared.jobs import ClaimedItem
 from shared.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
 from shared.settings import Settings as Configuration
+from shared.streams.recording import Recording
 from shared.text.features import TextFeatures
 from workers.generating.export import export_clip, finish, split_settings
 from workers.generating.port import Generated, Generator, Request, S
@@ -93,7 +94,9 @@ class GeneratorHandler(Generic[S]):
     def _request(self, item: ClaimedItem, blob: bytes) -> Request:
         fps = self.generator.limits.fps
         frames = None if item.seconds is None else round(item.seconds * fps)
-        return Request(TextFeatures.from_blob(blob), item.seed, frames)
+        recording = Recording.from_blob(blob)
+        text = TextFeatures.from_blob(blob) if recording is None else recording.text
+        return Request(text, item.seed, frames, recording)
 
 
 class _Rows:

@@ -15,6 +15,7 @@ from shared.errors import InvalidInput
 from shared.items import MAX_SEED
 from shared.motion.features import FeatureLayout
 from shared.nn.devices import choose_device, fast_bf16
+from shared.streams.recording import Recording
 from shared.text.features import TextFeatures
 
 
@@ -25,6 +26,7 @@ class Request:
     text: TextFeatures
     seed: int
     frames: int | None = None  # at the model's fps; None = the model decides
+    recording: Recording | None = None  # of a live stream: drawn already, only to be decoded
 
 
 @dataclass(frozen=True)
@@ -43,9 +45,10 @@ class Limits:
             InvalidInput: a length or seed out of range, or features of another encoder.
         """
         low, high = self.min_frames, self.max_frames
-        if request.frames is not None and not low <= request.frames <= high:
+        frames = request.frames if request.recording is None else None
+        if frames is not None and not low <= frames <= high:
             seconds = f"{low / self.fps:g} to {high / self.fps:g} seconds"
-            raise InvalidInput(f"{request.frames} frames is out of range: this bundle makes {seconds}", where="frames")
+            raise InvalidInput(f"{frames} frames is out of range: this bundle makes {seconds}", where="frames")
         if not 0 <= request.seed <= MAX_SEED:
             raise InvalidInput(f"{request.seed} must lie between 0 and {MAX_SEED}", where="seed")
         width = request.text.nodes.shape[1]

@@ -130,11 +130,24 @@ class Generator:
         control = control or NoControl()
         for request in requests:
             self.limits.check(request)
-        drawing = _Drawing(self, requests, inference)
+        recorded = {row: self.columns(r.recording.tokens) for row, r in enumerate(requests) if r.recording is not None}
+        drawing = _Drawing(self, requests, inference, recorded)
         while drawing.step(control.dropped()):
             control.progress(drawing.done, drawing.total)
         control.progress(drawing.total, drawing.total)
         return [None if columns is None else self._decode(torch.stack(columns)) for columns in drawing.columns]
+
+    def columns(self, tokens: NDArray[np.int16]) -> torch.Tensor:
+        """Tokens (n, V) that were drawn elsewhere, on this device.
+
+        Raises:
+            InvalidInput: they are none of this bundle's.
+        """
+        config = self.config.tokenizer
+        if tokens.ndim != 2 or tokens.shape[1] != config.levels or tokens.min() < 0 or tokens.max() >= config.codes:
+            wanted = f"(n, {config.levels}) codes from 0 to {config.codes - 1}"
+            raise InvalidInput(f"tokens {tokens.shape} are not {wanted}", where="tokens")
+        return torch.from_numpy(tokens.astype(np.int64)).to(self.device)
 
     def _decode(self, tokens: torch.Tensor) -> Generated:
         """One by one: a convolution rounds differently in another batch, files would differ."""
@@ -145,12 +158,23 @@ class Generator:
 class _Drawing:
     """Requests on their way through the sessions of one `Streams`."""
 
-    def __init__(self, generator: Generator, requests: Sequence[Request], inference: InferenceConfig) -> None:
+    def __init__(
+        self,
+        generator: Generator,
+        requests: Sequence[Request],
+        inference: InferenceConfig,
+        recorded: Mapping[int, torch.Tensor],
+    ) -> None:
         self.requests = requests
         self.limit = generator.config.max_frames
-        self.columns: list[list[torch.Tensor] | None] = [[] for _ in requests]  # None: dropped
-        self.total = sum(request.frames or self.limit for request in requests)
-        self.waiting = list(range(len(requests)))[::-1]
+        self.columns: list[list[torch.Tensor] | None] = [  # None: dropped
+            list(recorded[row].unbind()) if row in recorded else [] for row in range(len(requests))
+        ]
+        self.total = sum(
+            len(recorded[row]) if row in recorded else request.frames or self.limit
+            for row, request in enumerate(requests)
+        )
+        self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
         self.streams = Streams(
             generator.transformer, max(1, min(MAX_SESSIONS, len(requests))), inference, dtype=generator.dtype

@@ -13,24 +13,20 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from shared.bundles import choose_bundle
 from shared.errors import InvalidBundle, InvalidInput
 from shared.motion.features import HeadingLayout
 from shared.motion.live import LiveMotion, LiveState
+from shared.runtime.live.port import LiveFrame, Show
+from shared.settings import settings as configuration
 from shared.streams.frames import Frame
 from shared.text.features import TextFeatures
+from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
+from workers.mogo.bundle import MODEL
 from workers.mogo.generate import Generator, Settings
 from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import DecoderState
-
-
-@dataclass(frozen=True, eq=False)
-class LiveFrame:
-    """What a step gives for a session."""
-
-    frame: Frame
-    tokens: NDArray[np.int16]
-    """(V,): the column it was decoded from."""
 
 
 @dataclass
@@ -91,6 +87,16 @@ class LiveRoom:
         return self.generator.bundle.reference
 
     @property
+    def model(self) -> str:
+        """The queue that makes clips of recordings."""
+        return MODEL
+
+    @property
+    def min_frames(self) -> int:
+        """The shortest clip."""
+        return self.generator.limits.min_frames
+
+    @property
     def levels(self) -> int:
         """V, codes of a frame."""
         return self.generator.config.tokenizer.levels
@@ -117,7 +123,7 @@ class LiveRoom:
         body = self._motion.start(1)
         columns = None
         if past is not None and len(past):
-            columns = self._columns(past)
+            columns = self.generator.columns(past)
             features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
             body = self._motion.after(features[0].cpu().numpy())
         stream = self._streams.start(self._sentence(text), seed, past=columns)
@@ -230,9 +236,21 @@ class LiveRoom:
     def _sentence(self, text: TextFeatures) -> torch.Tensor:
         return torch.from_numpy(text.sentence.astype(np.float32)).to(self.generator.device)
 
-    def _columns(self, past: NDArray[np.int16]) -> torch.Tensor:
-        config = self.generator.config.tokenizer
-        if past.ndim != 2 or past.shape[1] != config.levels or past.min() < 0 or past.max() >= config.codes:
-            wanted = f"(n, {config.levels}) codes from 0 to {config.codes - 1}"
-            raise InvalidInput(f"the past of a session is {past.shape}, not {wanted}", where="past")
-        return torch.from_numpy(past.astype(np.int64)).to(self.generator.device)
+
+def create_show() -> Show:
+    """What the live loop of `marey worker mogo` serves: the bundle that this machine has.
+
+    Raises:
+        NotFound, InvalidBundle: there is none, or a damaged one.
+    """
+    chosen = configuration()
+    bundle = choose_bundle(MODEL, config=chosen)
+    if bundle.manifest.text is None:
+        raise InvalidBundle("it does not read prompts", where=str(bundle.path))
+    generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
+    pipeline = TextPipeline.load(bundle.manifest.text)
+    return Show(
+        open_room=lambda slots: LiveRoom(generator, slots),
+        parse=lambda prompt: pipeline.features([prompt])[0],
+        device=str(generator.device),
+    )

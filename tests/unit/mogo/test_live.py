@@ -9,12 +9,13 @@ import pytest
 
 from shared.errors import InvalidInput
 from shared.motion.live import LiveMotion
+from shared.runtime.live.port import LiveFrame
 from shared.streams.frames import decode_frame, encode_frame
 from tests.support.prepared import text_features
 from workers.mogo.bundle import random_bundle
 from workers.mogo.config import TINY
 from workers.mogo.generate import Generator, Settings
-from workers.mogo.live import LiveFrame, LiveRoom
+from workers.mogo.live import LiveRoom
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def test_frames_are_those_of_the_whole_clip_decoded_at_once(generator: Generator
     room = LiveRoom(generator, 1)
     made = run(room, room.start(text_features(0), 3), 30)
     tokens = np.stack([frame.tokens for frame in made])
-    features = generator.tokenizer.decode(room._columns(tokens)[None])[0].numpy()
+    features = generator.tokenizer.decode(generator.columns(tokens)[None])[0].numpy()
     motion = LiveMotion(generator.layout, room.skeleton)
     state = motion.start()
     for number, frame in enumerate(made):

@@ -1,0 +1,102 @@
+"""A stream under this worker's lease: what the loop adds to and the keeper writes down."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shared.jobs import StreamChunk, StreamRow, StreamState
+from shared.runtime.live.port import Tokens
+from shared.streams.control import ControlQueue
+from shared.streams.frames import Frame
+from shared.streams.redis import FrameStream, Lease
+from shared.streams.watch import Watch
+from shared.text.features import TextFeatures
+
+
+@dataclass(eq=False)
+class Held:
+    """One stream.
+
+    Attributes:
+        text: of the prompt in force.
+        opening: of the first prompt.
+        session: its name in the room; None before it joined and after it left.
+        read: id of the last message that was read; `obeyed` of the last that is in force.
+        unwritten: frames that Redis has not got yet.
+        shown: how many frames Redis has got, before and now: no token beyond them is written down.
+        recorded: how many frames are written down, with `recorded_prompts` of the prompts.
+        ending: why it ends; None while it goes on.
+        seen: when somebody last watched, by the monotonic clock.
+        lost: another worker has it.
+    """
+
+    row: StreamRow
+    frames: FrameStream
+    controls: ControlQueue
+    watch: Watch
+    lease: Lease
+    text: TextFeatures
+    opening: TextFeatures
+    tokens: list[Tokens]
+    prompts: list[tuple[int, str]]
+    seen: float
+    read: str
+    obeyed: str
+    shown: int
+    recorded: int
+    recorded_prompts: int
+    session: int | None = None
+    unwritten: list[Frame] = field(default_factory=list[Frame])
+    state: StreamState = StreamState.LIVE
+    recorded_state: StreamState = StreamState.LIVE
+    recorded_control: str = ""
+    ending: str | None = None
+    lost: bool = False
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        self.state = self.recorded_state = self.row.state
+        self.recorded_control = self.row.control
+
+    @property
+    def past(self) -> Tokens | None:
+        """(n, V) tokens of every frame so far; None before the first."""
+        return np.stack(self.tokens) if self.tokens else None
+
+    def add(self, tokens: Tokens) -> None:
+        """A frame was made."""
+        with self.lock:
+            self.tokens.append(tokens)
+
+    def steered(self, prompt: str, text: TextFeatures, control: str) -> None:
+        """A prompt is in force from the next frame on."""
+        with self.lock:
+            self.prompts.append((len(self.tokens), prompt))
+            self.text, self.obeyed = text, control
+
+    def chunk(self) -> StreamChunk | None:
+        """What is not written down yet and was shown; None if nothing is new."""
+        with self.lock:
+            stop = min(self.shown, len(self.tokens))
+            tokens = self.tokens[self.recorded : stop]
+            prompts = [(frame, text) for frame, text in self.prompts[self.recorded_prompts :] if frame < stop]
+            changed = self.state is not self.recorded_state
+            if not tokens and not changed:
+                return None
+            content = np.stack(tokens).astype("<i2").tobytes() if tokens else b""
+            # The message of a prompt that waits for its first frame is read again by whoever goes on from here.
+            waits = len(self.prompts) > self.recorded_prompts + len(prompts)
+            control = self.recorded_control if waits else self.obeyed
+            state = self.state if changed else None
+            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state)
+
+    def wrote(self, chunk: StreamChunk) -> None:
+        """A chunk is written down."""
+        with self.lock:
+            self.recorded_control = chunk.control
+            self.recorded += chunk.frames
+            self.recorded_prompts += len(chunk.prompts)
+            self.recorded_state = chunk.state or self.recorded_state

@@ -1,0 +1,77 @@
+"""The process of a live loop."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import socket
+import threading
+from types import FrameType
+from typing import cast
+
+from shared.errors import InvalidInput
+from shared.jobs import WorkerBeat, create_engine
+from shared.runtime.child import wait_for_database
+from shared.runtime.live.keeper import QUEUE, Keeper
+from shared.runtime.live.loop import LiveLoop
+from shared.runtime.live.port import ShowFactory
+from shared.runtime.logs import configure_logging, logger
+from shared.runtime.queue import redis_client
+from shared.settings import Settings
+
+log = logger(__name__)
+
+STOP_SECONDS = 10.0
+
+
+def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | None = None) -> int:
+    """Serve live streams until SIGTERM or SIGINT, or until `stopping` is set (then no signal handler is installed).
+
+    Args:
+        factory: `module:attribute` of a `ShowFactory`.
+
+    Raises:
+        InvalidInput: a setting is missing.
+        NotFound, InvalidBundle: there is no model to show.
+        Unreachable: the database does not answer within a minute.
+    """
+    queue_url = chosen.streams_url or chosen.queue_url
+    if chosen.database_url is None or queue_url is None:
+        raise InvalidInput(
+            "a live worker needs a database and Redis",
+            where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
+            hint="Set both, or use `marey serve`, which brings its own.",
+        )
+    if stopping is None:
+        configure_logging("live", level=chosen.log_level, json=chosen.log_json)
+        stopping = threading.Event()
+        _stop_on_signals(stopping)
+    wait_for_database(chosen)
+    module, _, attribute = factory.partition(":")
+    show = cast("ShowFactory", getattr(importlib.import_module(module), attribute))()
+    engine = create_engine(chosen.database_url.get_secret_value())
+    client = redis_client(queue_url.get_secret_value())
+    name = f"live-{socket.gethostname()}-{os.getpid()}"
+    keeper: Keeper
+    loop = LiveLoop(lambda: show.open_room(chosen.live_slots), lambda over: keeper.over(over))
+    worker = WorkerBeat(name, QUEUE, socket.gethostname(), os.getpid(), show.device, loop.room.bundle)
+    keeper = Keeper(engine, client, worker, show.parse, idle_seconds=chosen.stream_idle_seconds, stopping=stopping)
+    keeper.serve(loop)
+    log.info("ready", worker=name, bundle=loop.room.bundle, slots=chosen.live_slots)
+    try:
+        loop.run(stopping)
+    finally:
+        stopping.set()
+        keeper.join(STOP_SECONDS)
+        client.close()
+        engine.dispose()
+    return 0
+
+
+def _stop_on_signals(stopping: threading.Event) -> None:
+    def stop(_signal: int, _frame: FrameType | None) -> None:
+        stopping.set()
+
+    signal.signal(signal.SIGTERM, stop)
+    signal.signal(signal.SIGINT, stop)

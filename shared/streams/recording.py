@@ -1,0 +1,69 @@
+"""The recording of a live stream: its tokens and prompts, from which its clip is made by the queue of its model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from shared.errors import InvalidFile
+from shared.text.features import TextFeatures
+
+FORMAT = 1
+Prompts: TypeAlias = Sequence[tuple[int, str]]
+"""Texts with the frames from which they were in force."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """All of a stream that decides its clip.
+
+    Attributes:
+        stream: its id.
+        tokens: (T, V) int16.
+        prompts: the first begins at frame 0.
+        text: of the first prompt.
+    """
+
+    stream: str
+    tokens: NDArray[np.int16] = field(repr=False)
+    prompts: Prompts
+    text: TextFeatures = field(repr=False)
+
+    def to_blob(self) -> bytes:
+        """Safetensors; equal recordings are equal bytes."""
+        about = {"format": FORMAT, "stream": self.stream, "prompts": [[frame, text] for frame, text in self.prompts]}
+        arrays = {
+            "recording": np.frombuffer(json.dumps(about, ensure_ascii=False).encode(), np.uint8),
+            "text": np.frombuffer(self.text.to_blob(), np.uint8),
+            "tokens": np.ascontiguousarray(self.tokens, np.int16),
+        }
+        return save(arrays)
+
+    @classmethod
+    def from_blob(cls, blob: bytes) -> Recording | None:
+        """Read what `to_blob` wrote; None for any other safetensors.
+
+        Raises:
+            InvalidFile: damaged, or of another version.
+        """
+        try:
+            arrays = load(blob)
+            if "recording" not in arrays:
+                return None
+            about = json.loads(arrays["recording"].tobytes())
+            if about["format"] != FORMAT:
+                raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
+            tokens = arrays["tokens"]
+            if tokens.dtype != np.int16 or tokens.ndim != 2 or len(tokens) == 0:
+                raise ValueError(f"tokens are {tokens.dtype} {tokens.shape}")
+            prompts = [(int(frame), str(text)) for frame, text in about["prompts"]]
+            return cls(str(about["stream"]), tokens, prompts, TextFeatures.from_blob(arrays["text"].tobytes()))
+        except (SafetensorError, ValueError, KeyError, TypeError) as error:
+            raise InvalidFile(f"this is not a recording of this version: {error}", where="recording") from error

@@ -1,0 +1,263 @@
+"""Live streams from the row to the frames, and back to a motion: real Postgres, real Valkey, a small real MOGO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from uuid import UUID
+
+import numpy as np
+import pytest
+import redis
+import sqlalchemy as sa
+
+from shared.jobs import StreamState, get_job, list_items, stream_prompts, transaction
+from shared.jobs.states import STREAM_TRANSITIONS, ItemState
+from shared.runtime.live.port import LiveFrame
+from shared.runtime.queue import redis_client
+from shared.settings import Settings as Configuration
+from shared.storage import FolderStore
+from shared.streams.control import Control
+from shared.streams.frames import Frame
+from tests.support.live_loop import LiveWorker, Studio
+from tests.support.runtime import Loop
+from workers.generating.handler import GeneratorHandler
+from workers.mogo.bundle import random_bundle
+from workers.mogo.generate import Generator
+from workers.mogo.live import LiveRoom
+
+Start = Callable[..., LiveWorker]
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
+    return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu", threads=1)
+
+
+@pytest.fixture
+def client(queue_url: str) -> Iterator[redis.Redis]:
+    with redis_client(queue_url) as client:
+        yield client
+
+
+@pytest.fixture
+def studio(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Studio:
+    return Studio(engine, client, generator.bundle.reference)
+
+
+@pytest.fixture
+def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Iterator[Start]:
+    workers: list[LiveWorker] = []
+
+    def begin(slots: int = 2, room: type[LiveRoom] = LiveRoom, **options: float) -> LiveWorker:
+        workers.append(LiveWorker(engine, client, lambda: room(generator, slots), **options))
+        return workers[-1]
+
+    yield begin
+    for worker in workers:
+        worker.stop()
+
+
+def whole(studio: Studio, stream: UUID) -> list[Frame]:
+    """Its frames, none missing."""
+    frames = [frame for frame in studio.frames(stream) if isinstance(frame, Frame)]
+    assert [frame.number for frame in frames] == list(range(len(frames)))
+    return frames
+
+
+def farthest_step(frames: list[Frame]) -> float:
+    roots = np.stack([frame.root for frame in frames])
+    return float(np.linalg.norm(np.diff(roots, axis=0), axis=1).max())
+
+
+def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
+    studio: Studio, start: Start, generator: Generator, engine: sa.Engine, folder_store: FolderStore
+) -> None:
+    stream = studio.begin("a person walks")
+    assert (studio.row(stream).state, studio.row(stream).position) == (StreamState.WAITING, 0)
+    start()
+    studio.until(lambda: studio.row(stream).frames > 0, "a record")
+    assert studio.row(stream).state is StreamState.LIVE
+    studio.send(stream, Control("steer", "a person waves"))
+    studio.until(lambda: any(f.prompt == 1 for f in whole(studio, stream)), "the second prompt")
+    studio.send(stream, Control("stop"))
+    studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
+    frames = whole(studio, stream)
+    assert [frame.last for frame in frames] == [False] * (len(frames) - 1) + [True]
+    row = studio.row(stream)
+    assert (row.frames, row.reason) == (len(frames), "stopped")
+    with transaction(engine) as conn:
+        prompts = stream_prompts(conn, stream)
+    turned = next(frame.number for frame in frames if frame.prompt == 1)
+    assert prompts == [(0, "a person walks"), (turned, "a person waves")]
+    assert row.job is not None
+    handler = GeneratorHandler("mogo", lambda *_, **__: generator, 4, Configuration())
+    loop = Loop(engine, folder_store, handler)
+    try:
+        loop.run()
+    finally:
+        loop.close()
+    with transaction(engine) as conn:
+        (item,) = list_items(conn, studio.key.tenant, row.job).rows
+        assert get_job(conn, studio.key.tenant, row.job).state == "succeeded"
+    assert item.state is ItemState.SUCCEEDED
+    assert item.motion is not None
+    assert item.motion.frames == len(frames)
+    assert item.motion.metadata["stream"] == str(stream)
+    assert item.motion.metadata["prompts"] == [[0, "a person walks"], [turned, "a person waves"]]
+
+
+def test_a_paused_stream_stands_still_and_goes_on_where_it_was(studio: Studio, start: Start) -> None:
+    stream = studio.begin()
+    start()
+    studio.until(lambda: studio.shown(stream) > 5, "frames")
+    studio.send(stream, Control("pause"))
+    studio.until(lambda: studio.row(stream).state is StreamState.PAUSED, "the pause")
+    shown = studio.shown(stream)
+    studio.send(stream, Control("steer", "a person bows"))
+    studio.send(stream, Control("resume"))
+    studio.until(lambda: studio.shown(stream) > shown + 5, "more frames")
+    frames = whole(studio, stream)
+    assert [frame.prompt for frame in frames] == [0] * shown + [1] * (len(frames) - shown)
+    assert np.linalg.norm(frames[shown].root - frames[shown - 1].root) <= 2 * farthest_step(frames[:shown])
+
+
+def test_another_worker_goes_on_behind_the_last_frame_after_a_kill(studio: Studio, start: Start) -> None:
+    stream = studio.begin("a person walks")
+    first = start()
+    studio.until(lambda: studio.row(stream).frames > 0, "a record")
+    studio.send(stream, Control("steer", "a person runs"))
+    studio.until(lambda: studio.shown(stream) > 0 and whole(studio, stream)[-1].prompt == 1, "the second prompt")
+    studio.until(lambda: len(prompts_of(studio, stream)) == 2, "its record")
+    first.kill()
+    shown, fence = studio.shown(stream), studio.row(stream).fence
+    assert studio.row(stream).state is StreamState.LIVE
+    start()
+    studio.until(lambda: studio.shown(stream) >= shown + 20, "frames of the other worker")
+    frames = whole(studio, stream)
+    assert {frame.prompt for frame in frames[shown:]} == {1}
+    assert studio.row(stream).fence > fence
+    assert np.linalg.norm(frames[shown].root - frames[shown - 1].root) <= 3 * farthest_step(frames[:shown]) + 0.05
+
+
+def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio: Studio, start: Start) -> None:
+    stream = studio.begin()
+    first = start()
+    studio.until(lambda: studio.shown(stream) > 5, "frames")
+    first.stop()
+    shown = studio.shown(stream)
+    assert studio.row(stream).frames == shown
+    start()
+    studio.until(lambda: studio.shown(stream) > shown + 3, "frames of the other worker")
+    whole(studio, stream)
+
+
+def test_streams_wait_while_every_slot_is_taken(studio: Studio, start: Start) -> None:
+    streams = [studio.begin(seed=seed) for seed in range(3)]
+    start(slots=2)
+    studio.until(lambda: all(studio.shown(stream) > 0 for stream in streams[:2]), "frames of two")
+    waiting = studio.row(streams[2])
+    assert (waiting.state, waiting.position) == (StreamState.WAITING, 0)
+    studio.send(streams[0], Control("stop"))
+    studio.until(lambda: studio.shown(streams[2]) > 0, "frames of the third")
+    assert studio.row(streams[0]).state is StreamState.ENDED
+
+
+def test_a_stream_ends_at_its_limit(studio: Studio, start: Start) -> None:
+    stream = studio.begin(max_frames=12)
+    start()
+    studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
+    frames = whole(studio, stream)
+    assert len(frames) == 12
+    assert frames[-1].last
+    assert studio.row(stream).job is None  # shorter than any clip
+
+
+def test_a_stream_that_nobody_watches_ends(studio: Studio, start: Start) -> None:
+    lonely, watched = studio.begin(), studio.begin(seed=2)
+    start(idle_seconds=0.5)
+
+    def is_over() -> bool:
+        studio.watch(watched)
+        return studio.row(lonely).state is StreamState.ENDED
+
+    studio.until(is_over, "the end")
+    assert "nobody watched" in str(studio.row(lonely).reason)
+    assert studio.row(watched).state is StreamState.LIVE
+
+
+def test_a_queue_that_forgets_everything_costs_no_stream(studio: Studio, start: Start, client: redis.Redis) -> None:
+    stream = studio.begin()
+    start()
+    studio.until(lambda: studio.row(stream).frames > 0, "a record")
+    recorded = studio.row(stream).frames
+    client.flushall()
+    studio.until(lambda: studio.row(stream).frames > recorded + 20, "more records")
+    assert studio.row(stream).state is StreamState.LIVE
+
+
+class Fragile(LiveRoom):
+    """Breaks, with all that is in it, at frame 5 of the stream with seed 13."""
+
+    def step(self) -> dict[int, LiveFrame]:
+        made = super().step()
+        for session, live in made.items():
+            row = self._streams.sessions.index(self._sessions[session].stream)
+            if self._streams.state.seeds[row] == 13 and live.frame.number == 5:
+                raise RuntimeError("a bug in the model")
+        return made
+
+
+def test_a_stream_that_breaks_the_room_fails_alone(studio: Studio, start: Start) -> None:
+    good, bad = studio.begin(seed=1), studio.begin(seed=13)
+    start(room=Fragile)
+    studio.until(lambda: studio.row(bad).state is StreamState.FAILED, "the failure")
+    problem = studio.row(bad).problem
+    assert problem is not None
+    assert problem.type == "handler-error"
+    shown = studio.shown(good)
+    studio.until(lambda: studio.shown(good) > shown + 10, "frames of the other")
+    whole(studio, good)
+
+
+def test_a_prompt_that_cannot_be_read_fails_its_stream(studio: Studio, start: Start) -> None:
+    bad, good = studio.begin("refused"), studio.begin()
+    start()
+    studio.until(lambda: studio.row(bad).state is StreamState.FAILED, "the failure")
+    studio.until(lambda: studio.shown(good) > 0, "frames of the other")
+    studio.send(good, Control("steer", "refused"))
+    studio.send(good, Control("steer", "a person waves"))
+    studio.until(lambda: whole(studio, good)[-1].prompt == 1, "the next prompt")
+
+
+@pytest.mark.parametrize("before", StreamState)
+@pytest.mark.parametrize("after", StreamState)
+def test_the_database_allows_the_transitions_of_the_code(
+    studio: Studio, engine: sa.Engine, before: StreamState, after: StreamState
+) -> None:
+    stream = studio.begin()
+    ways = {
+        StreamState.WAITING: [],
+        StreamState.LIVE: [StreamState.LIVE],
+        StreamState.PAUSED: [StreamState.LIVE, StreamState.PAUSED],
+        StreamState.ENDED: [StreamState.ENDED],
+        StreamState.FAILED: [StreamState.FAILED],
+    }
+    for state in ways[before]:
+        move(engine, stream, state)
+    if before is after or after in STREAM_TRANSITIONS[before]:
+        move(engine, stream, after)
+    else:
+        with pytest.raises(sa.exc.DBAPIError, match="a stream may not go"):
+            move(engine, stream, after)
+
+
+def move(engine: sa.Engine, stream: UUID, state: StreamState) -> None:
+    ended = "coalesce(ended_at, now())" if state in (StreamState.ENDED, StreamState.FAILED) else "NULL"
+    with engine.begin() as conn:
+        query = sa.text(f"UPDATE stream SET state = :state, ended_at = {ended} WHERE id = :id")
+        conn.execute(query, {"state": state, "id": stream})
+
+
+def prompts_of(studio: Studio, stream: UUID) -> list[tuple[int, str]]:
+    with transaction(studio.engine) as conn:
+        return stream_prompts(conn, stream)

@@ -1,0 +1,115 @@
+"""A live worker inside the test's process: the real loop and keeper around a small room, on real Postgres and Redis."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from uuid import UUID
+
+import redis
+import sqlalchemy as sa
+
+from shared.errors import InvalidInput
+from shared.jobs import (
+    NewStream,
+    StreamRow,
+    WorkerBeat,
+    create_key,
+    create_stream,
+    get_stream,
+    transaction,
+)
+from shared.runtime.live.keeper import QUEUE, Keeper
+from shared.runtime.live.loop import LiveLoop
+from shared.runtime.live.port import Room
+from shared.streams.control import Control, ControlQueue
+from shared.streams.frames import Frame, decode_frame
+from shared.streams.redis import FrameStream, Gap
+from shared.streams.watch import Watch
+from shared.text.features import TextFeatures
+from tests.support.prepared import text_features
+
+PATIENCE = 60.0
+
+
+def parse(prompt: str) -> TextFeatures:
+    """Features that differ with the prompt."""
+    if prompt == "refused":
+        raise InvalidInput("this prompt cannot be read")
+    return text_features(zlib.crc32(prompt.encode()))
+
+
+class LiveWorker:
+    """One live worker; `kill` leaves everything as a SIGKILL would."""
+
+    def __init__(
+        self, engine: sa.Engine, client: redis.Redis, open_room: Callable[[], Room], *, idle_seconds: float = 600.0
+    ) -> None:
+        self._stopping = threading.Event()
+        self.loop = LiveLoop(open_room, lambda over: self.keeper.over(over))
+        beat = WorkerBeat(f"live-{id(self)}", QUEUE, "test", os.getpid(), "cpu", self.loop.room.bundle)
+        self.keeper = Keeper(engine, client, beat, parse, idle_seconds=idle_seconds, stopping=self._stopping)
+        self._thread = threading.Thread(target=self.loop.run, args=(self._stopping,), daemon=True)
+        self.keeper.serve(self.loop)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """As SIGTERM."""
+        self._stopping.set()
+        for thread in (self._thread, self.keeper, self.keeper.renewer):
+            thread.join(PATIENCE)
+
+    def kill(self) -> None:
+        """Nothing is written or released any more."""
+        self.keeper._give_back = lambda: None  # pyright: ignore
+        self.stop()
+
+
+class Studio:
+    """What a client sees of streams."""
+
+    def __init__(self, engine: sa.Engine, client: redis.Redis, bundle: str) -> None:
+        self.engine, self.client, self.bundle = engine, client, bundle
+        with transaction(engine) as conn:
+            self.key = create_key(conn, "studio", ["submit"]).key
+
+    def begin(self, prompt: str = "a person walks", *, seed: int = 1, max_frames: int = 10_000) -> UUID:
+        """Begin a stream."""
+        new = NewStream(self.key.tenant, self.key.id, prompt, "mogo", self.bundle, seed, max_frames)
+        with transaction(self.engine) as conn:
+            return create_stream(conn, new, limit=100)
+
+    def row(self, stream: UUID) -> StreamRow:
+        """Its row."""
+        with transaction(self.engine) as conn:
+            return get_stream(conn, self.key.tenant, stream)
+
+    def send(self, stream: UUID, control: Control) -> None:
+        """A message."""
+        ControlQueue(self.client, str(stream)).send(control)
+
+    def watch(self, stream: UUID) -> None:
+        """Somebody looks."""
+        Watch(self.client, str(stream)).touch()
+
+    def frames(self, stream: UUID) -> list[Frame | Gap]:
+        """All that Redis has."""
+        reader = FrameStream(self.client, str(stream)).reader()
+        found: list[Frame | Gap] = []
+        while batch := reader.read(count=500):
+            found += [each if isinstance(each, Gap) else decode_frame(each.data, joints=22) for each in batch]
+        return found
+
+    def shown(self, stream: UUID) -> int:
+        """How many frames there are."""
+        return FrameStream(self.client, str(stream)).bounds()[1]
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait for something that must come."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, f"{what} did not come in {PATIENCE:g} s"
+            time.sleep(0.02)
