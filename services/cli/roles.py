@@ -28,6 +28,8 @@ HANDLERS = {
     "text": "services.text.handler:create_handler",
 }
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
+SHOWS = {"mogo": "workers.mogo.live:create_show"}
+"""What the live loop of each model that streams serves."""
 GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
 """Where each model's `Generator` is."""
 

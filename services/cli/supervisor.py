@@ -6,22 +6,19 @@ import contextlib
 import fcntl
 import json
 import os
-import shutil
 import signal
 import socket
-import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from io import TextIOWrapper
-from pathlib import Path
 
 from services.cli import console
+from services.cli.children import Child, marey, stop_all
 from services.cli.place import Server, read_server, write_server
-from services.cli.roles import GENERATORS, role_of, threads_of
+from services.cli.roles import GENERATORS, SHOWS, role_of, threads_of
 from shared.errors import Conflict, InvalidInput, MareyError
 from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
 from shared.jobs.types import DEFAULT_TENANT
@@ -32,69 +29,7 @@ from shared.storage import open_store
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "operate", "read", "submit")
 TICK = 0.2
-FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
-"""Seconds before a child that ended is started again; doubled each time it ends within a minute."""
-STEADY = 60.0
-STOP_SECONDS = 35.0
-"""Workers release their leases within 30 s; longer and they are killed."""
 LOG_LIMIT = 10 * 2**20
-
-
-@dataclass
-class Child:
-    """A process of ours, started again when it ends."""
-
-    name: str
-    command: Sequence[str]
-    environment: dict[str, str]
-    log: Path
-    process: subprocess.Popen[bytes] | None = None
-    pause: float = FIRST_PAUSE
-    began: float = 0.0
-    due: float = 0.0
-
-    def keep(self, now: float) -> None:
-        """Start it if it does not run and its pause is over."""
-        if self.process is None:
-            if now >= self.due:
-                self.start(now)
-            return
-        code = self.process.poll()
-        if code is None:
-            return
-        if now - self.began > STEADY:
-            self.pause = FIRST_PAUSE
-        console.say(f"{self.name} ended ({_how(code)}); starting it again in {self.pause:g} s. Its log: {self.log}")
-        self.process, self.due = None, now + self.pause
-        self.pause = min(self.pause * 2, LONGEST_PAUSE)
-
-    def start(self, now: float) -> None:
-        """Start it. It gets SIGTERM when we die, however we die."""
-        with self.log.open("ab") as output:
-            self.process = subprocess.Popen(
-                [*_death_signal(), *self.command],
-                env=self.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,  # Ctrl-C is for us; we stop the children in order
-            )
-        self.began = now
-
-    def terminate(self) -> None:
-        """Ask it to end."""
-        if self.process is not None and self.process.poll() is None:
-            self.process.terminate()
-
-    def join(self, seconds: float) -> None:
-        """Wait until it has ended, by force after `seconds`."""
-        if self.process is None:
-            return
-        try:
-            self.process.wait(seconds)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
 
 
 @dataclass
@@ -163,7 +98,14 @@ class Supervisor:
         self._children = [
             self._child("api", ["api"], environment),
             self._child("scheduler", ["scheduler"], environment),
-            *(self._child(f"worker-{i}", ["worker", "+".join(q)], environment) for i, q in enumerate(self.roles, 1)),
+            *(
+                self._child(f"worker-{i}", ["worker", "+".join(queues), "--only", "queue"], environment)
+                for i, queues in enumerate(self.roles, 1)
+            ),
+            *(
+                self._child(f"live-{model}", ["worker", model, "--only", "live"], environment)
+                for model in self._shown()
+            ),
         ]
 
     def _start_backings(self) -> tuple[str, str]:
@@ -178,6 +120,10 @@ class Supervisor:
             urls["Postgres"] if database is None else database.get_secret_value(),
             urls["Valkey"] if queue is None else queue.get_secret_value(),
         )
+
+    def _shown(self) -> list[str]:
+        """Models with a live loop, in a process of its own: a batch must not hold up a stream."""
+        return [model for model in SHOWS if self.config.live_slots and any(model in role for role in self.roles)]
 
     def _environment(self, database_url: str, queue_url: str) -> dict[str, str]:
         computing = sum(any(queue in GENERATORS for queue in role) for role in self.roles)
@@ -196,7 +142,7 @@ class Supervisor:
         log = self.home / "logs" / f"{name}.log"
         if log.exists() and log.stat().st_size > LOG_LIMIT:
             log.replace(log.with_suffix(".log.1"))
-        return Child(name, [sys.executable, "-m", "services.cli", *arguments], environment, log)
+        return Child(name, marey(*arguments), environment, log)
 
     def _watch(self) -> None:
         url, announced, ready = self._server.url, False, False
@@ -221,10 +167,7 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C must not leave children behind
         (self.home / "server.json").unlink(missing_ok=True)
-        for child in self._children:
-            child.terminate()
-        for child in self._children:
-            child.join(STOP_SECONDS)
+        stop_all(self._children)
         for backing in reversed(self._backings):
             backing.server.stop()
 
@@ -301,12 +244,3 @@ def _answers(url: str) -> bool:
             return response.status == 200
     except (urllib.error.URLError, OSError):
         return False
-
-
-def _death_signal() -> list[str]:
-    setpriv = shutil.which("setpriv")
-    return [setpriv, "--pdeathsig", "TERM"] if setpriv else []
-
-
-def _how(code: int) -> str:
-    return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"

@@ -11,7 +11,15 @@ import sqlalchemy as sa
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from shared.errors import InvalidInput
-from shared.jobs import create_engine, remove_stale_assets, sweep, transaction
+from shared.jobs import (
+    Problem,
+    abandoned_streams,
+    create_engine,
+    end_stream,
+    remove_stale_assets,
+    sweep,
+    transaction,
+)
 from shared.runtime.app import create_app
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
@@ -20,7 +28,12 @@ from shared.storage import open_store
 
 log = logger(__name__)
 
+NOBODY = Problem(
+    "unreachable", "no worker showed this stream for 15 minutes", hint="See that a worker of its model runs."
+)
 STALE_ASSETS_SECONDS = 600.0  # assets half written by a dead worker wait an hour anyway
+ABANDONED_SECONDS = 900.0  # a stream waits this long for a worker, or for its worker's successor
+ABANDONED_EVERY = 30.0
 STOP_SECONDS = 10.0
 
 
@@ -80,6 +93,12 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
         if removed:
             log.info("stale_assets_removed", assets=removed)
 
+    def end_abandoned() -> None:
+        with transaction(engine) as conn:
+            for stream in abandoned_streams(conn, ABANDONED_SECONDS):
+                end_stream(conn, stream, None, NOBODY.message, problem=NOBODY)
+                log.warning("stream_abandoned", stream=str(stream))
+
     return [
         # A lease that ran out while the database was away is not its worker's fault: let heartbeats come first.
         Periodic(
@@ -91,6 +110,9 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
             grace=chosen.lease_seconds,
         ),
         Periodic("stale_assets", remove_stale, seconds=STALE_ASSETS_SECONDS, stopping=stopping),
+        Periodic(
+            "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY
+        ),
     ]
 
 

@@ -120,7 +120,7 @@ class Serving:
     log: Path
 
     def children(self) -> dict[str, psutil.Process]:
-        """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`."""
+        """Its children by role: `postgres`, `valkey-server`, `api`, `scheduler`, `worker`, `live`."""
         found: dict[str, psutil.Process] = {}
         for child in psutil.Process(self.process.pid).children():
             with contextlib.suppress(psutil.Error):  # just killed, and not waited for yet
@@ -168,5 +168,5 @@ def tiny_models(folder: Path) -> Path:
 def _role(process: psutil.Process) -> str:
     command = process.cmdline()
     if "services.cli" in command:
-        return command[command.index("services.cli") + 1]
+        return "live" if command[-2:] == ["--only", "live"] else command[command.index("services.cli") + 1]
     return process.name()

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from enum import StrEnum
 from typing import Annotated
 
 import typer
+
+from shared.errors import InvalidInput
 
 
 def serve(
@@ -36,19 +40,47 @@ def serve(
     Supervisor(config, parse_roles(roles or default_roles(config))).run()
 
 
+class Part(StrEnum):
+    """What a worker does."""
+
+    QUEUE = "queue"
+    LIVE = "live"
+
+
 def worker(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues to serve: hgm3, mogo, text, or hgm3+text.")],
+    only: Annotated[
+        Part | None,
+        typer.Option(
+            "--only", help="A model that streams has two processes, its queue and its live streams: one of them."
+        ),
+    ] = None,
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
-    from services.cli.roles import needs_extra, parse_roles, role_of
+    from services.cli.roles import SHOWS, needs_extra, parse_roles, role_of
 
     queues = parse_roles(model.replace(",", "+"))[0]
+    shown = [queue for queue in queues if queue in SHOWS]
     try:
+        from services.cli.children import Child, keep_all, marey
         from shared.runtime.worker import worker_main
         from shared.settings import settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    raise typer.Exit(worker_main(role_of(queues, settings()), settings()))
+    if only is Part.LIVE:
+        from shared.runtime.live.main import live_main
+
+        if len(shown) != 1:
+            raise InvalidInput(
+                f"{model!r} names {len(shown)} models that stream", where="MODEL", hint="Name one: mogo."
+            )
+        raise typer.Exit(live_main(SHOWS[shown[0]], settings()))
+    role = role_of(queues, settings())
+    if only is Part.QUEUE or not shown or not settings().live_slots:
+        raise typer.Exit(worker_main(role, settings()))
+    parts = [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
+    parts.append((f"{model} queue", [model, "--only", "queue"]))
+    keep_all([Child(name, marey("worker", *arguments), dict(os.environ)) for name, arguments in parts])
 
 
 def scheduler() -> None:

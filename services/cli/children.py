@@ -1,0 +1,122 @@
+"""Processes of `marey` that another one keeps running."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from services.cli import console
+
+TICK = 0.2
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
+"""Seconds before a child that ended is started again; doubled each time it ends within a minute."""
+STEADY = 60.0
+STOP_SECONDS = 35.0
+"""Workers release their leases within 30 s; longer and they are killed."""
+
+
+@dataclass
+class Child:
+    """A process of ours, started again when it ends.
+
+    Attributes:
+        log: where its output goes; None = where ours does.
+    """
+
+    name: str
+    command: Sequence[str]
+    environment: dict[str, str]
+    log: Path | None = None
+    process: subprocess.Popen[bytes] | None = None
+    pause: float = FIRST_PAUSE
+    began: float = 0.0
+    due: float = 0.0
+
+    def keep(self, now: float) -> None:
+        """Start it if it does not run and its pause is over."""
+        if self.process is None:
+            if now >= self.due:
+                self.start(now)
+            return
+        code = self.process.poll()
+        if code is None:
+            return
+        if now - self.began > STEADY:
+            self.pause = FIRST_PAUSE
+        where = "" if self.log is None else f" Its log: {self.log}"
+        console.say(f"{self.name} ended ({_how(code)}); starting it again in {self.pause:g} s.{where}")
+        self.process, self.due = None, now + self.pause
+        self.pause = min(self.pause * 2, LONGEST_PAUSE)
+
+    def start(self, now: float) -> None:
+        """Start it. It gets SIGTERM when we die, however we die."""
+        with contextlib.nullcontext() if self.log is None else self.log.open("ab") as output:
+            self.process = subprocess.Popen(
+                [*_death_signal(), *self.command],
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=None if output is None else subprocess.STDOUT,
+                start_new_session=True,  # Ctrl-C is for us; we stop the children in order
+            )
+        self.began = now
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        if self.process is not None and self.process.poll() is None:
+            self.process.terminate()
+
+    def join(self, seconds: float) -> None:
+        """Wait until it has ended, by force after `seconds`."""
+        if self.process is None:
+            return
+        try:
+            self.process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def marey(*arguments: str) -> list[str]:
+    """The command line of one of our own commands."""
+    return [sys.executable, "-m", "services.cli", *arguments]
+
+
+def keep_all(children: Sequence[Child]) -> None:
+    """Keep children running until SIGTERM or SIGINT."""
+    stopping: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, lambda number, _: stopping.append(number))
+    try:
+        while not stopping:
+            for child in children:
+                child.keep(time.monotonic())
+            time.sleep(TICK)
+    finally:
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)  # a second Ctrl-C must not leave children behind
+        stop_all(children)
+
+
+def stop_all(children: Sequence[Child]) -> None:
+    """Ask all to end, and wait until they have."""
+    for child in children:
+        child.terminate()
+    for child in children:
+        child.join(STOP_SECONDS)
+
+
+def _death_signal() -> list[str]:
+    setpriv = shutil.which("setpriv")
+    return [setpriv, "--pdeathsig", "TERM"] if setpriv else []
+
+
+def _how(code: int) -> str:
+    return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
