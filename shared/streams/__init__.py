@@ -1,1 +1,1 @@
-"""Frames of live streams: their bytes, and the streams on Redis that carry them from a worker to any API process."""
+"""Live streams: bytes of a frame, the streams on Redis that carry frames to any API process, messages, recordings."""
