@@ -17,7 +17,6 @@ STREAM = """
         model TEXT NOT NULL,
         bundle TEXT NOT NULL,
         seed INTEGER NOT NULL,
-        settings JSONB NOT NULL,
         max_frames INTEGER NOT NULL,
         state TEXT DEFAULT 'waiting' NOT NULL,
         reason TEXT,

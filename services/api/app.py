@@ -22,8 +22,12 @@ from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
 from services.api.jobs.routes import SCHEMAS
 from services.api.jobs.routes import router as jobs_router
+from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.streams.hub import Hub
+from services.api.streams.routes import router as streams_router
+from services.api.streams.wire import StreamProtocol
 from services.api.tailer import Tailer
 from services.text.routes import router as texts_router
 from shared.errors import InvalidInput
@@ -35,8 +39,14 @@ from shared.storage import open_store
 CONNECTIONS = 10
 """Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
 GRACE_SECONDS = 3
-"""For answers under way at SIGTERM; event streams end at once."""
-ROUTERS = (health_router, jobs_router, motions_router, models_router, texts_router)
+"""For answers under way at SIGTERM; event streams and sockets end at once."""
+SOCKETS: dict[str, Any] = {
+    "ws": StreamProtocol,
+    "ws_max_size": 64 * 2**10,  # what is too long for us is answered; what is over this is not even read
+    "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
+}
+"""What uvicorn must know of WebSockets."""
+ROUTERS = (health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router)
 TEXT_ROUTERS = (health_router, texts_router)
 """For `marey text serve`: parsing alone, which can be given machines of its own."""
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."
@@ -74,12 +84,16 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     url = config.database_url.get_secret_value()
     engine = create_engine(url, pool_size=CONNECTIONS, max_overflow=CONNECTIONS)
     tailer = Tailer(engine, url)
-    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer)
+    redis_url = config.streams_url or config.queue_url
+    hub = None if redis_url is None else Hub(redis_url.get_secret_value())
+    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer, hub)
     tailer.start()
     try:
         yield
     finally:
         tailer.stop()
+        if hub is not None:
+            hub.close()
         engine.dispose()
 
 
@@ -129,4 +143,5 @@ def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=GRACE_SECONDS,
+        **SOCKETS,
     )

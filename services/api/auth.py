@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import Depends, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 
-from services.api.context import Shared
+from services.api.context import Context, Shared
 from shared.errors import Refused, Unauthenticated
 from shared.jobs import ApiKey, authenticate, transaction
 
@@ -21,22 +21,32 @@ def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials |
     Raises:
         Unauthenticated: none, or not a valid one.
     """
-    if credentials is None:
+    return authenticated(shared, None if credentials is None else credentials.credentials)
+
+
+def authenticated(shared: Context, secret: str | None) -> ApiKey:
+    """The key of this secret; raises as `caller`."""
+    if not secret:
         raise Unauthenticated("no API key was sent", hint="Send the header `Authorization: Bearer <key>`.")
     with transaction(shared.engine) as conn:
-        return authenticate(conn, credentials.credentials)
+        return authenticate(conn, secret)
 
 
-def requires(scope: str) -> Callable[[ApiKey], ApiKey]:
-    """A dependency: the caller's key, if it has the scope (`admin` has all).
+def check_scope(key: ApiKey, scope: str) -> None:
+    """Nothing, if the key has the scope (`admin` has all).
 
     Raises:
         Refused: it has not.
     """
+    if scope not in key.scopes and "admin" not in key.scopes:
+        raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
+
+
+def requires(scope: str) -> Callable[[ApiKey], ApiKey]:
+    """A dependency: the caller's key, if it has the scope; raises as `check_scope`."""
 
     def check(key: Annotated[ApiKey, Depends(caller)]) -> ApiKey:
-        if scope not in key.scopes and "admin" not in key.scopes:
-            raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
+        check_scope(key, scope)
         return key
 
     return check

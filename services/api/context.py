@@ -1,4 +1,4 @@
-"""What the routes share: one engine, one store, one bundle catalogue and one tailer a process."""
+"""What the routes share: one engine, one store, one bundle catalogue, one tailer and one way to Redis a process."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import sqlalchemy as sa
-from fastapi import Depends, Request
+from fastapi import Depends
+from starlette.requests import HTTPConnection
 
 from services.api.catalogue import Catalogue
+from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
 from shared.jobs import transaction
 from shared.settings import Settings
@@ -25,13 +27,15 @@ class Context:
     store: AssetStore
     catalogue: Catalogue
     tailer: Tailer
+    streams: Hub | None = None
+    """None where no Redis is named."""
     seen_ready: bool = False
     """A worker has had its model loaded: from then on `/readyz` no longer asks for one."""
 
 
-def context(request: Request) -> Context:
-    """The context of this process."""
-    return request.app.state.context
+def context(asked: HTTPConnection) -> Context:
+    """The context of this process; of a request or a socket."""
+    return asked.app.state.context
 
 
 Shared = Annotated[Context, Depends(context)]

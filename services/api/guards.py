@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
 from services.api.problems import problem_response
 from shared.errors import InvalidInput, MareyError, Refused, TooLarge
@@ -18,7 +20,11 @@ SUBMIT_PATH = "/v1/jobs"
 
 
 class HostGuard:
-    """Answers only requests for hosts it is known by: a web page that rebinds its name to this port gets nothing."""
+    """Answers only requests for hosts it is known by: a web page that rebinds its name to this port gets nothing.
+
+    A page of any host may open a socket, unlike a request: browsers leave it to the server to look at where the page is
+    from. Who is no browser says nothing of that.
+    """
 
     def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
         self.app = app
@@ -26,19 +32,23 @@ class HostGuard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on, or refuse."""
-        if scope["type"] != "http" or "*" in self.allowed:
+        error = self._objection(scope)
+        if error is None:
             await self.app(scope, receive, send)
-            return
-        host = _without_port(Headers(scope=scope).get("host", "")).lower()
-        if host in self.allowed:
-            await self.app(scope, receive, send)
-            return
-        error = Refused(
-            "this server does not answer for that host",
-            where=host[:100],
-            hint="MAREY_ALLOWED_HOSTS names those it does.",
-        )
-        await _refuse(error, scope, receive, send)
+        else:
+            await _refuse(error, scope, receive, send)
+
+    def _objection(self, scope: Scope) -> Refused | None:
+        if scope["type"] not in ("http", "websocket") or "*" in self.allowed:
+            return None
+        headers = Headers(scope=scope)
+        host = _without_port(headers.get("host", "")).lower()
+        if host not in self.allowed:
+            return _foreign("this server does not answer for that host", host)
+        origin = headers.get("origin")
+        if scope["type"] == "websocket" and origin is not None and _host_of(origin) not in self.allowed:
+            return _foreign("this server opens no sockets for pages of that host", origin)
+        return None
 
 
 class BodyGuard:
@@ -104,9 +114,24 @@ def _without_port(host: str) -> str:
     return host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
 
 
+def _host_of(origin: str) -> str:
+    """The host of an `Origin`; empty for `null`, which is no host, and for what makes no sense."""
+    try:
+        return _without_port(urlsplit(origin).netloc).lower()
+    except ValueError:
+        return ""
+
+
+def _foreign(message: str, where: str) -> Refused:
+    return Refused(message, where=where[:100], hint="MAREY_ALLOWED_HOSTS names those it does.")
+
+
 def _too_large(limit: int) -> TooLarge:
     return TooLarge(f"the body is over {limit / 2**20:g} MiB", where="body", hint="Send it in several requests.")
 
 
 async def _refuse(error: MareyError, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket" and "websocket.http.response" not in scope.get("extensions", {}):
+        await WebSocketClose()(scope, receive, send)
+        return
     await problem_response(error)(scope, receive, send)

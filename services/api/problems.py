@@ -51,7 +51,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 """What every route may answer besides its own."""
 
 
-def problem_response(error: MareyError) -> JSONResponse:
+def problem_body(error: MareyError) -> ProblemBody:
     """The problem an expected error is told as."""
     body = ProblemBody(
         type=TYPE_PREFIX + error.problem_type,
@@ -66,6 +66,12 @@ def problem_response(error: MareyError) -> JSONResponse:
         body.problems = [
             FieldProblem(line=p.line, field=_clean(p.field), message=_clean(p.message) or "") for p in error.problems
         ]
+    return body
+
+
+def problem_response(error: MareyError) -> JSONResponse:
+    """The answer to a request that failed so."""
+    body = problem_body(error)
     headers: dict[str, str] = {}
     if isinstance(error, Unauthenticated):
         headers["WWW-Authenticate"] = 'Bearer realm="marey"'

@@ -296,7 +296,6 @@ stream = sa.Table(
     sa.Column("model", sa.Text, nullable=False),
     sa.Column("bundle", sa.Text, nullable=False),
     sa.Column("seed", sa.Integer, nullable=False),
-    sa.Column("settings", JSONB, nullable=False),
     sa.Column("max_frames", sa.Integer, nullable=False),
     sa.Column("state", sa.Text, nullable=False, server_default="waiting"),
     sa.Column("reason", sa.Text),

@@ -70,7 +70,6 @@ def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID
             model=stream.model,
             bundle=stream.bundle,
             seed=stream.seed,
-            settings=dict(stream.settings),
             max_frames=stream.max_frames,
         )
     )
@@ -231,7 +230,7 @@ def _streams() -> sa.Select[Any]:
     )
     c = table.c
     return sa.select(
-        *(c.id, c.tenant_id.label("tenant"), c.name, c.prompt, c.model, c.bundle, c.seed, c.settings, c.max_frames),
+        *(c.id, c.tenant_id.label("tenant"), c.name, c.prompt, c.model, c.bundle, c.seed, c.max_frames),
         *(c.state, c.reason, c.problem, c.fence, c.worker, c.control, c.frames, c.job_id.label("job")),
         *(c.created_at.label("created"), c.started_at.label("started"), c.ended_at.label("ended")),
         sa.case((c.state == StreamState.WAITING, before), else_=None).label("position"),

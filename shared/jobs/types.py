@@ -403,7 +403,6 @@ class NewStream:
         prompt: the first.
         bundle: the exact bundle.
         seed: 0 … 2³¹ − 1.
-        settings: of drawing.
         max_frames: after which it ends by itself.
     """
 
@@ -415,7 +414,6 @@ class NewStream:
     seed: int
     max_frames: int
     name: str | None = None
-    settings: JsonObject = field(default_factory=dict[str, object])
 
 
 @dataclass(frozen=True)
@@ -429,7 +427,6 @@ class StreamRow:
     model: str
     bundle: str
     seed: int
-    settings: JsonObject
     max_frames: int
     state: StreamState
     position: int | None

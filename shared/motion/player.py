@@ -11,7 +11,6 @@ import base64
 import html
 import json
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from shared.errors import InvalidInput
 from shared.motion.body import dress_clip
 from shared.motion.clip import MotionClip
 from shared.motion.files import write_atomically
+from shared.motion.pages import asset, body_document, fill, script_json, style
 from shared.motion.paper import one_line
 from shared.motion.render import caption_of, facts_of
 
@@ -70,38 +70,21 @@ def _page(document: dict[str, object], title: str, theme: str) -> str:
     parts = {
         "%THEME%": theme,
         "%TITLE%": html.escape(title),
-        "%STYLE%": _asset("player.css"),
+        "%STYLE%": style("player.css"),
         "%MOTION%": script_json(document),
-        "%LICENCE%": _asset("three.LICENSE.txt"),
-        "%THREE%": _asset("three.min.js"),
-        "%PLAYER%": _asset("player.js"),
+        "%LICENCE%": asset("three.LICENSE.txt"),
+        "%THREE%": asset("three.min.js"),
+        "%SCENE%": asset("scene.js"),
+        "%PLAYER%": asset("player.js"),
     }
-    page = _asset("player.html")
-    pieces: list[str] = []
-    # In order and once each: what is filled in is never searched for the next mark, so no text can imitate one.
-    for mark, text in parts.items():
-        before, page = page.split(mark, 1)
-        pieces += [before, text]
-    return "".join([*pieces, page])
-
-
-def script_json(value: object) -> str:
-    """JSON that may stand inside a `<script>`: no character in it can end the element or start a comment."""
-    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    for character in "<>&\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    return text
-
-
-def _asset(name: str) -> str:
-    return (resources.files("shared.motion") / "assets" / name).read_text(encoding="utf-8")
+    return fill(asset("player.html"), parts)
 
 
 def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:
     bodies: dict[str, int] = {}  # clips of one skeleton share one body
     entries: list[dict[str, object]] = []
     for number, (clip, caption) in enumerate(zip(clips, captions, strict=True), start=1):
-        body = json.dumps(_body(clip), separators=(",", ":"), allow_nan=False)
+        body = json.dumps(body_document(clip.skeleton, dress_clip(clip)), separators=(",", ":"), allow_nan=False)
         entries.append(
             {
                 "name": f"clip {number}",
@@ -116,26 +99,6 @@ def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str,
             }
         )
     return {"bodies": [json.loads(body) for body in bodies], "clips": entries}
-
-
-def _body(clip: MotionClip) -> dict[str, object]:
-    skeleton, body = clip.skeleton, dress_clip(clip)
-    return {
-        "parents": list(skeleton.parents),
-        "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],
-        "feet": list(skeleton.feet),
-        "height": round(body.height, 4),
-        "sole": round(body.sole, 4),
-        "limbs": [
-            {
-                "part": limb.part,
-                "joints": [limb.start, limb.end],
-                "radii": [round(limb.start_radius, 5), round(limb.end_radius, 5)],
-                "offsets": [[round(x, 5) for x in offset] for offset in (limb.start_offset, limb.end_offset)],
-            }
-            for limb in body.limbs
-        ],
-    }
 
 
 def _base64(array: NDArray[np.generic]) -> str:

@@ -50,7 +50,7 @@ class Control:
         """
         try:
             message = json.loads(data)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InvalidInput("not JSON", where="stream control") from error
         if not isinstance(message, dict) or not set(cast("dict[str, Any]", message)) <= {"kind", "prompt"}:
             raise InvalidInput("not an object with `kind` and, for a steer, `prompt`", where="stream control")

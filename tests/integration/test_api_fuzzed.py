@@ -17,6 +17,7 @@ from shared.runtime.embedded import EmbeddedServer
 from shared.settings import Settings
 from shared.storage import open_store
 from tests.support.live_api import ApiThread, LiveApi, settings_of
+from tests.support.live_streams import add_mogo
 
 EXAMPLES = 12
 """Of each operation; `slow` runs many more."""
@@ -27,6 +28,7 @@ def api(
     module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[LiveApi]:
     config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
+    add_mogo(config)
     engine = create_engine(module_database_url)
     with transaction(engine) as conn:
         key = create_key(conn, "all", ["admin"]).secret

@@ -14,6 +14,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+OPTIONS = (
+    "--headless",
+    "--no-sandbox",
+    "--use-angle=swiftshader",  # WebGL without a graphics card
+    "--enable-unsafe-swiftshader",
+    "--enable-logging=stderr",
+)
 
 
 @dataclass(frozen=True)
@@ -24,11 +31,7 @@ class Chromium:
     def _run(self, page: Path, fragment: str, *options: str, quiet: bool = True) -> subprocess.CompletedProcess[str]:
         command = [
             self.program,
-            "--headless",
-            "--no-sandbox",
-            "--use-angle=swiftshader",  # WebGL without a graphics card
-            "--enable-unsafe-swiftshader",
-            "--enable-logging=stderr",
+            *OPTIONS,
             "--window-size=1200,800",
             "--virtual-time-budget=3000",
             f"--user-data-dir={self.folder / 'profile'}",

@@ -14,7 +14,7 @@ import numpy as np
 import sqlalchemy as sa
 import uvicorn
 
-from services.api.app import create_app
+from services.api.app import SOCKETS, create_app
 from services.cli.client import Client
 from services.cli.place import Server
 from shared.bundles import BundleWriter, TextSpec
@@ -135,7 +135,9 @@ class ApiThread:
     def __init__(self, config: Settings) -> None:
         self.config = config
         self._server = uvicorn.Server(
-            uvicorn.Config(create_app(config), port=config.port, log_level="warning", timeout_graceful_shutdown=1)
+            uvicorn.Config(
+                create_app(config), port=config.port, log_level="warning", timeout_graceful_shutdown=1, **SOCKETS
+            )
         )
         self._thread = threading.Thread(target=self._server.run, daemon=True)
 

@@ -1,8 +1,8 @@
 "use strict";
-// The player: reads the motion embedded in the page, runs forward kinematics and draws round-cone bodies with three.js.
-// Conventions are the files': metres, seconds, Y up, quaternions w x y z, left blue and right orange.
+// The player: reads the motion embedded in the page and plays it on the stage of scene.js.
 (() => {
   const T = THREE;
+  const { Figure, Stage } = MareyScene;
   const $ = (id) => document.getElementById(id);
 
   // ---------------------------------------------------------------- data
@@ -31,223 +31,59 @@
     length: (c.frames - 1) / c.fps,
   }));
 
-  // ---------------------------------------------------------------- kinematics
-  class Pose {
+  // ---------------------------------------------------------------- figures
+  const stage = new Stage($("view"), $("failure"));
+
+  // A figure that plays one clip, with the trail of its root.
+  class Player extends Figure {
     constructor(clip) {
+      super(stage, clip);
       this.clip = clip;
-      const count = clip.parents.length;
-      this.local = clip.parents.map(() => new T.Quaternion());
-      this.world = clip.parents.map(() => new T.Quaternion());
-      this.joints = clip.parents.map(() => new T.Vector3());
-      this.next = new T.Quaternion();
-      this.count = count;
-    }
-
-    quaternion(frame, joint, out) {
-      const at = 4 * (frame * this.count + joint);
-      const r = this.clip.rotations;
-      return out.set(r[at + 1], r[at + 2], r[at + 3], r[at]).normalize();
-    }
-
-    // The pose at a time in seconds, between two frames by spherical interpolation.
-    at(seconds) {
-      const { clip } = this;
-      const exact = Math.min(Math.max(seconds * clip.fps, 0), clip.frames - 1);
-      const frame = Math.min(Math.floor(exact + 1e-6), Math.max(clip.frames - 2, 0));
-      const share = exact - frame;
-      const later = Math.min(frame + 1, clip.frames - 1);
-      for (let j = 0; j < this.count; j++) {
-        this.quaternion(frame, j, this.local[j]).slerp(this.quaternion(later, j, this.next), share);
-        const parent = clip.parents[j];
-        if (parent < 0) {
-          this.world[j].copy(this.local[j]);
-          const mix = (axis) => clip.root[3 * frame + axis] * (1 - share) + clip.root[3 * later + axis] * share;
-          this.joints[j].set(mix(0), mix(1), mix(2));
-        } else {
-          this.world[j].multiplyQuaternions(this.world[parent], this.local[j]);
-          this.joints[j].fromArray(clip.offsets[j]).applyQuaternion(this.world[parent]).add(this.joints[parent]);
-        }
-      }
-      this.frame = Math.round(exact);
-      return this;
-    }
-  }
-
-  // ---------------------------------------------------------------- scene
-  const PALETTE = {
-    light: { paper: 0xfaf9f6, line: 0xbab5a9, muted: 0x767a81, parts: { left: 0x3886d6, right: 0xec7a30, middle: 0xcec8be, face: 0x968f85 }, sky: 0xffffff, ground: 0xcfc8bd, shadow: 0.2 },
-    dark: { paper: 0x14161a, line: 0x4b505a, muted: 0x9a9ea6, parts: { left: 0x3886d6, right: 0xec7a30, middle: 0xcec8be, face: 0x968f85 }, sky: 0xe8ecf5, ground: 0x3a3d45, shadow: 0.5 },
-  };
-
-  let renderer;
-  try {
-    renderer = new T.WebGLRenderer({ canvas: $("view"), antialias: true, preserveDrawingBuffer: true });
-  } catch (error) {
-    $("failure").textContent = "This browser shows no WebGL, which the player draws with. Turn on hardware acceleration, or open the page in another browser.";
-    $("failure").hidden = false;
-    document.body.dataset.ready = "failed";
-    throw error;
-  }
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  renderer.shadowMap.enabled = true;
-  renderer.shadowMap.type = T.PCFShadowMap;
-  const scene = new T.Scene();
-  const camera = new T.PerspectiveCamera(32, 1, 0.05, 200);
-  const controls = new T.OrbitControls(camera, renderer.domElement);
-  controls.enableDamping = true;
-  controls.dampingFactor = 0.12;
-  controls.maxPolarAngle = Math.PI * 0.52;
-  controls.minDistance = 0.6;
-  controls.maxDistance = 40;
-  const sky = new T.HemisphereLight(0xffffff, 0xcfc8bd, 1.9);
-  const sun = new T.DirectionalLight(0xffffff, 2.1);
-  sun.castShadow = true;
-  sun.shadow.mapSize.set(2048, 2048);
-  sun.shadow.radius = 4;
-  sun.shadow.normalBias = 0.01;
-  Object.assign(sun.shadow.camera, { left: -2.4, right: 2.4, top: 2.4, bottom: -2.4, near: 0.5, far: 12 });
-  scene.add(sky, sun, sun.target);
-
-  // A grid of half metres (every second line stronger) that fades away from the figure.
-  const grid = new T.Mesh(
-    new T.PlaneGeometry(60, 60),
-    new T.ShaderMaterial({
-      transparent: true,
-      depthWrite: false,
-      uniforms: { colour: { value: new T.Color() }, centre: { value: new T.Vector2() }, reach: { value: 9 } },
-      vertexShader: "varying vec2 p; void main() { vec4 w = modelMatrix * vec4(position, 1.); p = w.xz; gl_Position = projectionMatrix * viewMatrix * w; }",
-      fragmentShader: `varying vec2 p; uniform vec3 colour; uniform vec2 centre; uniform float reach;
-        float lines(float step) { vec2 q = p / step; vec2 w = fwidth(q); vec2 d = abs(fract(q - .5) - .5) / w; return (1. - min(min(d.x, d.y), 1.)) * (1. - clamp(max(w.x, w.y) * 2., 0., 1.)); }
-        void main() { float near = 1. - smoothstep(.25, 1., length(p - centre) / reach);
-          gl_FragColor = vec4(colour, max(lines(.5) * .3, lines(1.) * .7) * near);
-          #include <colorspace_fragment>
-        }`,
-    }),
-  );
-  grid.rotation.x = -Math.PI / 2;
-  const floor = new T.Mesh(new T.PlaneGeometry(60, 60), new T.ShadowMaterial({ opacity: 0.2 }));
-  floor.rotation.x = -Math.PI / 2;
-  floor.receiveShadow = true;
-  scene.add(floor, grid);
-
-  // A round cone along +Y, its first ball at the origin.
-  function roundCone(length, first, second) {
-    const profile = [];
-    const slope = length > Math.abs(first - second) ? Math.asin((first - second) / length) : first > second ? Math.PI / 2 : -Math.PI / 2;
-    const arc = (radius, centre, from, to) => {
-      for (let k = 0; k <= 8; k++) {
-        const angle = from + ((to - from) * k) / 8;
-        profile.push(new T.Vector2(Math.max(radius * Math.cos(angle), 0), centre + radius * Math.sin(angle)));
-      }
-    };
-    arc(first, 0, -Math.PI / 2, slope);
-    arc(second, length, slope, Math.PI / 2);
-    return new T.LatheGeometry(profile, 24);
-  }
-
-  const UP = new T.Vector3(0, 1, 0);
-  class Figure {
-    constructor(clip) {
-      this.clip = clip;
-      this.pose = new Pose(clip);
-      this.meshes = [];
-      const rest = new Pose({ ...clip, frames: 1, root: new Float32Array(3), rotations: new Float32Array(4 * clip.parents.length).map((_, i) => (i % 4 ? 0 : 1)) }).at(0);
-      for (const limb of clip.limbs) {
-        const [a, b] = this.ends(limb, rest).map((v) => v.clone());
-        const material = new T.MeshStandardMaterial({ roughness: 0.78 });
-        const mesh = new T.Mesh(roundCone(a.distanceTo(b), limb.radii[0], limb.radii[1]), material);
-        mesh.castShadow = mesh.receiveShadow = true;
-        this.meshes.push(mesh);
-        scene.add(mesh);
-      }
-      this.lamps = clip.feet.map(() => {
-        const lamp = new T.Mesh(new T.CircleGeometry(0.085, 32), new T.MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false }));
-        lamp.rotation.x = -Math.PI / 2;
-        scene.add(lamp);
-        return lamp;
-      });
       const path = [];
       for (let t = 0; t < clip.frames; t++) path.push(clip.root[3 * t], 0, clip.root[3 * t + 2]);
-      this.path = this.line(T.Line, path, 0.35);
-      this.past = this.line(T.Line, path, 1);
-      this.axes = this.line(T.LineSegments, new Array(18 * clip.parents.length).fill(0), 1);
-      const tints = clip.parents.flatMap(() => [0xe0483e, 0x3fae5a, 0x3d74e8].flatMap((hex) => Array(2).fill(new T.Color(hex).toArray()).flat()));
-      this.axes.geometry.setAttribute("color", new T.Float32BufferAttribute(tints, 3));
-      Object.assign(this.axes.material, { vertexColors: true, depthTest: false });
-      this.axes.renderOrder = 2;
-    }
-
-    line(Kind, points, opacity) {
-      const geometry = new T.BufferGeometry();
-      geometry.setAttribute("position", new T.Float32BufferAttribute(points, 3));
-      const line = new Kind(geometry, new T.LineBasicMaterial({ transparent: true, opacity }));
-      line.frustumCulled = false;
-      scene.add(line);
-      return line;
-    }
-
-    ends(limb, pose) {
-      return [0, 1].map((k) => new T.Vector3(...limb.offsets[k]).applyQuaternion(pose.world[limb.joints[k]]).add(pose.joints[limb.joints[k]]));
+      this.path = stage.line(T.Line, path, 0.35);
+      this.past = stage.line(T.Line, path, 1);
     }
 
     show(visible) {
-      for (const part of [...this.meshes, ...this.lamps, this.path, this.past, this.axes]) part.visible = visible;
+      super.show(visible);
+      this.path.visible = this.past.visible = visible;
     }
 
     paint(palette) {
-      this.clip.limbs.forEach((limb, k) => this.meshes[k].material.color.set(palette.parts[limb.part]));
-      this.lamps.forEach((lamp, k) => lamp.material.color.set(palette.parts[k < 2 ? "left" : "right"]));
+      super.paint(palette);
       for (const line of [this.path, this.past]) line.material.color.set(palette.muted);
     }
 
-    move(seconds, options) {
-      const pose = this.pose.at(seconds);
-      this.clip.limbs.forEach((limb, k) => {
-        const [a, b] = this.ends(limb, pose);
-        this.meshes[k].position.copy(a);
-        this.meshes[k].quaternion.setFromUnitVectors(UP, b.sub(a).normalize());
-      });
-      this.lamps.forEach((lamp, k) => {
-        const joint = pose.joints[this.clip.feet[k]];
-        lamp.position.set(joint.x, 0.004 - this.clip.sole, joint.z);
-        lamp.visible = this.clip.contacts[pose.frame * this.clip.feet.length + k] > 0;
-      });
-      this.path.visible = this.past.visible = options.trail;
-      this.path.position.y = this.past.position.y = 0.006 - this.clip.sole;
-      this.past.geometry.setDrawRange(0, pose.frame + 1);
-      this.axes.visible = options.axes;
-      if (options.axes) this.drawAxes(pose);
-      return pose;
+    read(frame) {
+      const { root, rotations, parents } = this.clip;
+      const turns = 4 * parents.length;
+      return { root: root.subarray(3 * frame, 3 * frame + 3), turns: rotations.subarray(turns * frame, turns * (frame + 1)) };
     }
 
-    drawAxes(pose) {
-      const position = this.axes.geometry.attributes.position;
-      pose.joints.forEach((joint, j) => {
-        for (let axis = 0; axis < 3; axis++) {
-          const tip = new T.Vector3().setComponent(axis, 0.09).applyQuaternion(pose.world[j]).add(joint);
-          position.setXYZ(6 * j + 2 * axis, joint.x, joint.y, joint.z);
-          position.setXYZ(6 * j + 2 * axis + 1, tip.x, tip.y, tip.z);
-        }
-      });
-      position.needsUpdate = true;
+    // Show a time in seconds, between two frames by spherical interpolation.
+    seek(seconds, options) {
+      const { clip } = this;
+      const exact = Math.min(Math.max(seconds * clip.fps, 0), clip.frames - 1);
+      const frame = Math.min(Math.floor(exact + 1e-6), Math.max(clip.frames - 2, 0));
+      this.pose.between(this.read(frame), this.read(Math.min(frame + 1, clip.frames - 1)), exact - frame);
+      this.frame = Math.round(exact);
+      this.move(clip.contacts.subarray(this.frame * clip.feet.length, (this.frame + 1) * clip.feet.length), options.axes);
+      this.path.visible = this.past.visible = options.trail;
+      this.path.position.y = this.past.position.y = 0.006 - clip.sole;
+      this.past.geometry.setDrawRange(0, this.frame + 1);
     }
   }
 
   // ---------------------------------------------------------------- state
   const state = { clip: 0, seconds: 0, playing: true, speed: 1, follow: true, trail: true, axes: false, theme: "light" };
   const figures = clips.map(() => null);
-  const anchor = new T.Vector3();
   const clip = () => clips[state.clip];
-  const figure = () => (figures[state.clip] ??= new Figure(clip()));
+  const figure = () => (figures[state.clip] ??= new Player(clip()));
 
   function home() {
     const { root, height } = clip();
-    anchor.set(root[0], 0, root[2]);
-    controls.target.set(root[0], 0.5 * height, root[2]);
-    const distance = 2.7 * height * Math.max(1, 0.9 / camera.aspect);
-    const [azimuth, elevation] = [0.56, 0.2];
-    camera.position.copy(controls.target).add(new T.Vector3(Math.sin(azimuth) * Math.cos(elevation), Math.sin(elevation), Math.cos(azimuth) * Math.cos(elevation)).multiplyScalar(distance));
-    controls.update();
+    stage.home(root[0], root[2], height);
   }
 
   function select(index) {
@@ -256,7 +92,7 @@
     state.clip = Math.min(Math.max(index, 0), clips.length - 1);
     state.seconds = 0;
     figure().show(true);
-    figure().paint(PALETTE[state.theme]);
+    figure().paint(stage.theme(state.theme));
     $("caption").textContent = clip().caption || clip().name;
     $("facts").textContent = clip().facts;
     document.title = `${clip().caption || clip().name} · Marey`;
@@ -295,37 +131,20 @@
 
   function theme(name) {
     state.theme = name;
-    document.documentElement.dataset.theme = name;
-    const palette = PALETTE[name];
-    scene.background = new T.Color(palette.paper);
-    sky.color.set(palette.sky);
-    sky.groundColor.set(palette.ground);
-    grid.material.uniforms.colour.value.set(palette.line);
-    floor.material.opacity = palette.shadow;
-    figure().paint(palette);
+    figure().paint(stage.theme(name));
     drawLanes();
     draw();
   }
 
   // ---------------------------------------------------------------- drawing
   function draw() {
-    const pose = figure().move(state.seconds, state);
-    const [x, z] = [pose.joints[0].x, pose.joints[0].z];
-    if (state.follow) {
-      const shift = new T.Vector3(x - anchor.x, 0, z - anchor.z);
-      camera.position.add(shift);
-      controls.target.add(shift);
-    }
-    anchor.set(x, 0, z);
-    floor.position.set(x, -clip().sole, z);
-    grid.position.set(x, 0.002 - clip().sole, z);
-    grid.material.uniforms.centre.value.set(x, z);
-    sun.target.position.set(x, 0.6, z);
-    sun.position.set(x - 1.4, 5.6, z + 2.2);
+    figure().seek(state.seconds, state);
+    const { frame, pose } = figure();
+    stage.track(pose.joints[0], clip().sole, state.follow);
     $("scrub").value = state.seconds;
-    $("clock").textContent = `${state.seconds.toFixed(2)} / ${clip().length.toFixed(2)} s · frame ${pose.frame}`;
-    Object.assign(document.body.dataset, { ready: "yes", clip: state.clip, frame: pose.frame });
-    renderer.render(scene, camera);
+    $("clock").textContent = `${state.seconds.toFixed(2)} / ${clip().length.toFixed(2)} s · frame ${frame}`;
+    Object.assign(document.body.dataset, { ready: "yes", clip: state.clip, frame });
+    stage.render();
   }
 
   // Foot contact over time: left above right; the fuller the colour, the more of the foot is down.
@@ -360,18 +179,14 @@
       state.seconds += passed * state.speed;
       if (state.seconds > clip().length) state.seconds = state.seconds % clip().length;
     }
-    controls.update();
+    stage.controls.update();
     draw();
     requestAnimationFrame(tick);
   }
 
   function resize() {
-    camera.aspect = innerWidth / innerHeight;
     // The list of clips covers the left: look at the middle of what is free.
-    const list = $("clips").offsetWidth;
-    camera.setViewOffset(innerWidth, innerHeight, -list / 2, -10, innerWidth, innerHeight);
-    camera.updateProjectionMatrix();
-    renderer.setSize(innerWidth, innerHeight, false);
+    stage.resize($("clips").offsetWidth / 2, 10);
     drawLanes();
   }
 
@@ -439,14 +254,13 @@
     seek,
     play: () => play(true),
     pause: () => play(false),
-    state: () => ({ ...state, frame: figure().pose.frame, frames: clip().frames, clips: clips.length }),
+    state: () => ({ ...state, frame: figure().frame, frames: clip().frames, clips: clips.length }),
     joints: () => figure().pose.joints.map((v) => v.toArray()),
   };
 
   // #clip=2&t=1.5&paused opens at that moment.
   const hash = new URLSearchParams(location.hash.slice(1));
-  const wanted = document.documentElement.dataset.theme;
-  state.theme = wanted !== "auto" ? wanted : matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+  state.theme = stage.wantedTheme();
   resize();
   select(Number(hash.get("clip") ?? 0) || 0);
   theme(state.theme);

@@ -1,4 +1,4 @@
-// What the player uses of three.js; see README.md for how three.min.js is made from it.
+// What the pages use of three.js; see README.md for how three.min.js is made from it.
 export {
   BufferGeometry,
   CircleGeometry,

@@ -16,7 +16,8 @@ import pytest
 from shared.errors import InvalidInput
 from shared.motion import player
 from shared.motion.kinematics import forward_kinematics
-from shared.motion.player import html_player, script_json
+from shared.motion.pages import script_json
+from shared.motion.player import html_player
 from shared.motion.rotations import normalize
 from tests.support.walker import walker
 

@@ -1,0 +1,1 @@
+"""Live streams and the sockets that show them."""

@@ -1,0 +1,98 @@
+"""Who may open a socket, on what, and what those who may not are told."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Literal, cast, get_args
+from uuid import UUID
+
+import structlog
+from fastapi import WebSocket
+from starlette.datastructures import QueryParams
+from starlette.websockets import WebSocketDisconnect
+
+from services.api.auth import authenticated, check_scope
+from services.api.context import Context
+from services.api.streams import service
+from services.api.streams.session import Session, Visit
+from services.api.streams.wire import Wire, close_code
+from shared.errors import InvalidInput, MareyError, NotFound
+from shared.jobs import get_stream, stream_prompts, transaction
+
+PROTOCOL = "marey.stream.v1"
+KEY_PREFIX = "marey.key."
+"""Of the subprotocol that carries a key: a browser can send no header with a socket."""
+MAX_FRAME = 2**32
+Slow = Literal["skip", "pause"]
+SLOW: tuple[str, ...] = get_args(Slow)
+
+log = structlog.get_logger(__name__)
+
+
+async def let_in(websocket: WebSocket, stream: str, shared: Context) -> None:
+    """Show a stream to a client until it is over or the client goes; who may not see it is told why by a close code.
+
+    The handshake is always answered: a browser does not show what stands in one that is refused.
+    """
+    offered: list[str] = websocket.scope["subprotocols"]
+    wire = Wire(websocket)
+    with suppress(WebSocketDisconnect):
+        await websocket.accept(PROTOCOL if PROTOCOL in offered else None)
+        try:
+            hub = service.hub_of(shared)
+            secret = key_of(websocket.headers.get("authorization"), offered)
+            visit = await hub.call(lambda: _admit(shared, secret, stream, websocket.query_params))
+            with hub.place():
+                await Session(wire, hub, shared, visit).run()
+        except MareyError as error:
+            await wire.close(close_code(error), error.message)
+        except Exception:
+            log.exception("stream_socket_failed", stream=stream[:64])
+            await wire.close(1011, "an internal error; the server's log has its traceback")
+
+
+def key_of(header: str | None, offered: list[str]) -> str | None:
+    """The secret of the API key that a client shows: `Authorization: Bearer …`, else a subprotocol."""
+    scheme, _, secret = (header or "").partition(" ")
+    if scheme.lower() == "bearer":
+        return secret.strip()
+    return next((name.removeprefix(KEY_PREFIX) for name in offered if name.startswith(KEY_PREFIX)), None)
+
+
+def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams) -> Visit:
+    """What the client may see.
+
+    Raises:
+        Unauthenticated, Refused, InvalidInput, NotFound: by what is wrong.
+    """
+    key = authenticated(shared, secret)
+    check_scope(key, "read")
+    first, slow = first_frame(query.get("from")), _slow(query.get("slow"))
+    if slow == "pause":
+        check_scope(key, "submit")  # it is a message like those a client sends
+    try:
+        identifier = UUID(stream)
+    except ValueError:
+        raise NotFound("there is no such stream", where=f"stream {stream[:64]}") from None
+    with transaction(shared.engine) as conn:
+        row = get_stream(conn, key.tenant, identifier)
+        return Visit(key, row, stream_prompts(conn, identifier), service.made_by(shared, row), first, slow == "pause")
+
+
+def first_frame(given: str | None) -> int:
+    """The number of the first frame that the client wants.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    if given is None:
+        return 0
+    if not given.isascii() or not given.isdecimal() or int(given[:20]) >= MAX_FRAME:
+        raise InvalidInput(f"{given[:40]!r} is not the number of a frame", where="from")
+    return int(given)
+
+
+def _slow(given: str | None) -> Slow:
+    if given is not None and given not in SLOW:
+        raise InvalidInput(f"{given[:40]!r} is neither {' nor '.join(SLOW)}", where="slow")
+    return cast("Slow", given or SLOW[0])

@@ -1,0 +1,74 @@
+"""What a client asks of the stream it watches."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+from uuid import UUID
+
+from services.api.auth import check_scope
+from services.api.context import Context
+from services.api.streams import service
+from services.api.streams.hub import Hub
+from services.api.streams.wire import Wire
+from shared.errors import Busy, MareyError, TooLarge
+from shared.jobs import ApiKey
+from shared.streams.control import Control
+from shared.text.prompts import check_prompt
+
+MAX_BYTES = 8 * 1024
+"""Of a message; a prompt has at most 2,000 characters."""
+A_SECOND = 20
+"""Messages."""
+
+
+class Rate:
+    """So many in a second; after a quiet time as many at once."""
+
+    def __init__(self, a_second: int) -> None:
+        self._a_second = a_second
+        self._left = float(a_second)
+        self._at = time.monotonic()
+
+    def allows(self, now: float) -> bool:
+        """Whether one more may be, which counts if it may."""
+        self._left = min(self._left + (now - self._at) * self._a_second, self._a_second)
+        self._at = now
+        if self._left < 1:
+            return False
+        self._left -= 1
+        return True
+
+
+class Messages:
+    """Reads what one client sends and passes it on, one message after the other."""
+
+    def __init__(self, wire: Wire, hub: Hub, shared: Context, key: ApiKey, stream: UUID) -> None:
+        self._wire, self._hub, self._shared, self._key, self._stream = wire, hub, shared, key, stream
+        self._rate = Rate(A_SECOND)
+
+    async def obey(self) -> None:
+        """Until the client, or the server, goes away."""
+        while (message := await self._wire.receive()) is not None:
+            try:
+                control = self._control(message)
+                ask = partial(service.command, self._shared, self._key.tenant, self._stream, control)
+                await self._hub.call(ask)
+            except MareyError as error:
+                await self._wire.complain(error)
+
+    def _control(self, message: bytes) -> Control:
+        """What a message asks for.
+
+        Raises:
+            Refused, Busy, TooLarge, InvalidInput: by what is wrong with it.
+        """
+        if not self._rate.allows(time.monotonic()):
+            raise Busy(f"more than {A_SECOND} messages a second", hint="Send it again, later.", seconds=1)
+        check_scope(self._key, "submit")
+        if len(message) > MAX_BYTES:
+            raise TooLarge(f"the message is over {MAX_BYTES // 1024} KiB", where="message")
+        control = Control.from_bytes(message)
+        if control.prompt is not None:
+            control = Control("steer", check_prompt(control.prompt, where="prompt"))
+        return control

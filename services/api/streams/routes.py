@@ -1,0 +1,67 @@
+"""`/v1/streams`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+from uuid import UUID
+
+from fastapi import APIRouter, Query, Response, WebSocket
+
+from services.api.auth import Reader, Submitter
+from services.api.context import Connection, Shared
+from services.api.problems import RESPONSES
+from services.api.schemas import Cursor, Limit, PageView
+from services.api.streams import service
+from services.api.streams.door import let_in
+from services.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
+from shared import jobs
+
+router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)
+
+
+@router.post("", status_code=201)
+def begin_stream(body: NewStreamBody, response: Response, shared: Shared, key: Submitter) -> StreamDetailView:
+    """Begin a live stream; its frames come over the WebSocket at its path.
+
+    It waits while every slot of every worker is taken. 429 when the key has as many open ones as it may.
+    """
+    view = service.begin(shared, key, body)
+    response.headers["Location"] = f"/v1/streams/{view.id}"
+    return view
+
+
+@router.get("")
+def list_streams(
+    shared: Shared,
+    conn: Connection,
+    key: Reader,
+    is_open: Annotated[bool, Query(alias="open", description="Those alone that are not over.")] = False,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> PageView[StreamView]:
+    """Live streams, newest first."""
+    page = jobs.list_streams(conn, key.tenant, is_open=is_open, cursor=cursor, limit=limit)
+    made = service.made_by_each(shared, page.rows)
+    items = [StreamView.of(row, by) for row, by in zip(page.rows, made, strict=True)]
+    return PageView[StreamView](items=items, next=page.cursor)
+
+
+@router.get("/{stream}")
+def get_stream(stream: UUID, shared: Shared, conn: Connection, key: Reader) -> StreamDetailView:
+    """One live stream, with its prompts on record and its skeleton."""
+    return service.detail(conn, shared, jobs.get_stream(conn, key.tenant, stream))
+
+
+@router.delete("/{stream}", status_code=202)
+def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailView:
+    """Ask a live stream to end; one that still waits is over at once, and one that is over stays as it is."""
+    service.hub_of(shared)
+    row = service.stop(shared, key.tenant, stream)
+    with jobs.transaction(shared.engine) as conn:
+        return service.detail(conn, shared, row)
+
+
+@router.websocket("/{stream}")
+async def watch_stream(websocket: WebSocket, stream: str, shared: Shared) -> None:
+    """Frames from `from` on, and control."""
+    await let_in(websocket, stream, shared)

@@ -1,0 +1,161 @@
+"""What the routes and sockets of live streams take and give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+from uuid import UUID
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.jobs.schemas import ErrorView
+from services.api.problems import ProblemBody
+from services.api.schemas import View
+from shared.bundles import Bundle
+from shared.items import MAX_SEED
+from shared.jobs import StreamRow, StreamState
+from shared.motion.features import layout
+from shared.motion.skeleton import Skeleton
+
+MODEL = "mogo"
+"""The model that makes motion frame by frame."""
+MIN_SECONDS, MAX_SECONDS = 1.0, 600.0
+DIGITS = 6
+"""Of offsets: a thousandth of a millimetre."""
+GONE = "null when the bundle is no longer here."
+
+
+class NewStreamBody(BaseModel):
+    """A live stream to begin; what an item has too is checked as there."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    prompt: str = Field(min_length=1, description="What the person does first, in English, at most 200 words.")
+    name: str | None = Field(None, description="File name of the clip, without its ending.")
+    model: str = Field(MODEL, description="Model, bundle or exact bundle that can make motion frame by frame.")
+    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Drawn when not given.")
+    seconds: float = Field(MAX_SECONDS, ge=MIN_SECONDS, le=MAX_SECONDS, description="After which it ends by itself.")
+
+
+class SkeletonView(View):
+    """The joints that frames turn."""
+
+    names: list[str]
+    parents: list[int] = Field(description="Index of each joint's parent, which comes before it; -1 for the root.")
+    offsets: list[tuple[float, float, float]] = Field(
+        description="The rest pose: metres from the parent, Y up, facing +Z; the root's own from the floor."
+    )
+
+    @classmethod
+    def of(cls, skeleton: Skeleton) -> SkeletonView:
+        """From the skeleton of a layout."""
+        places = np.round(skeleton.offsets.astype(np.float64), DIGITS) + 0.0  # no -0.0
+        offsets = [(x, y, z) for x, y, z in places.tolist()]
+        return cls(names=list(skeleton.joint_names), parents=list(skeleton.parents), offsets=offsets)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a stream's bundle says of it; nothing where the bundle is no longer here."""
+
+    licence: str | None = None
+    fps: float | None = None
+    skeleton: SkeletonView | None = None
+
+    @classmethod
+    def by(cls, bundle: Bundle) -> Made:
+        """From a bundle."""
+        manifest = bundle.manifest
+        skeleton = None if manifest.layout is None else SkeletonView.of(layout(manifest.layout).skeleton)
+        return cls(licence=manifest.licence, fps=manifest.fps, skeleton=skeleton)
+
+
+class PromptView(View):
+    """A prompt, and since which frame it is in force."""
+
+    number: int = Field(description="As in frames: from 0; each steer counts one on.")
+    frame: int
+    prompt: str
+
+
+class StreamView(View):
+    """A live stream."""
+
+    id: UUID
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    licence: str | None = Field(description=f"Terms of the weights; {GONE}")
+    seed: int
+    state: StreamState
+    position: int | None = Field(description="How many wait before it; null when it does not wait.")
+    reason: str | None = Field(description="Why it is over.")
+    error: ErrorView | None
+    fps: float | None = Field(description=f"Frames a second; {GONE}")
+    frames: int = Field(description="How many are on record: a second less than were shown, at most.")
+    max_frames: int
+    job: UUID | None = Field(description="Makes the clip.")
+    created: datetime
+    started: datetime | None
+    ended: datetime | None
+
+    @classmethod
+    def of(cls, row: StreamRow, made: Made) -> StreamView:
+        """From a row."""
+        return cls(**_fields(row, made))
+
+
+class StreamDetailView(StreamView):
+    """A live stream with its prompts on record and its skeleton."""
+
+    prompts: list[PromptView]
+    skeleton: SkeletonView | None = Field(description=f"What the frames drive; {GONE}")
+
+    @classmethod
+    def detail(cls, row: StreamRow, made: Made, prompts: Sequence[tuple[int, str]]) -> StreamDetailView:
+        """From a row, and its prompts with the frame each is in force from."""
+        told = [PromptView(number=number, frame=frame, prompt=text) for number, (frame, text) in enumerate(prompts)]
+        return cls(prompts=told, skeleton=made.skeleton, **_fields(row, made))
+
+
+class StreamMessage(View):
+    """How the stream stands: first on every socket, and whenever its state, position or prompts changed."""
+
+    type: Literal["stream"] = "stream"
+    stream: StreamDetailView
+
+
+class GapMessage(View):
+    """Frames `first` to `first + count - 1` are not sent."""
+
+    type: Literal["gap"] = "gap"
+    first: int
+    count: int
+
+
+class ErrorMessage(View):
+    """A message of the client cannot be used, or what the socket needs is away for now; the socket stays."""
+
+    type: Literal["error"] = "error"
+    problem: ProblemBody
+
+
+class EndMessage(View):
+    """The stream is over, and so is the socket."""
+
+    type: Literal["end"] = "end"
+    stream: StreamDetailView
+
+
+SocketMessage = StreamMessage | GapMessage | ErrorMessage | EndMessage
+
+
+def _fields(row: StreamRow, made: Made) -> dict[str, Any]:
+    apart = {"error", "licence", "fps"}
+    own = {name: getattr(row, name) for name in StreamView.model_fields if name not in apart}
+    error = None if row.problem is None else ErrorView.of(row.problem)
+    return {**own, "error": error, "licence": made.licence, "fps": made.fps}

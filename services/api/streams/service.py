@@ -1,0 +1,164 @@
+"""What routes and sockets do with streams: begin one, look at it, ask something of it."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Sequence
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from services.api.catalogue import Catalogue, Offer
+from services.api.context import Context
+from services.api.streams.hub import Hub
+from services.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
+from shared.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
+from shared.items import MAX_SEED, Item, read_item
+from shared.jobs import (
+    ApiKey,
+    NewStream,
+    StreamRow,
+    create_stream,
+    end_stream,
+    get_stream,
+    stream_prompts,
+    transaction,
+)
+from shared.jobs.states import OPEN_STREAMS
+from shared.streams.control import Control, ControlQueue
+
+STOPPED = "stopped"
+NEVER_TAKEN = 0
+"""Fence of a stream that no worker has had yet: leases count from 1."""
+
+
+def hub_of(shared: Context) -> Hub:
+    """The way to the Redis of the frames.
+
+    Raises:
+        Unreachable: none is named.
+    """
+    if shared.streams is None:
+        raise Unreachable(
+            "live streams need Redis, and none is named", where="MAREY_QUEUE_URL", hint="Set it, or MAREY_STREAMS_URL."
+        )
+    return shared.streams
+
+
+def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView:
+    """A new stream, waiting for a worker.
+
+    Raises:
+        InvalidInput: of a prompt, name, seed or setting that cannot be used, or a model that cannot stream.
+        Busy: the key has as many as it may.
+    """
+    hub_of(shared)
+    new = _new_stream(key, body, shared.catalogue)
+    with transaction(shared.engine) as conn:
+        stream = create_stream(conn, new, limit=shared.config.streams_per_key)
+        return detail(conn, shared, get_stream(conn, key.tenant, stream))
+
+
+def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetailView:
+    """A stream with its prompts and skeleton."""
+    return StreamDetailView.detail(row, made_by(shared, row), stream_prompts(conn, row.id))
+
+
+def made_by(shared: Context, row: StreamRow) -> Made:
+    """What the bundle of a stream says, as far as it is still here: a stream that is over outlives its bundle."""
+    try:
+        return Made.by(shared.catalogue.offer(row.bundle).bundle)
+    except (NotFound, InvalidBundle, Refused):
+        return Made()
+
+
+def made_by_each(shared: Context, rows: Sequence[StreamRow]) -> list[Made]:
+    """`made_by` of each row, each bundle looked at once."""
+    found = {row.bundle: row for row in rows}
+    views = {name: made_by(shared, row) for name, row in found.items()}
+    return [views[row.bundle] for row in rows]
+
+
+def is_over(row: StreamRow) -> bool:
+    """Whether nothing more comes of it."""
+    return row.state not in OPEN_STREAMS
+
+
+def command(shared: Context, tenant: str, stream: UUID, control: Control) -> None:
+    """Ask something of a stream that is not over.
+
+    Raises:
+        NotFound: the tenant has no such stream.
+        Conflict: it is over.
+        Unreachable: Redis or the database does not answer.
+    """
+    with transaction(shared.engine) as conn:
+        row = get_stream(conn, tenant, stream)
+    if is_over(row):
+        raise Conflict(f"the stream is over: {row.reason}", where=f"stream {stream}")
+    if control.kind == "stop":
+        stop(shared, tenant, stream)
+    else:
+        ControlQueue(hub_of(shared).redis, str(stream)).send(control)
+
+
+def stop(shared: Context, tenant: str, stream: UUID) -> StreamRow:
+    """Ask a stream to end, and see how it stands then. One that waits is over at once; one that is over stays so.
+
+    A worker may take the stream at this very moment. Both lock its row, and look again once they have it: if we come
+    first, the worker finds it over and takes nothing; if it comes first, the row has the number of its lease,
+    nothing is ended here, and the worker finds our message, which stays in the queue until it reads.
+
+    Raises:
+        NotFound: the tenant has no such stream.
+        Unreachable: Redis or the database does not answer.
+    """
+    with transaction(shared.engine) as conn:
+        get_stream(conn, tenant, stream)
+        end_stream(conn, stream, NEVER_TAKEN, STOPPED)
+        row = get_stream(conn, tenant, stream)
+    if not is_over(row):
+        ControlQueue(hub_of(shared).redis, str(stream)).send(Control("stop"))
+    return row
+
+
+def _new_stream(key: ApiKey, body: NewStreamBody, catalogue: Catalogue) -> NewStream:
+    item = _checked(body)
+    offer = _offer(item, catalogue)
+    manifest = offer.bundle.manifest
+    fps = manifest.fps or 0.0  # an offer has one
+    return NewStream(
+        tenant=key.tenant,
+        key=key.id,
+        prompt=item.prompt,
+        model=manifest.model,
+        bundle=offer.bundle.reference,
+        seed=secrets.randbelow(MAX_SEED + 1) if item.seed is None else item.seed,
+        max_frames=round(body.seconds * fps),
+        name=item.name,
+    )
+
+
+def _checked(body: NewStreamBody) -> Item:
+    """What a stream shares with an item, checked as there."""
+    item, problems = read_item(body.model_dump(exclude={"seconds"}))
+    if item is None or problems:
+        message = "; ".join(str(problem) for problem in problems)
+        raise InvalidInput(message, where=", ".join(dict.fromkeys(str(problem.field) for problem in problems)))
+    return item
+
+
+def _offer(item: Item, catalogue: Catalogue) -> Offer:
+    """What the stream is made with."""
+    try:
+        offer = catalogue.offer(item.model)
+    except NotFound as error:  # what is not found is not at this path
+        raise InvalidInput(error.message, where="model", hint=error.hint) from error
+    manifest = offer.bundle.manifest
+    if manifest.model != MODEL:
+        raise InvalidInput(
+            f"{manifest.name} is a bundle of {manifest.model}, which cannot make motion frame by frame",
+            where="model",
+            hint=f"Bundles of {MODEL} can.",
+        )
+    return offer

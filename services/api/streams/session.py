@@ -1,0 +1,251 @@
+"""One client that watches a stream: the frames as they come, and how the stream stands.
+
+What stands here of frames is one number, that of the next to send: every send is awaited, and what a client does not
+take stays in Redis, or is skipped.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import anyio
+from anyio.abc import TaskGroup
+from starlette.websockets import WebSocketDisconnect
+
+from services.api.context import Context
+from services.api.streams.hub import Hub
+from services.api.streams.messages import Messages
+from services.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
+from services.api.streams.service import is_over
+from services.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
+from services.api.streams.wire import Wire, close_code
+from shared.errors import MareyError, Unreachable
+from shared.jobs import ApiKey, StreamRow, StreamState, get_stream, stream_prompts, transaction
+from shared.streams.control import ControlQueue
+from shared.streams.frames import HEADER, LAST
+from shared.streams.redis import FrameStream, Gap, StoredFrame
+from shared.streams.watch import TOUCH_SECONDS, Watch
+
+BATCH = 20
+"""Frames of one read: a second."""
+IDLE_SECONDS, FLOW_SECONDS = 1.0, 2.0
+"""Between looks at the row: where no frame comes or the row is behind what frames say, and where they flow."""
+LAST_SECONDS = 0.2
+"""The same after the last frame: the row is over any moment."""
+HOLD_SECONDS = 0.25
+MEASURE_SECONDS = 0.5
+"""Between two looks at how far a client is behind: where we are what is slow, asking more often would make it worse."""
+OUTAGE_SECONDS = 8.0
+"""A Redis or Postgres that restarts is back by then."""
+AGAIN_SECONDS = 0.5
+
+
+@dataclass(frozen=True)
+class Visit:
+    """What a client came for.
+
+    Attributes:
+        row, prompts, made: how the stream stood when it came.
+        first: number of the first frame it wants.
+        pauses: where it is slow, the stream stands still rather than have it lose frames.
+    """
+
+    key: ApiKey
+    row: StreamRow
+    prompts: Sequence[tuple[int, str]]
+    made: Made
+    first: int
+    pauses: bool
+
+
+class Session:
+    """Shows one stream to one client.
+
+    Args:
+        wire: to the client; the handshake is done.
+        visit: what it came for.
+    """
+
+    def __init__(self, wire: Wire, hub: Hub, shared: Context, visit: Visit) -> None:
+        self._wire, self._hub, self._shared, self._visit = wire, hub, shared, visit
+        self._row, self._prompts = visit.row, visit.prompts
+        self._told = self._standing()
+        self._looked = time.monotonic()
+        name = str(visit.row.id)
+        self._frames = FrameStream(hub.redis, name)
+        self._watch = Watch(hub.redis, name)
+        self._messages = Messages(wire, hub, shared, visit.key, visit.row.id)
+        self._brake = Brake(hub, ControlQueue(hub.redis, name))
+        self._lag = Lag()
+        self._at = visit.first
+        self._prompt = 0  # the highest number that a frame carried
+        self._last = False
+        self._sending: float | None = None  # a frame, since when
+        self._measured = -MEASURE_SECONDS
+        self._away: float | None = None  # Redis or Postgres, since when
+
+    async def run(self) -> None:
+        """Until the stream is over, the client is gone or the server stops."""
+        tasks = [self._show, self._messages.obey, self._renew]
+        if self._visit.pauses:
+            tasks.append(self._hold)
+        try:
+            async with anyio.create_task_group() as group:
+                for task in tasks:
+                    group.start_soon(_and_then_none, task, group)
+        finally:
+            with anyio.CancelScope(shield=True), suppress(Unreachable):
+                await self._brake.release()  # nobody else would
+
+    async def _show(self) -> None:
+        await self._wire.tell(StreamMessage(stream=self._detail()))
+        while True:
+            try:
+                if await self._turn():
+                    return
+                self._away = None
+            except Unreachable as error:
+                if await self._give_up(error):
+                    return
+            except MareyError as error:
+                await self._wire.close(close_code(error), error.message)
+                return
+
+    async def _turn(self) -> bool:
+        """Wait for frames and send them, or see how the stream stands; whether it is over, and everything told."""
+        if is_over(self._row):
+            await self._finish()
+            return True
+        found = await self._hub.wait(lambda: self._read(LAST_SECONDS if self._last else IDLE_SECONDS))
+        if await self._pass_on(found) and len(found) < BATCH:
+            self._lag.caught_up()
+            await self._brake.release()
+        if time.monotonic() - self._looked >= self._patience(bool(found)):
+            await self._look()
+        return False
+
+    def _read(self, seconds: float) -> list[StoredFrame | Gap]:
+        return self._frames.reader(self._at).read(count=BATCH, block_ms=round(1000 * seconds))
+
+    async def _pass_on(self, found: Sequence[StoredFrame | Gap]) -> bool:
+        """Send these; False when the rest of them was skipped."""
+        for each in found:
+            if isinstance(each, Gap):
+                await self._tell_gap(each)
+                continue
+            blocked = await self._send(each)
+            self._at = each.number + 1
+            _, _, flags, _, _, prompt, *_ = HEADER.unpack_from(each.data)
+            self._prompt, self._last = max(self._prompt, prompt), bool(flags & LAST)
+            if blocked and not self._visit.pauses and await self._skip():
+                return False
+        return True
+
+    async def _send(self, frame: StoredFrame) -> bool:
+        """Send a frame; whether that had to wait."""
+        self._sending = time.monotonic()
+        try:
+            await self._wire.send(frame.data)
+            return time.monotonic() - self._sending > BLOCKED_SECONDS
+        finally:
+            self._sending = None
+
+    async def _skip(self) -> bool:
+        """Go on with the newest frame, if the client falls behind."""
+        if time.monotonic() - self._measured < MEASURE_SECONDS:
+            return False
+        self._measured = time.monotonic()
+        if not self._lag.falls(await self._behind()):
+            return False
+        reader = self._frames.reader(self._at)
+        missed = await self._hub.call(reader.skip)
+        self._lag.caught_up()
+        if missed is not None:
+            await self._tell_gap(missed)
+        return missed is not None
+
+    async def _tell_gap(self, gap: Gap) -> None:
+        await self._wire.tell(GapMessage(first=gap.first, count=gap.count))
+        self._at = gap.first + gap.count
+
+    async def _behind(self) -> int:
+        """Frames that are there and that the client has not."""
+        return (await self._hub.call(self._frames.bounds))[1] - self._at
+
+    def _patience(self, flowing: bool) -> float:
+        """Seconds from one look at the row to the next; a little less than a read waits, for its clock is another."""
+        if self._last:
+            return 0.0
+        settled = self._row.state is StreamState.LIVE and self._prompt < len(self._prompts)
+        return FLOW_SECONDS if flowing and settled else 0.9 * IDLE_SECONDS
+
+    async def _look(self) -> None:
+        """See how the stream stands, and tell it if that is news."""
+        self._row, self._prompts = await self._hub.call(self._stand)
+        self._looked = time.monotonic()
+        if self._standing() != self._told and not is_over(self._row):
+            await self._wire.tell(StreamMessage(stream=self._detail()))
+            self._told = self._standing()
+
+    def _stand(self) -> tuple[StreamRow, Sequence[tuple[int, str]]]:
+        """The row, and the prompts where there may be new ones: frames carry a number that is not on record here."""
+        with transaction(self._shared.engine) as conn:
+            row = get_stream(conn, self._row.tenant, self._row.id)
+            known = self._prompt < len(self._prompts) and not is_over(row)
+            return row, self._prompts if known else stream_prompts(conn, row.id)
+
+    async def _finish(self) -> None:
+        """What is left of a stream that is over."""
+        while found := await self._hub.wait(lambda: self._read(0)):
+            await self._pass_on(found)
+        if self._at < self._row.frames:  # an hour after its end it has none
+            await self._tell_gap(Gap(self._at, self._row.frames - self._at))
+        await self._wire.tell(EndMessage(stream=self._detail()))
+        await self._wire.close(1000)
+
+    async def _give_up(self, error: Unreachable) -> bool:
+        """Tell of an outage once, and wait a little; True, and the socket closed, when it lasts too long."""
+        now = time.monotonic()
+        if self._away is None:
+            self._away = now
+            await self._wire.complain(error)
+        if now - self._away > OUTAGE_SECONDS:
+            await self._wire.close(close_code(error), error.message)
+            return True
+        await anyio.sleep(AGAIN_SECONDS)
+        return False
+
+    async def _renew(self) -> None:
+        """Say that somebody watches, as long as this runs."""
+        while True:
+            with suppress(Unreachable):  # told by `_show`
+                await self._hub.call(self._watch.touch)
+            await anyio.sleep(TOUCH_SECONDS)
+
+    async def _hold(self) -> None:
+        """Pause the stream while the client blocks our sends and falls behind; `_turn` lets it go on."""
+        while True:
+            await anyio.sleep(HOLD_SECONDS)
+            since = self._sending
+            if since is None or time.monotonic() - since < BLOCKED_SECONDS or self._row.state is not StreamState.LIVE:
+                continue
+            with suppress(Unreachable):  # told by `_show`
+                if self._lag.falls(await self._behind()):
+                    await self._brake.pull()
+
+    def _standing(self) -> tuple[object, ...]:
+        """What the client is told of when it changes."""
+        return self._row.state, self._row.position, tuple(self._prompts)
+
+    def _detail(self) -> StreamDetailView:
+        return StreamDetailView.detail(self._row, self._visit.made, self._prompts)
+
+
+async def _and_then_none(task: Callable[[], Awaitable[None]], group: TaskGroup) -> None:
+    """Where one task of a session ends, all do: the client is gone, or everything is told."""
+    with suppress(WebSocketDisconnect):
+        await task()
+    group.cancel_scope.cancel()

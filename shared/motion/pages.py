@@ -1,0 +1,64 @@
+"""How a page with a 3D figure is put together: one HTML file with style, scripts, three.js and data inside.
+
+Nothing is loaded from elsewhere. What is filled in is data, whatever is in it: no text can end the element it stands in
+or pass for a mark of the template.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib import resources
+
+from shared.motion.body import Body
+from shared.motion.skeleton import Skeleton
+
+
+def asset(name: str) -> str:
+    """The text of a file in `assets`."""
+    return (resources.files("shared.motion") / "assets" / name).read_text(encoding="utf-8")
+
+
+def fill(template: str, parts: Mapping[str, str]) -> str:
+    """A template with each mark replaced by its text, in order and once each.
+
+    What is filled in is never searched for the next mark.
+    """
+    pieces: list[str] = []
+    for mark, text in parts.items():
+        before, template = template.split(mark, 1)
+        pieces += [before, text]
+    return "".join([*pieces, template])
+
+
+def style(name: str) -> str:
+    """A page's own style behind the one that all share."""
+    return asset("page.css") + asset(name)
+
+
+def script_json(value: object) -> str:
+    """JSON that may stand inside a `<script>`: no character in it can end the element or start a comment."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text
+
+
+def body_document(skeleton: Skeleton, body: Body) -> dict[str, object]:
+    """A skeleton and its body as scene.js reads them."""
+    return {
+        "parents": list(skeleton.parents),
+        "offsets": [[round(float(x), 6) for x in offset] for offset in skeleton.offsets],
+        "feet": list(skeleton.feet),
+        "height": round(body.height, 4),
+        "sole": round(body.sole, 4),
+        "limbs": [
+            {
+                "part": limb.part,
+                "joints": [limb.start, limb.end],
+                "radii": [round(limb.start_radius, 5), round(limb.end_radius, 5)],
+                "offsets": [[round(x, 5) for x in offset] for offset in (limb.start_offset, limb.end_offset)],
+            }
+            for limb in body.limbs
+        ],
+    }
