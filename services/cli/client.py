@@ -14,6 +14,7 @@ import httpx2
 
 from services.cli.place import Server, find_server
 from shared.errors import (
+    Busy,
     Conflict,
     InvalidBundle,
     InvalidFile,
@@ -78,6 +79,10 @@ class Client:
         """POST a JSON body, None = none; the answer's JSON. Retried: only for requests that may be repeated."""
         return self._send("POST", path, params=_given(params), json=body).json()
 
+    def post_once(self, path: str, body: Any) -> Any:
+        """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
+        return self._send("POST", path, repeatable=False, json=body).json()
+
     def patch(self, path: str, body: Any) -> Any:
         """PATCH with a JSON body; the answer's JSON."""
         return self._send("PATCH", path, json=body).json()
@@ -135,19 +140,24 @@ class Client:
                 if event.data:
                     yield json.loads(event.data)
 
-    def _send(self, method: str, path: str, **request: Any) -> httpx2.Response:
+    def _send(self, method: str, path: str, *, repeatable: bool = True, **request: Any) -> httpx2.Response:
         pause = FIRST_PAUSE
         for attempt in range(1, ATTEMPTS + 1):
             try:
                 response = self._http.request(method, path, **request)
             except httpx2.TransportError as error:
-                if attempt == ATTEMPTS or isinstance(error, httpx2.UnsupportedProtocol):
+                never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
+                if (
+                    attempt == ATTEMPTS
+                    or isinstance(error, httpx2.UnsupportedProtocol)
+                    or not (repeatable or never_sent)
+                ):
                     raise _unreachable(self.server, error) from error
                 wait = pause
             else:
                 if response.status_code < 400:
                     return response
-                if response.status_code not in RETRIED or attempt == ATTEMPTS:
+                if response.status_code not in RETRIED or attempt == ATTEMPTS or not repeatable:
                     raise error_of(response)
                 wait = max(pause, _retry_after(response))
             time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
@@ -166,6 +176,8 @@ def error_of(response: httpx2.Response) -> MareyError:
     if kind == InvalidItems.problem_type:
         problems = [Problem(p.get("line"), p.get("field"), p["message"]) for p in problem.get("problems", [])]
         return InvalidItems(problems, total=problem.get("total"))
+    if kind == Busy.problem_type:
+        return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
     return found(message, where=where, hint=hint)
 

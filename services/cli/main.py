@@ -9,7 +9,20 @@ import typer
 from typer.core import TyperGroup
 
 from services.cli import console
-from services.cli.commands import admin, convert, data, fetch, generate, jobs, models, serve, submit, text, train
+from services.cli.commands import (
+    admin,
+    convert,
+    data,
+    fetch,
+    generate,
+    jobs,
+    models,
+    serve,
+    stream,
+    submit,
+    text,
+    train,
+)
 from shared.errors import MareyError
 
 INTERRUPTED = 130
@@ -67,6 +80,7 @@ app.command("generate")(generate.generate)
 app.command("submit")(submit.submit)
 app.add_typer(jobs.app, name="jobs")
 app.command("fetch")(fetch.fetch)
+app.command("stream")(stream.stream)
 app.command("serve")(serve.serve)
 app.command("worker")(serve.worker)
 app.command("scheduler")(serve.scheduler)

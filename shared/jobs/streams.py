@@ -221,7 +221,7 @@ def abandoned_streams(conn: sa.Connection, seconds: float) -> Sequence[UUID]:
 # --- helpers ---
 
 
-def _streams() -> sa.Select[Any]:
+def _streams() -> sa.Select[*tuple[Any, ...]]:
     table, earlier = schema.stream, schema.stream.alias("earlier")
     before = (
         sa.select(sa.func.count())

@@ -45,46 +45,88 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
     """The text of the BVH file; see `write_bvh`."""
     if getattr(clip, "positions", None) is not None:
         raise InvalidInput("bones of this clip change their length, which one set of OFFSETs cannot say")
-    scale = 1 / METRES[unit]
-    skeleton, rotations = clip.skeleton, np.asarray(clip.rotations, np.float64)
-    root, offsets = np.asarray(clip.root, np.float64) * scale, skeleton.offsets * scale
-    tips = _tips(clip) * scale
-    if up == "z":
-        offsets, tips, root = (rotate(conjugate(Z_TO_Y), a) for a in (offsets, tips, root))
-        rotations = multiply(multiply(conjugate(Z_TO_Y), rotations), Z_TO_Y)
-    # file order is depth first, whatever the order of the arrays
-    order: list[int] = []
-    lines = ["HIERARCHY"]
+    layout = Layout(clip.skeleton, ends=getattr(clip, "ends", None), unit=unit, up=up)
+    rows = layout.rows(clip.root, continuous_euler(layout.angles(clip.rotations)))
+    return "\n".join([layout.header(str(len(rows)), clip.fps), *rows]) + "\n"
 
-    def vector(v: Array) -> str:
-        return " ".join(f"{x + 0.0:.6f}" for x in np.round(v, 6))
 
-    def joint(j: int, depth: int) -> None:
-        order.append(j)
-        pad = "\t" * depth
-        lines.append(f"{pad}{'JOINT' if j else 'ROOT'} {_word(skeleton.joint_names[j])}")
-        lines.append(f"{pad}{{")
-        lines.append(f"{pad}\tOFFSET {vector(offsets[j] if j else np.zeros(3))}")
-        channels = (
-            "3 Zrotation Yrotation Xrotation" if j else "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
-        )
-        lines.append(f"{pad}\tCHANNELS {channels}")
-        for child in skeleton.children[j]:
-            joint(child, depth + 1)
-        if not skeleton.children[j]:
-            lines.extend([f"{pad}\tEnd Site", f"{pad}\t{{", f"{pad}\t\tOFFSET {vector(tips[j])}", f"{pad}\t}}"])
-        lines.append(f"{pad}}}")
+class Layout:
+    """One skeleton as BVH: the only place that knows how a header and a row of numbers look.
 
-    joint(0, 0)
-    angles = continuous_euler(to_euler(rotations, "ZYX"))[:, order].reshape(len(root), -1)
-    values = np.concatenate([root, angles], axis=1)
-    if not np.isfinite(values).all():
-        raise InvalidInput("the clip holds NaN or infinite numbers", where=skeleton.name)
-    values = np.round(values, 6) + 0.0  # no -0
-    lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {1 / clip.fps:.8f}"]
-    row = " ".join(["%.6f"] * values.shape[1])
-    lines += [row % tuple(numbers) for numbers in values.tolist()]
-    return "\n".join(lines) + "\n"
+    Joints stand depth first in the file, whatever their order in the arrays.
+
+    Args:
+        skeleton: its offsets become the OFFSETs.
+        ends: (J, 3) End Site offsets in metres, NaN or None where a short bone on from the last one will do.
+        unit: what the lengths of the file are in.
+        up: which axis of the file points up.
+    """
+
+    def __init__(self, skeleton: Skeleton, *, ends: Array | None = None, unit: Unit = "cm", up: Up = "y") -> None:
+        self.skeleton = skeleton
+        self.up = up
+        self._scale = 1 / METRES[unit]
+        self._offsets = self._turned(skeleton.offsets * self._scale)
+        self._tips = self._turned(_tips(skeleton, ends) * self._scale)
+        self._order: list[int] = []
+        self._hierarchy = ["HIERARCHY"]
+        self._joint(0, 0)
+
+    def header(self, frames: str, fps: float) -> str:
+        """Everything before the numbers, without the end of its last line; `frames` is the count as it is to stand."""
+        return "\n".join([*self._hierarchy, "MOTION", f"Frames: {frames}", f"Frame Time: {1 / fps:.8f}"])
+
+    def angles(self, rotations: NDArray[np.floating[Any]]) -> Array:
+        """Local quaternions (T, J, 4) as Euler angles (T, J, 3) in degrees, each frame by itself: `continuous_euler`
+        makes channels without jumps of them."""
+        turns = np.asarray(rotations, np.float64)
+        if self.up == "z":
+            turns = multiply(multiply(conjugate(Z_TO_Y), turns), Z_TO_Y)
+        return to_euler(turns, "ZYX")
+
+    def rows(self, root: NDArray[np.floating[Any]], angles: Array) -> list[str]:
+        """The lines of numbers, without their ends.
+
+        Args:
+            root: (T, 3) metres, Y up.
+            angles: (T, J, 3) degrees, in the skeleton's order.
+
+        Raises:
+            InvalidInput: numbers that are not finite.
+        """
+        place = self._turned(np.asarray(root, np.float64) * self._scale)
+        values = np.concatenate([place, angles[:, self._order].reshape(len(place), -1)], axis=1)
+        if not np.isfinite(values).all():
+            raise InvalidInput("the clip holds NaN or infinite numbers", where=self.skeleton.name)
+        values = np.round(values, 6) + 0.0  # no -0
+        row = " ".join(["%.6f"] * values.shape[1])
+        return [row % tuple(numbers) for numbers in values.tolist()]
+
+    def _turned(self, vectors: Array) -> Array:
+        return rotate(conjugate(Z_TO_Y), vectors) if self.up == "z" else vectors
+
+    def _joint(self, j: int, depth: int) -> None:
+        self._order.append(j)
+        children, pad = self.skeleton.children[j], "\t" * depth
+        channels = "3 Zrotation Yrotation Xrotation"
+        if not j:
+            channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
+        self._hierarchy += [
+            f"{pad}{'JOINT' if j else 'ROOT'} {_word(self.skeleton.joint_names[j])}",
+            f"{pad}{{",
+            f"{pad}\tOFFSET {_vector(self._offsets[j] if j else np.zeros(3))}",
+            f"{pad}\tCHANNELS {channels}",
+        ]
+        for child in children:
+            self._joint(child, depth + 1)
+        if not children:
+            self._hierarchy += [f"{pad}\tEnd Site", f"{pad}\t{{"]
+            self._hierarchy += [f"{pad}\t\tOFFSET {_vector(self._tips[j])}", f"{pad}\t}}"]
+        self._hierarchy.append(f"{pad}}}")
+
+
+def _vector(v: Array) -> str:
+    return " ".join(f"{x + 0.0:.6f}" for x in np.round(v, 6))
 
 
 def _word(name: str) -> str:
@@ -92,12 +134,10 @@ def _word(name: str) -> str:
     return re.sub(r"[\s{}]+", "_", name) or "_"
 
 
-def _tips(clip: Posed) -> Array:
-    """(J, 3) End Site offsets in metres: the file's own, else a short bone on from the last one (toes: forward)."""
-    skeleton = clip.skeleton
+def _tips(skeleton: Skeleton, ends: Array | None) -> Array:
+    """(J, 3) End Site offsets in metres: the given ones, else a short bone on from the last one (toes: forward)."""
     offsets = np.asarray(skeleton.offsets, np.float64)
     tips = 0.15 * normalize(offsets)
     for toe in skeleton.feet[1::2]:
         tips[toe] = [0.0, 0.0, 0.05]
-    own = getattr(clip, "ends", None)
-    return tips if own is None else np.where(np.isfinite(own), own, tips)
+    return tips if ends is None else np.where(np.isfinite(ends), ends, tips)

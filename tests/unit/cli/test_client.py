@@ -13,7 +13,7 @@ import pytest
 from services.cli import client as client_module
 from services.cli.client import Client
 from services.cli.place import Server
-from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unreachable
+from shared.errors import Busy, Conflict, InvalidInput, NotFound, Refused, Unreachable
 from shared.items import InvalidItems
 
 
@@ -123,3 +123,19 @@ def test_an_answer_of_something_else_is_told_as_such(scripted: Scripted) -> None
     client, _ = scripted((404, "<html>"))
     with client, pytest.raises(InvalidInput, match="MAREY_SERVER"):
         client.get("/v1/jobs")
+
+
+def test_what_must_not_be_done_twice_is_sent_once(scripted: Scripted) -> None:
+    for answer in ((0, None), (503, problem("unreachable")), (429, problem("busy"))):
+        client, script = scripted(answer, (201, {"id": "s"}))
+        with client, pytest.raises(Unreachable if answer[0] != 429 else Busy):
+            client.post_once("/v1/streams", {"prompt": "a person walks"})
+        assert len(script.asked) == 1
+
+
+def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client_module, "ATTEMPTS", 1)
+    client, _ = scripted((429, problem("busy", hint="Stop one.")))
+    with client, pytest.raises(Busy, match=r"no\n  Stop one\.") as caught:
+        client.get("/v1/jobs")
+    assert caught.value.exit_code == 5

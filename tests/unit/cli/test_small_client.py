@@ -21,6 +21,7 @@ MISSING = ("torch", "numpy", "pydantic_settings", "sqlalchemy", "fastapi", "cele
         (["admin", "gc"], "server"),
         (["convert", "a.npz", "a.bvh"], "motion"),
         (["render", "a.npz", "-o", "a.png"], "motion"),
+        (["stream", "a person waves", "-o", "a.bvh"], "motion"),
         (["text", "parse", "a person waves"], "worker"),
         (["train", "hgm3", "tokenizer", "data", "--run", "run", "--steps", "1"], "worker"),
         (["data", "inspect", "data"], "worker"),

@@ -1,0 +1,146 @@
+"""`marey stream`."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console, options
+from shared.errors import InvalidInput, MareyError, NotFound
+
+if TYPE_CHECKING:
+    from services.cli.client import Client
+    from services.cli.live.frames import Recording
+    from services.cli.live.steering import Interrupts
+
+COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
+
+
+class Slow(StrEnum):
+    """What becomes of a client that cannot keep up."""
+
+    SKIP = "skip"
+    PAUSE = "pause"
+
+
+def stream(
+    prompt: Annotated[str, typer.Argument(metavar="PROMPT", help="What the person does first.")],
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="Length at most; none given = the server decides: 10 minutes.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed; none given = drawn.")] = None,
+    model: Annotated[str | None, typer.Option("--model", help="Model, bundle or exact bundle; else mogo.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for the stream and its clip.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="A .bvh that grows while the stream runs.")
+    ] = None,
+    slow: Annotated[
+        Slow, typer.Option("--slow", help="Where this side cannot keep up: skip frames, or pause the stream.")
+    ] = Slow.SKIP,
+    fetch: Annotated[
+        Path | None, typer.Option("--fetch", help="Afterwards wait for the clip, and fetch its files into this folder.")
+    ] = None,
+    overwrite: options.Overwrite = False,
+    as_json: console.Json = False,
+) -> None:
+    """Watch motion while it is made, and steer it.
+
+    A line on stdin is what the person does next; /pause, /resume and /stop do what they say. The end of stdin ends
+    nothing. Ctrl-C stops the stream, waits for its end and exits with 130; a second one leaves at once.
+
+    The line that counts shows frames a second over the last two seconds, and the latency: the age of the newest frame
+    on an even clock of 20 frames a second, set by the frame that came earliest. It is below 50 ms as long as no time is
+    lost on the way; `buffered` counts frames that arrived and are not written yet, `gaps` those that never came.
+
+    The BVH is whole at every moment, however the program ends, and row n is frame n: missing frames are made of their
+    neighbours, by slerp and lerp. The clip that --fetch brings has all frames.
+    """
+    from services.cli.live.steering import Interrupts
+
+    body = _body(prompt, seconds=seconds, seed=seed, model=model, name=name)
+    recording = _recording(output, overwrite=overwrite)
+    if fetch is not None:
+        from services.cli.fetching import check_folder
+
+        check_folder(fetch)  # before anything begins
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        with Interrupts() as interrupts:
+            result, error = _follow(client, body, recording, interrupts, slow=slow, as_json=as_json)
+        _write_result(result, as_json=as_json)
+        if error is not None:
+            raise error
+        if interrupts.count:
+            if fetch is not None and result["job"] is not None:
+                console.say(f"Not fetched; `marey fetch {result['job']} -o {fetch}` does it.")
+            raise KeyboardInterrupt
+        if fetch is not None:
+            _fetch(client, result, fetch, overwrite=overwrite, as_json=as_json)
+
+
+def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]:
+    """The request, checked as far as one can without the server."""
+    from shared.items import read_items
+
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
+        raise InvalidInput(f"{seconds:g} seconds cannot be", where="--seconds")
+    (item,) = read_items([(None, {"prompt": prompt, **given})])
+    body = item.as_json()
+    del body["variants"]
+    return body if seconds is None else {**body, "seconds": seconds}
+
+
+def _recording(path: Path | None, *, overwrite: bool) -> Recording | None:
+    if path is None:
+        return None
+    from services.cli.live.frames import Recording
+
+    return Recording(path, overwrite=overwrite)
+
+
+def _follow(
+    client: Client, body: dict[str, Any], recording: Recording | None, interrupts: Interrupts, *, slow: Slow,
+    as_json: bool,
+) -> tuple[dict[str, Any], MareyError | None]:  # fmt: skip
+    """The line of the stream, and what went wrong; what came until then stays."""
+    from services.cli.live.follow import Follower
+    from services.cli.live.link import Link
+
+    begun = client.post_once("/v1/streams", body)
+    with Link(client.server, begun["id"], slow=slow.value) as link:
+        follower = Follower(begun, link, recording, interrupts, as_json=as_json)
+        try:
+            follower.run()
+        except MareyError as error:
+            return follower.result(), error
+        return follower.result(), follower.failure()
+
+
+def _write_result(result: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        console.result_json({"type": "end", **result})
+        return
+    if result["gaps"]:
+        console.say(f"{result['gaps']} of {result['frames']} frames did not come" + _filled(result))
+    shown = {**result, "file": result["file"] and console.home_relative(result["file"])}
+    console.table(COLUMNS, [[shown[column] for column in COLUMNS]])
+
+
+def _filled(result: dict[str, Any]) -> str:
+    return "; in the file, those around them stand in." if result["file"] else "."
+
+
+def _fetch(client: Client, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
+    from services.cli.commands.fetch import write_job
+    from services.cli.watching import check_ended, watch_job
+
+    if result["job"] is None:
+        raise NotFound("there is no clip to fetch: nothing of it was recorded", where=f"stream {result['stream']}")
+    ended = watch_job(client, result["job"])
+    write_job(client, result["job"], folder, None, overwrite=overwrite, as_json=as_json)
+    check_ended(ended)

@@ -1,0 +1,187 @@
+"""The socket of one stream: opened, kept alive, and taken up again where it broke."""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlencode
+
+from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidURI, WebSocketException
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from services.cli.place import Server
+from services.cli.watching import PATIENCE
+from shared.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
+
+SUBPROTOCOL = Subprotocol("marey.stream.v1")
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 4.0
+"""Seconds between attempts, doubling with jitter: a stream moves to another worker in two seconds."""
+OPEN_SECONDS, CLOSE_SECONDS = 10.0, 1.0
+PING_SECONDS, PONG_SECONDS = 5.0, 10.0
+STEADY_SECONDS = 5.0
+"""A socket that lived so long, or brought a frame, was a good one; attempts are counted from the last good one."""
+MOST_WAITING = 1200
+"""Messages that may wait here before the socket is left alone: as many frames as a server keeps."""
+_REFUSALS = {401: Unauthenticated, 403: Refused, 404: NotFound, 422: InvalidInput}
+"""What the status of an answer that is no socket is told as, and with 4000 added a close code; anything else is tried
+again."""
+
+Message = bytes | dict[str, Any]
+
+
+class Link:
+    """The socket of a stream. Not for several threads.
+
+    Args:
+        server: the socket is at its address, `wss` for `https`.
+        stream: the stream's id.
+        slow: what becomes of a client that is slow, `skip` or `pause`.
+        patience: seconds of failed attempts after which the server counts as unreachable.
+
+    Attributes:
+        next: number of the frame from which a socket goes on that is opened anew.
+        sockets: how many were opened.
+    """
+
+    def __init__(self, server: Server, stream: str, *, slow: str = "skip", patience: float = PATIENCE) -> None:
+        self.next = 0
+        self.sockets = 0
+        self._server = server
+        self._address = f"ws{server.url.removeprefix('http')}/v1/streams/{stream}"
+        self._slow = slow
+        self._patience = patience
+        self._socket: ClientConnection | None = None
+        self._closing = ExitStack()
+        self._good = time.monotonic()
+        self._opened = 0.0
+        self._pause = FIRST_PAUSE
+        self._retry_at = 0.0
+        self._refusal: MareyError | None = None
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._closing.close()
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a socket now."""
+        return self._socket is not None
+
+    def send(self, message: dict[str, str]) -> bool:
+        """Send a control message; False when there is no socket to send it through."""
+        if self._socket is None:
+            return False
+        try:
+            self._socket.send(json.dumps(message, ensure_ascii=False))
+        except ConnectionClosed as closed:
+            self._drop(closed)
+            return False
+        return True
+
+    def receive(self, wait: float) -> list[Message]:
+        """All that has arrived, in order: frames as bytes, the rest as objects. Opens the socket where there is none.
+
+        Args:
+            wait: how many seconds to wait when nothing has.
+
+        Raises:
+            Unauthenticated, Refused, NotFound, InvalidInput: the server will not have us, or does not speak our tongue.
+            Unreachable: attempts failed for longer than the patience lasts.
+        """
+        if self._refusal is not None:
+            raise self._refusal
+        if self._socket is None and not self._open(wait):
+            return []
+        messages: list[Message] = []
+        try:
+            while self._socket is not None and len(messages) < MOST_WAITING:
+                messages.append(_read(self._socket.recv(timeout=0 if messages else wait)))
+        except TimeoutError:
+            pass
+        except ConnectionClosed as closed:
+            self._drop(closed)
+        if any(isinstance(message, bytes) for message in messages):
+            self._good, self._pause = time.monotonic(), FIRST_PAUSE
+        return messages
+
+    def _open(self, wait: float) -> bool:
+        """A socket, unless it is too early for another attempt, or this one fails."""
+        early = self._retry_at - time.monotonic()
+        if early > 0:
+            time.sleep(min(wait, early))
+            return False
+        try:
+            self._socket = self._closing.enter_context(
+                connect(
+                    f"{self._address}?{urlencode({'from': self.next, 'slow': self._slow})}",
+                    additional_headers={"Authorization": f"Bearer {self._server.key}"},
+                    subprotocols=[SUBPROTOCOL],
+                    compression=None,  # 200 bytes of noise a frame: nothing to gain
+                    open_timeout=OPEN_SECONDS,
+                    close_timeout=CLOSE_SECONDS,
+                    ping_interval=PING_SECONDS,
+                    ping_timeout=PONG_SECONDS,
+                    max_queue=MOST_WAITING,
+                )
+            )
+        except InvalidURI as error:
+            raise InvalidInput(f"is no address of a server: {error}", where=self._server.url) from error
+        except InvalidStatus as error:
+            self._failed(error, error.response.status_code, "")
+        except (OSError, WebSocketException) as error:
+            self._failed(error, None, "")
+        else:
+            self.sockets += 1
+            self._opened = time.monotonic()
+        return self._socket is not None
+
+    def _drop(self, closed: ConnectionClosed) -> None:
+        self._socket = None
+        self._closing.close()
+        if time.monotonic() - self._opened > STEADY_SECONDS:
+            self._good, self._pause = time.monotonic(), FIRST_PAUSE
+        code, reason = (closed.rcvd.code, closed.rcvd.reason) if closed.rcvd else (None, "")
+        try:
+            self._failed(closed, code, reason)
+        except MareyError as refusal:
+            self._refusal = refusal  # told after the messages that came before it
+
+    def _failed(self, error: Exception, code: int | None, reason: str) -> None:
+        """Set the time of the next attempt.
+
+        Raises:
+            MareyError: there is to be none.
+        """
+        if code is not None and (refusal := _REFUSALS.get(code % 4000)) is not None:
+            raise refusal(reason or f"the server refuses the socket ({code})", where=self._address)
+        now = time.monotonic()
+        if now - self._good > self._patience:
+            raise Unreachable(
+                f"the stream was out of reach for {self._patience:.0f} s ({reason or error})",
+                where=self._address,
+                hint="It ends by itself when nobody watches it for a minute.",
+            ) from error
+        self._retry_at = now + self._pause * random.uniform(0.8, 1.2)  # noqa: S311
+        self._pause = min(self._pause * 2, LONGEST_PAUSE)
+
+
+def _read(message: str | bytes) -> Message:
+    if isinstance(message, bytes):
+        return message
+    try:
+        found = json.loads(message)
+    except ValueError:
+        found = None
+    if not isinstance(found, dict) or not isinstance(found.get("type"), str):
+        hint = "client and server are of different releases: update the older one"
+        raise InvalidInput(f"the server says {message[:60]!r}, which is no message", where="stream", hint=hint)
+    return found
