@@ -15,7 +15,7 @@ from shared.errors import Conflict, InvalidInput
 from shared.hashing import sha256_of
 from shared.motion.features import HUMANML3D_263
 from workers.training.data import manifest as names
-from workers.training.data.captions import captions
+from workers.training.data.captions import captions, phrasings
 from workers.training.data.compose import COUNTS, compose
 from workers.training.data.describe import Facts, describe, describe_cmu
 from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
@@ -164,7 +164,7 @@ class FolderWriter:
                     steps=walked.steps,
                     side=acts[0].side,
                 ),
-                captions=captions(acts, name, 2 if spliced and len(acts) == 1 else 3),
+                captions=captions(acts, name, phrasings(acts, spliced=bool(spliced))),
                 seams=seams,
                 act_captions=tuple(
                     captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(acts) if len(acts) > 1

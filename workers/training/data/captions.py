@@ -435,6 +435,18 @@ def _loosen(text: str, rng: random.Random) -> str:
 LONG_SHARE = 0.5  # of the captured clips; a long caption is nearly always a new string, and each costs text features
 
 
+PHRASINGS = {"walk_back": 12, "bow": 8, "walk": 6, "run": 4, "turn": 4}
+"""Captions of a clip of one act that is drawn often and has few clips. With two each, those of 159 clips backward were
+drawn 50 times in an hour of training: known captions were obeyed at 98 %, words by another author at 67 %."""
+
+
+def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
+    """How many captions a clip gets: as many as keep each from being drawn over and over."""
+    if len(parts) == 1 and parts[0].act in PHRASINGS:
+        return PHRASINGS[parts[0].act]
+    return 2 if spliced and len(parts) == 1 else 3
+
+
 def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ...]:
     """Different captions of a clip, all true of it: short ones, and for half the clips of one act a long one.
 
@@ -450,7 +462,7 @@ def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ..
     wanted = count
     if len(parts) == 1 and rng.random() < LONG_SHARE:
         wanted -= 1
-    for _ in range(20):
+    for _ in range(20 * count):
         if len(out) >= wanted:
             break
         out[short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)] = None
