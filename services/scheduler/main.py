@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import threading
-from types import FrameType
 
 import sqlalchemy as sa
 
@@ -23,6 +21,7 @@ from shared.jobs import (
 from shared.runtime.app import create_app
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
+from shared.runtime.signals import stop_on_signals
 from shared.settings import Settings
 from shared.storage import open_store
 
@@ -54,7 +53,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     if stopping is None:
         configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
         stopping = threading.Event()
-        _stop_on_signals(stopping)
+        stop_on_signals(stopping)
     database_url = chosen.database_url.get_secret_value()
     queue_url = chosen.queue_url.get_secret_value()
     engine = create_engine(database_url)
@@ -114,11 +113,3 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
             "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY
         ),
     ]
-
-
-def _stop_on_signals(stopping: threading.Event) -> None:
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        stopping.set()
-
-    signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, stop)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
-import signal
 import socket
 import threading
-from types import FrameType
 from typing import cast
 
 from shared.errors import InvalidInput
@@ -18,6 +16,7 @@ from shared.runtime.live.loop import LiveLoop
 from shared.runtime.live.port import ShowFactory
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
+from shared.runtime.signals import stop_on_signals
 from shared.settings import Settings
 
 log = logger(__name__)
@@ -46,7 +45,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     if stopping is None:
         configure_logging("live", level=chosen.log_level, json=chosen.log_json)
         stopping = threading.Event()
-        _stop_on_signals(stopping)
+        stop_on_signals(stopping)
     wait_for_database(chosen)
     module, _, attribute = factory.partition(":")
     show = cast("ShowFactory", getattr(importlib.import_module(module), attribute))()
@@ -67,11 +66,3 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
         client.close()
         engine.dispose()
     return 0
-
-
-def _stop_on_signals(stopping: threading.Event) -> None:
-    def stop(_signal: int, _frame: FrameType | None) -> None:
-        stopping.set()
-
-    signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, stop)
