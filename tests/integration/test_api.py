@@ -15,10 +15,9 @@ import httpx2
 import pytest
 
 from shared.errors import NotFound
-from shared.jobs import WorkerBeat, beat, create_engine, create_key, transaction
+from shared.jobs import WorkerBeat, beat, transaction
 from shared.runtime.embedded import EmbeddedServer
-from shared.storage import open_store
-from tests.support.live_api import BUNDLE, ApiThread, LiveApi, settings_of
+from tests.support.live_api import BUNDLE, LiveApi, running_api, settings_of
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
 
@@ -28,12 +27,8 @@ def api(
     module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[LiveApi]:
     config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
-    engine = create_engine(module_database_url)
-    with transaction(engine) as conn:
-        key = create_key(conn, "all", ["admin"]).secret
-    with ApiThread(config) as url:
-        yield LiveApi(url, key, engine, open_store(config))
-    engine.dispose()
+    with running_api(config, module_database_url) as api:
+        yield api
 
 
 @pytest.fixture

@@ -18,16 +18,15 @@ import sqlalchemy as sa
 from websockets.exceptions import InvalidStatus
 
 from services.api.streams import hub, session
-from shared.jobs import StreamState, create_engine, create_key, schema, take_stream, transaction
+from shared.jobs import StreamState, create_key, schema, take_stream, transaction
 from shared.motion.skeleton import HUMANML3D
 from shared.runtime.embedded import EmbeddedServer, start_valkey
 from shared.runtime.queue import redis_client
 from shared.settings import Settings
-from shared.storage import open_store
 from shared.streams.control import Control, ControlQueue
 from shared.streams.redis import FrameStream
 from shared.streams.watch import Watch
-from tests.support.live_api import ApiThread, LiveApi, settings_of
+from tests.support.live_api import ApiThread, LiveApi, running_api, settings_of
 from tests.support.live_streams import BUNDLE, PATIENCE, Hand, add_mogo, watching
 
 WALK = {"prompt": "a person walks"}
@@ -44,12 +43,8 @@ def config(module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: p
 
 @pytest.fixture(scope="module")
 def api(config: Settings, module_database_url: str) -> Iterator[LiveApi]:
-    engine = create_engine(module_database_url)
-    with transaction(engine) as conn:
-        key = create_key(conn, "all", ["admin"]).secret
-    with ApiThread(config) as url:
-        yield LiveApi(url, key, engine, open_store(config))
-    engine.dispose()
+    with running_api(config, module_database_url) as api:
+        yield api
 
 
 @pytest.fixture

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,12 +32,13 @@ from shared.jobs import (
     claim,
     commit_motions,
     commit_texts,
+    create_engine,
     create_key,
     fail_items,
     transaction,
 )
 from shared.settings import Settings
-from shared.storage import AssetStore
+from shared.storage import AssetStore, open_store
 
 BUNDLE = "hgm3-paperclip"
 
@@ -153,6 +156,17 @@ class ApiThread:
     def __exit__(self, *_: object) -> None:
         self._server.should_exit = True
         self._thread.join(20)
+
+
+@contextlib.contextmanager
+def running_api(config: Settings, database_url: str) -> Iterator[LiveApi]:
+    """The API of these settings, with a key that may do everything."""
+    engine = create_engine(database_url)
+    with transaction(engine) as conn:
+        key = create_key(conn, "all", ["admin"]).secret
+    with ApiThread(config) as url:
+        yield LiveApi(url, key, engine, open_store(config))
+    engine.dispose()
 
 
 def _free_port() -> int:
