@@ -1,10 +1,12 @@
-"""Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on the others.
+"""Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on rows beside it.
 
 `torch.nn.functional.linear` takes other kernels, which add in another order, for fewer than some 18 rows. oneDNN's
 packed product in float32 does so for a single row alone: measured with torch 2.13 on AVX-512 for 16 shapes, 2 to 192
-rows give equal bits; 6 rows by 1024 x 3072 take 0.6 ms in place of 0.9. In bfloat16, which halves that, bits do depend
-on the number of rows while they are few, so they go in blocks of one size. Many rows at once (128 and more) are 5 %
-faster than with torch's own product, which packs the weights anew each time, and give the very same bits.
+rows give equal bits; 6 rows by 1024 x 3072 take 0.6 ms in place of 0.9. Many rows at once (128 and more) are 5 % faster
+than with torch's own product, which packs the weights anew each time, and give the very same bits.
+
+Every call of it costs 50 µs, though, and in bfloat16, which halves what is read, bits do depend on the number of rows
+while they are few. So what is drawn frame by frame goes through `GroupedLinear`: products of one shape.
 """
 
 from __future__ import annotations
@@ -13,48 +15,90 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-_BLOCK = 48
-"""Rows of one bfloat16 product: eight sessions of six levels. For one session it costs a quarter more than 6 rows."""
+SMALL = 2**19
+"""Weights of a matrix that stays in the processor's cache: torch's own product of a few rows takes 20 µs there in place
+of 80, and less to read is worth nothing."""
 
 
 class PackedLinear(nn.Module):
-    """The inference twin of a linear layer; its weights can be neither trained nor read."""
+    """The inference twin of a linear layer; its weights can be neither trained nor read.
 
-    def __init__(
-        self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, many: bool = False, gelu: bool = False
-    ) -> None:
+    In float32 a row's bits do not depend on the others; in bfloat16 they do while rows are few.
+    """
+
+    def __init__(self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, gelu: bool = False) -> None:
         """Pack a layer.
 
         Args:
             linear: the layer.
             dtype: of the weights, float32 or bfloat16; what goes in and comes out has one type, float32 or this.
-            many: there are always many rows: one product for all of them.
             gelu: GELU follows, in the same pass.
         """
         super().__init__()
         self.dtype = dtype
-        self.many = many
         self.activation = "gelu" if gelu else "none"
-        self.width = linear.out_features
         self.packed: Tensor = torch.ops.mkldnn._reorder_linear_weight(linear.weight.detach().to(dtype), None)
-        biased = linear.bias is not None  # pyright: ignore[reportUnnecessaryComparison]
-        self.bias: Tensor | None = linear.bias.detach().to(dtype) if biased else None
+        bias = _bias(linear)
+        self.bias = None if bias is None else bias.to(dtype)
 
     def forward(self, x: Tensor) -> Tensor:
         """(…, in) -> (…, out), no gradient."""
-        if self.many:
-            return self._product(x.to(self.dtype)).to(x.dtype)
-        rows = x.reshape(-1, x.shape[-1]).to(self.dtype)
-        if len(rows) == 0:
-            return x.new_zeros(*x.shape[:-1], self.width)
-        block = _BLOCK if self.dtype == torch.bfloat16 else max(2, len(rows))
-        padded = F.pad(rows, (0, 0, 0, -len(rows) % block))
-        products = [self._product(padded[i : i + block]) for i in range(0, len(padded), block)]
-        product = products[0] if len(products) == 1 else torch.cat(products)
-        return product[: len(rows)].to(x.dtype).view(*x.shape[:-1], self.width)
+        if x.numel() == x.shape[-1] and self.dtype == torch.float32:
+            two = self._product(x.reshape(1, -1).expand(2, -1))
+            return two[0].view(*x.shape[:-1], -1)
+        return self._product(x.to(self.dtype)).to(x.dtype)
 
     def _product(self, x: Tensor) -> Tensor:
         return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, self.activation, [], "none")
+
+
+class GroupedLinear(nn.Module):
+    """The inference twin of a linear layer for sessions that come and go: their number changes nobody's bits.
+
+    (S, R, in) are S sessions of R rows; every product has the rows of `group` sessions, made up with zeros where there
+    are fewer. More sessions in a group share one reading of the weights; a session that is alone pays for all of them.
+    (R, in) is a product of its own.
+    """
+
+    def __init__(self, linear: nn.Linear, dtype: torch.dtype = torch.float32, *, group: int = 1) -> None:
+        """Pack a layer.
+
+        Args:
+            linear: the layer.
+            dtype: of the weights where they are many (`SMALL`), float32 or bfloat16; what goes in and comes out is
+                float32.
+            group: sessions of one product.
+        """
+        super().__init__()
+        self.group = group
+        self.bias = _bias(linear)
+        self.columns: Tensor | None = None  # (in, out)
+        self.packed: PackedLinear | None = None
+        if linear.weight.numel() <= SMALL:
+            self.columns = linear.weight.detach().float().T.contiguous()
+        else:
+            self.packed = PackedLinear(linear, dtype)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(S, R, in) -> (S, R, out), or (R, in) -> (R, out); no gradient."""
+        if x.ndim == 2:
+            return self._product(x)
+        if len(x) == self.group:
+            return self._product(x.flatten(0, 1)).view(*x.shape[:2], -1)
+        whole = F.pad(x, (0, 0, 0, 0, 0, -len(x) % self.group)).view(-1, self.group * x.shape[1], x.shape[2])
+        products = torch.stack([self._product(part) for part in whole])
+        return products.view(-1, x.shape[1], products.shape[-1])[: len(x)]
+
+    def _product(self, x: Tensor) -> Tensor:
+        if self.packed is not None:
+            return self.packed(x)
+        assert self.columns is not None
+        return x @ self.columns if self.bias is None else torch.addmm(self.bias, x, self.columns)
+
+
+def is_small(module: nn.Module) -> bool:
+    """Whether all matrices are: then products of a session each, on one thread, lose next to nothing."""
+    return all(part.weight.numel() <= SMALL for part in module.modules() if isinstance(part, nn.Linear))
 
 
 def can_pack(module: nn.Module) -> bool:
@@ -62,11 +106,23 @@ def can_pack(module: nn.Module) -> bool:
     return torch.backends.mkldnn.is_available() and all(p.device.type == "cpu" for p in module.parameters())
 
 
-def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, many: bool = False) -> None:
-    """Replace every linear layer in `module` where that can be done (`can_pack`); elsewhere nothing changes."""
+def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, group: int | None = None) -> None:
+    """Replace every linear layer in `module` where that can be done (`can_pack`); elsewhere nothing changes.
+
+    Args:
+        module: changed in place.
+        dtype: of the weights.
+        group: None = `PackedLinear`, else `GroupedLinear` of so many sessions.
+    """
     if not can_pack(module):
         return
     for parent in list(module.modules()):
         for name, child in list(parent.named_children()):
             if isinstance(child, nn.Linear):
-                setattr(parent, name, PackedLinear(child, dtype, many=many))
+                packed = PackedLinear(child, dtype) if group is None else GroupedLinear(child, dtype, group=group)
+                setattr(parent, name, packed)
+
+
+def _bias(linear: nn.Linear) -> Tensor | None:
+    biased = linear.bias is not None  # pyright: ignore[reportUnnecessaryComparison]
+    return linear.bias.detach() if biased else None

@@ -128,18 +128,19 @@ class Block(nn.Module):
         """(B, S, w) -> (B, S, w), or the first `rows` of it, which read all S."""
         if self.norm_first:
             x = x[:, :rows] + self._drop(self.attention(self.norm1(x), mask, rows))
-            return x + self._feedforward(self.norm2(x))
+            return x + self.feedforward(self.norm2(x))
         x = self.norm1(x[:, :rows] + self._drop(self.attention(x, mask, rows)))
-        return self.norm2(x + self._feedforward(x))
+        return self.norm2(x + self.feedforward(x))
 
     def pack(self, dtype: torch.dtype) -> None:
         """Pack the matrices for inference on a CPU, GELU into the first of the feed-forward."""
         if isinstance(self.wide, nn.Linear):
-            self.wide, self.gelu = PackedLinear(self.wide, dtype, many=True, gelu=True), nn.Identity()
+            self.wide, self.gelu = PackedLinear(self.wide, dtype, gelu=True), nn.Identity()
         self.attention.packed = True
-        pack_linears(self, dtype, many=True)
+        pack_linears(self, dtype)
 
-    def _feedforward(self, x: Tensor) -> Tensor:
+    def feedforward(self, x: Tensor) -> Tensor:
+        """The second half of the block: (…, w) -> (…, w), no norm and no residual."""
         return self._drop(self.narrow(self._drop(self.gelu(self.wide(x)))))
 
     def _drop(self, x: Tensor) -> Tensor:

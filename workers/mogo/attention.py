@@ -14,7 +14,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-_HIDDEN = -1e30
+HIDDEN = -1e30
+"""Added to the score of what may not be read."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,16 @@ class Reach:
     prompts: int  # P
     to_prompt: Tensor  # (1 or N, n) int64: relative distance of each frame to position 0
     hidden: Tensor  # (1 or N, 1, n, P + n) bool: prompts and later frames that a frame may not read
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Where S sessions stand in what they remember: worked out once a frame, for all layers."""
+
+    rows: Tensor  # (S,) 0 … S - 1
+    newest: Tensor  # (S,) int64: the slot of the newest frame
+    distance: Tensor  # (S, 1, 1, slots) int64: relative distance of each slot
+    hidden: Tensor  # (S, 1, 1, slots): `HIDDEN` where nothing may be read, else 0
 
 
 class RelativeAttention(nn.Module):
@@ -52,13 +63,17 @@ class RelativeAttention(nn.Module):
 
     def forward(self, x: Tensor, terms: Tensor, reach: Reach) -> Tensor:
         """Whole sequences (N, P + n, w) -> (N, P + n, w)."""
-        query, key, value = (part.transpose(1, 2) for part in self.project(x))  # (N, H, P + n, w / H)
+        return self.out(self.mix(*self.project(x), terms, reach))
+
+    def mix(self, query: Tensor, key: Tensor, value: Tensor, terms: Tensor, reach: Reach) -> Tensor:
+        """What each position reads (N, P + n, w) from `project`'s (N, P + n, H, w / H)."""
+        query, key, value = (part.transpose(1, 2) for part in (query, key, value))  # (N, H, P + n, w / H)
         frames = query[:, :, reach.prompts :]
         bias = self._positions(frames, terms, reach)
         scores = (frames + self._heads(self.u)) @ key.transpose(2, 3) * frames.shape[-1] ** -0.5 + bias
-        weights = scores.masked_fill(reach.hidden, _HIDDEN).float().softmax(-1).to(value.dtype)
+        weights = scores.masked_fill(reach.hidden, HIDDEN).float().softmax(-1).to(value.dtype)
         mixed = torch.cat([value[:, :, : reach.prompts], weights @ value], 2)  # a prompt reads itself
-        return self.out(mixed.transpose(1, 2).reshape(x.shape))
+        return mixed.transpose(1, 2).flatten(2)
 
     def _positions(self, query: Tensor, terms: Tensor, reach: Reach) -> Tensor:
         """(q_i + v)·φ_{i−j} of frames (N, H, n, w / H) over prompts and frames: (N, H, n, P + n)."""
@@ -71,26 +86,29 @@ class RelativeAttention(nn.Module):
         shifted = F.pad(among, (1, 0)).view(*among.shape[:2], size + 1, size)[:, :, 1:]
         return torch.cat([to_prompt, shifted], -1)
 
-    def look_back(self, query: Tensor, key: Tensor, value: Tensor, terms: Tensor, distance: Tensor) -> Tensor:
-        """One new position of S sessions, L lanes each, over cached slots: (S, L, w).
+    def look_back(self, x: Tensor, memory: Tensor, terms: Tensor, slots: Slots) -> Tensor:
+        """One new position of S sessions, L lanes each, over what they remember: (S, L, w) -> (S, L, w).
 
         Args:
-            query: (S, L, H, w / H).
-            key: (S, L, H, slots, w / H), the new position's own among them.
-            value: like `key`.
+            x: (S, L, w).
+            memory: (2, S, H, L, slots, w / H) keys and values; the new position's are put into it.
             terms: from `terms`.
-            distance: (S, slots) int64 relative distance of each slot, -1 where nothing may be read.
+            slots: where the sessions stand.
         """
-        sessions, lanes, heads, width = query.shape
-        about = (query + self.v.view(heads, width)).transpose(1, 2)  # (S, H, L, w / H)
+        sessions, lanes, _ = x.shape
+        qkv = self.qkv(x).view(sessions, lanes, 3, self.heads, -1).permute(0, 2, 3, 1, 4)  # (S, 3, H, L, w / H)
+        query = qkv[:, 0]
+        memory[:, slots.rows, :, :, slots.newest] = qkv[:, 1:]
         # session by session: with more rows some processors' products add in another order
-        positions = torch.stack([torch.bmm(each, terms) for each in about]).transpose(1, 2)  # (S, L, H, D + 1)
-        index = distance.clamp(min=0)[:, None, None].expand(-1, lanes, heads, -1)
-        bias = positions.gather(-1, index).masked_fill((distance < 0)[:, None, None], _HIDDEN)  # (S, L, H, slots)
-        content = (query + self.u.view(heads, width)) * width**-0.5
-        scores = (content[..., None, :] @ key.transpose(-1, -2)).squeeze(-2) + bias
-        mixed = scores.float().softmax(-1).to(value.dtype)[..., None, :] @ value  # (S, L, H, 1, w / H)
-        return self.out(mixed.reshape(sessions, lanes, -1))
+        positions = torch.stack([torch.bmm(each, terms) for each in query + self._heads(self.v)])  # (S, H, L, D + 1)
+        bias = positions.gather(-1, slots.distance.expand(-1, self.heads, lanes, -1)) + slots.hidden
+        key, value = memory.flatten(1, 3)  # (S · H · L, slots, w / H)
+        content = (query + self._heads(self.u)).reshape(len(key), 1, -1)
+        scores = torch.baddbmm(
+            bias.view(len(key), 1, -1), content, key.transpose(1, 2), alpha=content.shape[-1] ** -0.5
+        )
+        mixed = torch.bmm(scores.softmax(-1), value).view(query.shape)
+        return self.out(mixed.transpose(1, 2).reshape(sessions, lanes, -1))
 
     def _heads(self, vector: Tensor) -> Tensor:
         return vector.view(1, self.heads, 1, -1)

@@ -17,7 +17,7 @@ from workers.generating.port import Control, Limits, NoControl, Request, open_bu
 from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
-from workers.mogo.streaming import Streams
+from workers.mogo.streaming import Streams, sessions_of_product
 from workers.mogo.tokenizer import Tokenizer
 
 MAX_SESSIONS = 32
@@ -177,7 +177,11 @@ class _Drawing:
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
         self.streams = Streams(
-            generator.transformer, max(1, min(MAX_SESSIONS, len(requests))), inference, dtype=generator.dtype
+            generator.transformer,
+            max(1, min(MAX_SESSIONS, len(requests))),
+            inference,
+            dtype=generator.dtype,
+            group=sessions_of_product(generator.transformer, MAX_SESSIONS),  # whatever the number: the same tokens
         )
         self._device, self._ends_from = generator.device, generator.config.min_frames
 

@@ -17,6 +17,7 @@ from shared.bundles import choose_bundle
 from shared.errors import InvalidBundle, InvalidInput
 from shared.motion.features import HeadingLayout
 from shared.motion.live import LiveMotion, LiveState
+from shared.nn.packed import is_small
 from shared.runtime.live.port import LiveFrame, Show
 from shared.settings import settings as configuration
 from shared.streams.frames import Frame
@@ -25,7 +26,7 @@ from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
 from workers.mogo.bundle import MODEL
 from workers.mogo.generate import Generator, Settings
-from workers.mogo.streaming import Streams
+from workers.mogo.streaming import Streams, sessions_of_product
 from workers.mogo.tokenizer import DecoderState
 
 
@@ -64,7 +65,8 @@ class LiveRoom:
         inference = (settings or Settings()).inference(generator.config.inference)
         self.skeleton = generator.layout.skeleton
         self.capacity = capacity
-        self._streams = Streams(generator.transformer, capacity, inference, dtype=generator.dtype)
+        group = sessions_of_product(generator.transformer, capacity)
+        self._streams = Streams(generator.transformer, capacity, inference, dtype=generator.dtype, group=group)
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # the session in each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)
@@ -248,6 +250,8 @@ def create_show() -> Show:
     if bundle.manifest.text is None:
         raise InvalidBundle("it does not read prompts", where=str(bundle.path))
     generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
+    if chosen.threads == 0 and is_small(generator.transformer):
+        torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(bundle.manifest.text)
     return Show(
         open_room=lambda slots: LiveRoom(generator, slots),

@@ -21,9 +21,10 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from shared.nn.convolution import frame_mask
-from shared.nn.transformer import Block, dropout, initialize, sinusoidal_positions
+from shared.nn.transformer import dropout, initialize, sinusoidal_positions
 from workers.mogo.attention import Reach, RelativeAttention
-from workers.mogo.config import DepthConfig, MOGOConfig, TransformerConfig
+from workers.mogo.config import MOGOConfig, TransformerConfig
+from workers.mogo.depth import DepthHead
 
 NOT_ASKED = -1
 """Target that counts in no loss."""
@@ -102,31 +103,6 @@ class Trunk(nn.Module):
     def layers(self) -> list[TrunkBlock]:
         """The blocks, typed."""
         return [block for block in self.blocks if isinstance(block, TrunkBlock)]
-
-
-class DepthHead(nn.Module):
-    """A small causal transformer across the levels of one frame (ours): level l sees the codes drawn below it."""
-
-    def __init__(self, config: DepthConfig, levels: int, width: int) -> None:
-        super().__init__()
-        self.state = nn.Linear(width, config.width)
-        self.code = nn.Linear(width, config.width, bias=False)
-        self.level = nn.Parameter(torch.randn(levels, config.width) * 0.02)
-        self.blocks = nn.ModuleList(
-            Block(config.width, config.heads, config.feedforward, 0.0, 0.0, norm_first=True)
-            for _ in range(config.layers)
-        )
-        self.norm = nn.LayerNorm(config.width)
-        self.leave = nn.Linear(config.width, width)
-
-    def forward(self, states: Tensor, below: Tensor) -> Tensor:
-        """States (N, L, w) of the levels 0 … L - 1 and embeddings (N, L - 1, w) of the codes below each: (N, L, w)."""
-        size = states.shape[1]
-        x = self.state(states) + self.level[:size] + F.pad(self.code(below), (0, 0, 1, 0))
-        mask = torch.ones(size, size, dtype=torch.bool, device=x.device).tril()[None, None]
-        for block in self.blocks:
-            x = block(x, mask)
-        return states + self.leave(self.norm(x)).float()
 
 
 class RQHCTransformer(nn.Module):

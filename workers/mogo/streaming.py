@@ -14,17 +14,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 from shared.errors import InvalidInput
-from shared.nn.packed import pack_linears
+from shared.nn.packed import is_small, pack_linears
 from shared.nn.sampling import guide, sample_top_k, uniform
-from workers.mogo.attention import RelativeAttention
+from workers.mogo.attention import HIDDEN, RelativeAttention, Slots
 from workers.mogo.config import InferenceConfig
+from workers.mogo.depth import DepthFrame
 from workers.mogo.model import RQHCTransformer
 
 NEVER = 2**62
 """More frames than any session makes."""
+MOST_GROUPED = 8
+"""Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
 TOKEN_STREAM = 4
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""
 
@@ -40,15 +44,13 @@ class StreamState:
     ended: Tensor  # (S,) bool: it drew END, and from then on columns of -1
     last: Tensor  # (S, V) int64, the newest column; -1 before the first
     opening: Tensor  # (S, L, w) states of position 0, from which frame 1 is drawn
-    keys: Tensor  # (layers, S, L, H, 1 + W, w / H)
-    values: Tensor  # like `keys`
+    memory: Tensor  # (layers, 2, S, H, L, 1 + W, w / H) keys and values
 
     @classmethod
     def empty(cls, model: RQHCTransformer, sessions: int, lanes: int, window: int) -> StreamState:
         """Room for so many sessions."""
         t, device = model.config.transformer, model.head.weight.device
         whole = torch.zeros(4, sessions, dtype=torch.long, device=device)
-        cache = torch.zeros(t.layers, sessions, lanes, t.heads, 1 + window, t.width // t.heads, device=device)
         return cls(
             seeds=whole[0],
             made=whole[1],
@@ -57,14 +59,18 @@ class StreamState:
             ended=whole[3].bool(),
             last=torch.full((sessions, model.levels), -1, device=device),
             opening=torch.zeros(sessions, lanes, t.width, device=device),
-            keys=cache,
-            values=torch.zeros_like(cache),
+            memory=torch.zeros(t.layers, 2, sessions, t.heads, lanes, 1 + window, t.width // t.heads, device=device),
         )
 
     def row(self, index: int) -> dict[str, Tensor]:
         """Views of one session's tensors."""
-        names = [f.name for f in fields(self)]
-        return {n: getattr(self, n)[:, index] if n in {"keys", "values"} else getattr(self, n)[index] for n in names}
+        rows = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "memory"}
+        return {**rows, "memory": self.memory[:, :, index]}
+
+
+def sessions_of_product(model: RQHCTransformer, sessions: int) -> int:
+    """`group` of `Streams` that serves up to so many `sessions` well: large weights are read once for all of them."""
+    return 1 if is_small(model) else min(sessions, MOST_GROUPED)
 
 
 class Streams:
@@ -77,6 +83,7 @@ class Streams:
         config: InferenceConfig | None = None,
         *,
         dtype: torch.dtype = torch.float32,
+        group: int = 1,
     ) -> None:
         """Make room for `capacity` sessions.
 
@@ -85,6 +92,7 @@ class Streams:
             capacity: sessions at most.
             config: None = the model's own.
             dtype: of the packed matrices on a CPU; bfloat16 halves what a frame reads.
+            group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
 
         Raises:
             InvalidInput: a window beyond what the model was trained for.
@@ -103,7 +111,7 @@ class Streams:
         self._started = 0
         self.blocks = self.model.trunk.layers
         self.terms = [block.attention.terms(self.model.trunk.sinusoids).contiguous() for block in self.blocks]
-        pack_linears(self.model, dtype)
+        pack_linears(self.model, dtype, group=group)
 
     def start(
         self, sentence: Tensor, seed: int, *, ends_from: int = NEVER, past: Tensor | None = None, skipped: int = 0
@@ -165,17 +173,12 @@ class Streams:
     def states(self) -> Tensor:
         """Trunk states (s, L, w) of the active rows, from which their next frame is drawn."""
         active, state = len(self.sessions), self.state
-        made, skipped = state.made[:active], state.skipped[:active]
-        slots = torch.arange(1, self.window + 1, device=made.device)
-        back = (made[:, None] - slots) % self.window  # (s, W): frames since the slot was written
-        back = back.masked_fill(back >= (made - skipped)[:, None], -1)
-        distance = torch.cat([made.clamp(max=self.farthest)[:, None], back], 1)  # (s, 1 + W)
-        # Before the first frame nothing is there to feed: the slot then written is overwritten before it is read.
-        slot = 1 + (made - 1) % self.window
+        slots = self._slots(active)
         x = self.model.columns(state.last[:active, None])[:, :, 0].repeat(1, self.branches, 1)  # (s, L, w)
         for layer, block in enumerate(self.blocks):
-            x = block(x, lambda h, i=layer, b=block: self._attend(i, b.attention, h, distance, slot))
-        return torch.where((made == 0)[:, None, None], state.opening[:active], self.model.trunk.norm(x))
+            memory, terms = state.memory[layer, :, :active], self.terms[layer]
+            x = block(x, lambda h, b=block, m=memory, t=terms: b.attention.look_back(h, m, t, slots))
+        return torch.where((state.made[:active] == 0)[:, None, None], state.opening[:active], self.model.trunk.norm(x))
 
     def accept(self, columns: Tensor) -> None:
         """Take columns (s, V) as the next frame of the active rows, drawn or known."""
@@ -204,11 +207,11 @@ class Streams:
 
     @torch.no_grad()
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:
-        """Write position 0, and behind it frames `past` (n, V), into a row's cache; one pass for all of it."""
+        """Write position 0, and behind it frames `past` (n, V), into a row's memory; one pass for all of it."""
         null = torch.arange(self.branches, device=past.device) > 0
         prompt = self.model.prompt(sentence.expand(self.branches, -1), null)[:, :, None]  # (branches, V, 1, w)
         frames = self.model.columns(past[None].expand(self.branches, -1, -1))  # (branches, V, n, w)
-        x = torch.cat([prompt, frames], 2).flatten(0, 1)  # (L, 1 + n, w)
+        x = torch.cat([prompt, frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
         skipped = self.state.skipped[row]
         reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
         position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1
@@ -216,43 +219,43 @@ class Streams:
         for layer, block in enumerate(self.blocks):
 
             def attend(h: Tensor, i: int = layer, attention: RelativeAttention = block.attention) -> Tensor:
-                _, key, value = attention.project(h)  # (L, 1 + n, H, w / H)
-                self.state.keys[i, row][:, :, slots] = key.transpose(1, 2)
-                self.state.values[i, row][:, :, slots] = value.transpose(1, 2)
-                return attention(h, self.terms[i], reach)
+                query, key, value = (part.unflatten(0, (-1, len(slots))) for part in attention.project(h))
+                for kept, part in zip(self.state.memory[i, :, row], (key, value), strict=True):
+                    kept[:, :, slots] = part.permute(2, 0, 1, 3)  # (L, 1 + n, H, w / H), heads first
+                return attention.out(attention.mix(query, key, value, self.terms[i], reach).flatten(0, 1))
 
             x = block(x, attend)
-        self.state.opening[row] = self.model.trunk.norm(x[:, 0])
+        self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, 0])
 
-    def _attend(self, layer: int, attention: RelativeAttention, x: Tensor, distance: Tensor, slot: Tensor) -> Tensor:
-        """Put the new position's keys and values into `slot` (s,) and read the cache: (s, L, w) -> (s, L, w)."""
-        query, key, value = attention.project(x)  # (s, L, H, w / H)
-        active = torch.arange(len(x), device=x.device)
-        keys, values = self.state.keys[layer, : len(x)], self.state.values[layer, : len(x)]
-        keys[active, :, :, slot] = key
-        values[active, :, :, slot] = value
-        return attention.look_back(query, keys, values, self.terms[layer], distance)
+    def _slots(self, active: int) -> Slots:
+        """Where the active rows stand. Slot p holds frame p, frame p + W, …; slot 0 the prompt."""
+        made, skipped = self.state.made[:active], self.state.skipped[:active]
+        places = torch.arange(1, self.window + 1, device=made.device)
+        back = (made[:, None] - places) % self.window  # (s, W): frames since the slot was written
+        hidden = F.pad((back >= (made - skipped)[:, None]) * HIDDEN, (1, 0))  # the prompt is always read
+        distance = torch.cat([made.clamp(max=self.farthest)[:, None], back], 1)  # (s, 1 + W)
+        # Before the first frame nothing is there to feed: the slot then written is overwritten before it is read.
+        newest = 1 + (made - 1) % self.window
+        return Slots(torch.arange(active, device=made.device), newest, distance[:, None, None], hidden[:, None, None])
 
     @torch.no_grad()
     def _draw(self, states: Tensor) -> Tensor:
-        """Columns (s, V) from trunk states (s, L, w), level by level."""
-        active, levels = len(states), self.model.levels
-        states = states.view(active * self.branches, levels, -1)
-        flat = self.model.score(states) if self.model.depth is None else None  # independent levels: one product
-        codes = self.state.last.new_zeros(active, 0)
-        ended = self.state.ended[:active]
+        """Columns (s, V) from trunk states (s, L, w), level by level where a level knows those below."""
+        active, levels, model = len(states), self.model.levels, self.model
         noise = self._noise(active)
-        for level in range(levels):
-            if flat is None:
-                below = codes.repeat_interleave(self.branches, 0)
-                refined = self.model.refine(states[:, : level + 1], below)[:, -1:]
-                logits = self.model.score(refined, level)[:, 0]
-            else:
-                logits = flat[:, level]
-            drawn = self._draw_level(logits.view(active, self.branches, -1), noise[:, level], level)
-            if level == 0:
-                ended |= drawn == self.model.end
-            codes = torch.cat([codes, drawn.clamp(max=self.model.codes - 1)[:, None]], 1)
+        states = states.view(active, self.branches, levels, -1)
+        if model.depth is None:
+            logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
+            drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
+        else:
+            frame, drawn = DepthFrame(model.depth, states), list[Tensor]()
+            for level in range(levels):
+                below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
+                logits = model.head(frame.next(below))[:, :, None]
+                drawn.append(self._pick(logits, noise[:, level : level + 1], level))
+        codes = torch.cat(drawn, 1)
+        ended = self.state.ended[:active]
+        ended |= codes[:, 0] == model.end
         return codes.masked_fill(ended[:, None], -1)
 
     def _noise(self, active: int) -> Tensor:
@@ -263,13 +266,13 @@ class Streams:
         crossed = uniform(self.state.seeds[:active], TOKEN_STREAM, 0, positions.flatten())
         return crossed.view(active, active, -1).diagonal().T
 
-    def _draw_level(self, logits: Tensor, noise: Tensor, level: int) -> Tensor:
-        """Codes (s,) of one level from logits (s, branches, K + 1) and random numbers (s,)."""
-        config, active = self.config, len(logits)
+    def _pick(self, logits: Tensor, noise: Tensor, level: int = 0) -> Tensor:
+        """Codes (s, n) of levels that are drawn alike, `level` the lowest, from logits (s, branches, n, K + 1) and
+        random numbers (s, n)."""
+        config = self.config
         guided = logits[:, 0] if self.branches == 1 else guide(logits[:, 0], logits[:, 1], config.guidance)
-        if level == 0:
-            may_end = self.state.made[:active] >= self.state.ends_from[:active]
-            guided[:, self.model.end] = guided[:, self.model.end].where(may_end, -torch.inf)
+        barred = self.state.made[: len(logits)] < (NEVER if level else self.state.ends_from[: len(logits)])
+        guided[..., self.model.end].masked_fill_(barred[:, None], -torch.inf)
         return sample_top_k(
             guided,
             noise,

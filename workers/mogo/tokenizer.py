@@ -47,8 +47,16 @@ class CausalConv(nn.Conv1d):
 
     def advance(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, C, T) behind `past` (B, C, reach) to (B, C', T) and the new past."""
+        one = x.shape[-1] == 1
         x = torch.cat([past, x], -1)
-        return self(x), x[..., x.shape[-1] - self.reach :]
+        return (self._last(x) if one and not self.training else self(x)), x[..., x.shape[-1] - self.reach :]
+
+    def _last(self, x: Tensor) -> Tensor:
+        """The one frame (B, C', 1) that (B, C, reach + 1) gives: products of a vector each, so that streams do not
+        change each other's bits, in a tenth of the time of a convolution."""
+        seen = x[..., :: self.dilation[0]].flatten(1)  # (B, C · kernel)
+        frames = [F.linear(each, self.weight.flatten(1), self.bias) for each in seen]
+        return torch.stack(frames)[..., None]
 
 
 class CausalBlock(nn.Module):
@@ -57,13 +65,14 @@ class CausalBlock(nn.Module):
     def __init__(self, width: int, dilation: int, dropout: float) -> None:
         super().__init__()
         self.wide = CausalConv(width, width, 3, dilation)
-        self.narrow = nn.Conv1d(width, width, 1)
+        self.narrow = CausalConv(width, width, 1)
         self.dropout = dropout
 
     def forward(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
         """(B, C, T) -> (B, C, T) and the new past."""
         h, past = self.wide.advance(F.relu(x), past)
-        return x + F.dropout(self.narrow(F.relu(h)), self.dropout, self.training), past
+        h, _ = self.narrow.advance(F.relu(h), h[..., :0])
+        return x + F.dropout(h, self.dropout, self.training), past
 
 
 class Encoder(nn.Module):
@@ -98,7 +107,7 @@ class Decoder(nn.Module):
 
     def start(self, batch: int) -> DecoderState:
         """Before the first frame: zeros, as if motionless latents of zero had come before."""
-        convolutions = [part for part in self.modules() if isinstance(part, CausalConv)]
+        convolutions = [part for part in self.modules() if isinstance(part, CausalConv) and part.reach]
         return DecoderState(tuple(c.weight.new_zeros(batch, c.in_channels, c.reach) for c in convolutions))
 
     def forward(self, x: Tensor, state: DecoderState) -> tuple[Tensor, DecoderState]:

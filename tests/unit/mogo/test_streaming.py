@@ -63,13 +63,14 @@ def test_a_session_draws_the_same_tokens_beside_others() -> None:
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
-def test_a_session_computes_the_same_bits_beside_others(dtype: torch.dtype) -> None:
+@pytest.mark.parametrize(("width", "group"), [(256, 1), (1024, 1), (1024, 8)])
+def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, dtype: torch.dtype) -> None:
     # wide enough for a plain product to take another kernel for one session than for many
-    wide = replace(TINY.transformer, width=256, heads=4, feedforward=512)
+    wide = replace(TINY.transformer, width=width, heads=4, feedforward=2 * width)
     model = transformer(replace(TINY, transformer=wide))
 
     def states_of(*seeds: int) -> torch.Tensor:
-        streams = Streams(model, len(seeds), dtype=dtype)
+        streams = Streams(model, len(seeds), dtype=dtype, group=group)
         for seed in seeds:
             streams.start(said(seed), seed)
         run(streams, 8)
@@ -126,16 +127,17 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
     before, other = streams.save(session), streams.save(beside)
     streams.steer(session, said(3))
     after = streams.save(session)
-    for name in ("keys", "values"):
-        assert torch.equal(after[name][..., 1:, :], before[name][..., 1:, :])
+    now, then = after["memory"], before["memory"]  # (layers, 2, H, L, 1 + W, w / H)
+    assert torch.equal(now[..., 1:, :], then[..., 1:, :])
+    for kind in range(2):
         for level in range(TINY.tokenizer.levels):
-            assert not torch.equal(after[name][:, level, :, 0], before[name][:, level, :, 0])
+            assert not torch.equal(now[:, kind, :, level, 0], then[:, kind, :, level, 0])
     for name in ("seeds", "made", "skipped", "ends_from", "ended", "last"):
         assert torch.equal(after[name], before[name])
     assert all(torch.equal(part, other[name]) for name, part in streams.save(beside).items())
     fresh = Streams(transformer(config), 1)
     expected = fresh.save(fresh.start(said(3), 5))
-    torch.testing.assert_close(after["keys"][..., 0, :], expected["keys"][..., 0, :])
+    torch.testing.assert_close(now[..., 0, :], expected["memory"][..., 0, :])
 
 
 def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
@@ -203,9 +205,9 @@ def test_frames_that_left_the_window_are_forgotten_and_the_prompt_is_not() -> No
 def test_endless_motion_needs_no_more_memory() -> None:
     streams = Streams(transformer(), 1)
     streams.start(said(1), 1)
-    addresses = (streams.state.keys.data_ptr(), streams.state.values.data_ptr())
+    address = streams.state.memory.data_ptr()
     run(streams, 5 * WINDOW)
-    assert (streams.state.keys.data_ptr(), streams.state.values.data_ptr()) == addresses
+    assert streams.state.memory.data_ptr() == address
     assert int(streams.state.made[0]) == 5 * WINDOW
 
 
