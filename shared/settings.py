@@ -70,6 +70,16 @@ class Settings(BaseSettings):
     drain_seconds: float = 300.0
     """A drain task claims nothing after this long and returns."""
 
+    rewriter: Literal["none", "rules", "openai"] | None = None
+    """Brings prompts into the words of captions before they are read; unset = what the bundle says, usually `none`.
+    The API and all workers need the same."""
+    rewriter_url: str = "https://api.openai.com/v1"
+    """Of `openai`: any endpoint that speaks `POST /chat/completions`."""
+    rewriter_model: str | None = None
+    rewriter_key: SecretStr | None = None
+    rewriter_seconds: float = Field(default=10.0, gt=0, le=60)
+    """For one prompt, with all tries; then it is read as it was written."""
+
     live_slots: int = 4
     """Live streams of one worker at once."""
     streams_per_key: int = 4
@@ -83,7 +93,7 @@ class Settings(BaseSettings):
     @model_validator(mode="before")
     @classmethod
     def _secrets_by_file(cls, values: dict[str, object]) -> dict[str, object]:
-        for name in ("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key"):
+        for name in ("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"):
             path = os.environ.get(f"MAREY_{name.upper()}_FILE")
             if path and name not in values:
                 values[name] = Path(path).read_text(encoding="utf-8").strip()

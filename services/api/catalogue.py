@@ -11,7 +11,7 @@ from shared.bundles import Bundle, TextSpec, choose_bundle, list_bundles
 from shared.errors import InvalidBundle, InvalidInput
 from shared.items import OUTPUT_FPS, SETTINGS
 from shared.settings import Settings
-from shared.text.keys import resolve
+from shared.text.keys import as_served, resolve
 
 FRESH_SECONDS = 5.0
 """A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""
@@ -77,7 +77,7 @@ def offer_of(bundle: Bundle, config: Settings) -> Offer:
             f"{manifest.name!r} is a {manifest.kind}, not a text-to-motion generator", where=str(bundle.path)
         )
     low, high = seconds_of(bundle)
-    return Offer(bundle, resolve(manifest.text, config=config), low, high)
+    return Offer(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:

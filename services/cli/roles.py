@@ -98,6 +98,7 @@ class OneShot:
             NotFound, InvalidBundle: weights are missing or damaged.
         """
         try:
+            from shared.text.keys import as_served
             from shared.text.pipeline import TextPipeline
 
             kind = import_module(GENERATORS[bundle.manifest.model]).Generator
@@ -106,7 +107,7 @@ class OneShot:
         if bundle.manifest.text is None:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
-        self._text = TextPipeline.load(bundle.manifest.text)
+        self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
         self._generator: Generator[Any] = kind.load(bundle, device=config.device, threads=threads_of(config, 1))
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:

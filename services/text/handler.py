@@ -8,6 +8,7 @@ from shared.bundles import TextSpec, find_bundle
 from shared.errors import InvalidBundle, MareyError
 from shared.jobs import TEXT_QUEUE, ClaimedItem
 from shared.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
+from shared.text.keys import as_served
 from shared.text.pipeline import TextPipeline
 
 BATCH = 64
@@ -34,7 +35,7 @@ class TextHandler:
         if spec is None:
             raise InvalidBundle("this bundle does not read prompts", where=bundle)
         if spec not in self._pipelines:
-            self._pipelines[spec] = TextPipeline.load(spec)
+            self._pipelines[spec] = TextPipeline.load(as_served(spec))
         self._pipeline = self._pipelines[spec]
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
@@ -44,6 +45,7 @@ class TextHandler:
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
         """The features of each prompt, as soon as they are made."""
         assert self._pipeline is not None  # the loop loads before it runs
+        self._pipeline.prefetch([item.prompt for item in batch.items if item.id not in control.dropped()])
         for done, item in enumerate(batch.items, 1):
             if item.id in control.dropped():
                 continue

@@ -15,6 +15,7 @@ from shared.bundles import TextSpec, choose_bundle
 from shared.errors import InvalidInput, Unreachable
 from shared.items import MODEL
 from shared.jobs import ApiKey
+from shared.text.keys import as_served
 from shared.text.prompts import check_prompt
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def pipeline_of(model: str) -> TextPipeline:
     if bundle.manifest.text is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="model", hint="Name a generator.")
     with _loading:
-        return _loaded(bundle.manifest.text.model_dump_json())
+        return _loaded(as_served(bundle.manifest.text).model_dump_json())
 
 
 @lru_cache(maxsize=4)

@@ -46,7 +46,9 @@ class TextSpec(_Frozen):
     width: int = Field(default=384, ge=1)
     labeller: str = "light"
     labeller_sha256: Sha256 | None = None
-    rewriter: Literal["none", "rules"] = "none"
+    rewriter: Literal["none", "rules", "openai"] = "none"
+    rewriter_model: str | None = None
+    """The language model of `openai`."""
     node_features: Literal["pooled", "span"] = "pooled"
     max_actions: int = Field(default=8, ge=1)
     max_specifics: int = Field(default=16, ge=1)

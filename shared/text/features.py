@@ -27,6 +27,7 @@ class TextFeatures:
     rewritten: str
     graph: SemanticGraph  # of the rewritten prompt
     nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
+    not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
 
     @property
     def sentence(self) -> NDArray[np.float16]:
@@ -36,6 +37,8 @@ class TextFeatures:
     def to_blob(self) -> bytes:
         """Safetensors fp16; prompt, rewritten prompt and graph stand in its metadata."""
         about = {"format": FORMAT, "prompt": self.prompt, "rewritten": self.rewritten, "graph": self.graph.to_json()}
+        if self.not_rewritten is not None:
+            about["not_rewritten"] = self.not_rewritten
         # one entry: safetensors writes several in random order, and equal features should be equal bytes
         metadata = {"features": json.dumps(about, ensure_ascii=False)}
         return save({"nodes": np.ascontiguousarray(self.nodes, dtype=np.float16)}, metadata=metadata)
@@ -55,7 +58,7 @@ class TextFeatures:
             graph = SemanticGraph.from_json(about["graph"])
             if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != len(graph.nodes):
                 raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {len(graph.nodes)} nodes")
-            return cls(about["prompt"], about["rewritten"], graph, nodes)
+            return cls(about["prompt"], about["rewritten"], graph, nodes, about.get("not_rewritten"))
         except (SafetensorError, ValueError, KeyError, TypeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",

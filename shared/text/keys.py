@@ -7,11 +7,11 @@ import json
 
 from shared.bundles import TextSpec, find_bundle
 from shared.errors import InvalidBundle
-from shared.settings import Settings
+from shared.settings import Settings, settings
 
 PIPELINE_VERSION = 1
 """Raise it when the graph or the node features of the same prompt change for any reason but weights."""
-REWRITER_VERSIONS = {"none": 1, "rules": 1}
+REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
 NO_LABELLER = "none"
 """A spec may say so: graphs are the motion node alone."""
@@ -35,12 +35,21 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
     parts = [
         PIPELINE_VERSION,
         prompt,
-        [spec.rewriter, REWRITER_VERSIONS[spec.rewriter]],
+        [spec.rewriter, REWRITER_VERSIONS[spec.rewriter], *([spec.rewriter_model] if spec.rewriter_model else [])],
         [spec.labeller, spec.labeller_sha256],
         [spec.encoder, spec.encoder_sha256, spec.width, spec.node_features],
         [spec.max_actions, spec.max_specifics],
     ]
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
+
+
+def as_served(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
+    """How this machine reads prompts for a bundle: with `MAREY_REWRITER` in place of the bundle's rewriter."""
+    config = config or settings()
+    if config.rewriter is None:
+        return spec
+    model = config.rewriter_model if config.rewriter == "openai" else None
+    return spec.model_copy(update={"rewriter": config.rewriter, "rewriter_model": model})
 
 
 def resolve(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:

@@ -20,7 +20,7 @@ from shared.text.guard import changed_meaning
 from shared.text.keys import NO_LABELLER, feature_key
 from shared.text.labellers import load_labeller
 from shared.text.prompts import check_prompt
-from shared.text.rewriters import PromptRewriter, load_rewriter
+from shared.text.rewriters import NotRewritten, PromptRewriter, load_rewriter
 from shared.text.roles import RoleLabeller
 
 if TYPE_CHECKING:
@@ -89,13 +89,27 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        return self._graphs([self.rewrite(check_prompt(prompt)) for prompt in prompts])
+        return self._graphs([text for text, _ in self._rewritten([check_prompt(prompt) for prompt in prompts])])
 
-    def rewrite(self, prompt: str) -> str:
-        """The prompt as the model reads it: rewritten, or as it is where the rewrite would say something else."""
-        rewritten = self.rewriter.rewrite(prompt)
+    def prefetch(self, prompts: Sequence[str]) -> None:
+        """Get ready to read these prompts one by one."""
+        self.rewriter.prefetch(prompts)
+
+    def _rewritten(self, prompts: Sequence[str]) -> list[tuple[str, str | None]]:
+        if len(prompts) > 1:
+            self.prefetch(prompts)
+        return [self.rewrite(prompt) for prompt in prompts]
+
+    def rewrite(self, prompt: str) -> tuple[str, str | None]:
+        """The prompt as the model reads it; and, where that is the prompt as it was written although the rewriter was
+        asked, why: the rewrite would say something else, or there is none."""
+        try:
+            rewritten = self.rewriter.rewrite(prompt)
+        except NotRewritten as error:
+            log.warning("a prompt was not rewritten: %s", error.message)
+            return prompt, error.message
         if rewritten == prompt:
-            return prompt
+            return prompt, None
         from shared.text.spelling import Speller
 
         if self._speller is None:
@@ -103,9 +117,9 @@ class TextPipeline:
         before, after = self._graphs([self._speller.correct(prompt), rewritten])
         reason = changed_meaning(before, after)
         if reason is None:
-            return rewritten
-        log.info("a rewrite was refused: %s", reason)
-        return prompt
+            return rewritten, None
+        log.info("a rewrite was refused")
+        return prompt, reason
 
     def features(self, prompts: Sequence[str]) -> list[TextFeatures]:
         """Graph and node vectors of each prompt.
@@ -114,10 +128,11 @@ class TextPipeline:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
         checked = [check_prompt(prompt) for prompt in prompts]
-        rewritten = [self.rewrite(prompt) for prompt in checked]
+        rewritten = self._rewritten(checked)
+        graphs = self._graphs([text for text, _ in rewritten])
         return [
-            TextFeatures(prompt, text, graph, self.encode(graph))
-            for prompt, text, graph in zip(checked, rewritten, self._graphs(rewritten), strict=True)
+            TextFeatures(prompt, text, graph, self.encode(graph), reason)
+            for prompt, (text, reason), graph in zip(checked, rewritten, graphs, strict=True)
         ]
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:

@@ -1,5 +1,5 @@
-"""Prompt rewriting: the port, `none` and `rules`. A rewriter that calls a language model has its place here too; its
-answer passes the same guard (`shared.text.guard`)."""
+"""Prompt rewriting: the port, `none` and `rules`; `openai` stands in `shared.text.openai_rewriter`. What any of them
+makes passes the same guard (`shared.text.guard`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from shared.errors import InvalidBundle
+from shared.errors import InvalidBundle, MareyError
+from shared.settings import settings
 from shared.text.roles import Frame, RoleLabeller
 from shared.text.words import SINGULAR, UNITS, bare, is_past, lemma, third_person
 
@@ -30,6 +31,10 @@ SPACED_UNITS = frozenset(UNITS) - {"in", "s", "x", "m", "min"} | {"m"}
 """Short forms understood after a space too: "5 in" may go on with "place"."""
 
 
+class NotRewritten(MareyError):
+    """A rewriter has nothing better for a prompt, which is then read as it was written."""
+
+
 class PromptRewriter(Protocol):
     """Brings a prompt closer to the captions a model was trained on (MOGO's TCA; SnapMoGen Tab. 6)."""
 
@@ -39,7 +44,11 @@ class PromptRewriter(Protocol):
         ...
 
     def rewrite(self, prompt: str) -> str:
-        """The rewritten prompt."""
+        """The rewritten prompt. Raises NotRewritten."""
+        ...
+
+    def prefetch(self, prompts: Sequence[str]) -> None:
+        """Get ready to rewrite these, if that is faster for several at once."""
         ...
 
 
@@ -51,6 +60,9 @@ class NoRewriter:
     def rewrite(self, prompt: str) -> str:
         """`prompt` itself."""
         return prompt
+
+    def prefetch(self, prompts: Sequence[str]) -> None:
+        """Nothing to do."""
 
 
 class RulesRewriter:
@@ -67,6 +79,9 @@ class RulesRewriter:
         words = expand_units(self._speller.correct(prompt).split())
         words = self._third_person(words)
         return " ".join(self._present_tense(words))
+
+    def prefetch(self, prompts: Sequence[str]) -> None:
+        """Nothing to do."""
 
     def _third_person(self, words: list[str]) -> list[str]:
         """I, you and imperatives become "a person"."""
@@ -147,6 +162,7 @@ def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
 
     Raises:
         InvalidBundle: there is none.
+        InvalidInput: `openai` without its settings.
     """
     if name == "none":
         return NoRewriter()
@@ -154,4 +170,8 @@ def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
         from shared.text.spelling import Speller
 
         return RulesRewriter(labeller, Speller.load())
-    raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules.")
+    if name == "openai":
+        from shared.text.openai_rewriter import Endpoint, OpenAIRewriter
+
+        return OpenAIRewriter(Endpoint.of(settings()))
+    raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules, openai.")

@@ -30,6 +30,7 @@ def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[
     return {
         "prompt": text.prompt,
         "rewritten": text.rewritten,
+        **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
         "graph": text.graph.to_json(),
         "model": bundle.manifest.model,
         "bundle": bundle.reference,

@@ -22,6 +22,7 @@ from shared.runtime.live.port import LiveFrame, Show
 from shared.settings import settings as configuration
 from shared.streams.frames import Frame
 from shared.text.features import TextFeatures
+from shared.text.keys import as_served
 from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
 from workers.mogo.bundle import MODEL
@@ -252,7 +253,7 @@ def create_show() -> Show:
     generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
     if chosen.threads == 0 and is_small(generator.transformer):
         torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
-    pipeline = TextPipeline.load(bundle.manifest.text)
+    pipeline = TextPipeline.load(as_served(bundle.manifest.text))
     return Show(
         open_room=lambda slots: LiveRoom(generator, slots),
         parse=lambda prompt: pipeline.features([prompt])[0],

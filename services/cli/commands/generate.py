@@ -74,11 +74,20 @@ def generate(
         for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
             line = _write(plan, clip, elapsed, chosen, output, name_template, kinds, overwrite=overwrite)
             bar.advance(task)
+            _tell_rewrite(clip)
             if as_json:
                 console.result_json(line)
             else:
                 for path in line["files"].values():
                     console.result(console.home_relative(path))
+
+
+def _tell_rewrite(clip: MotionClip) -> None:
+    about = clip.manifest
+    if about["rewritten"] != about["prompt"]:
+        console.say(f"{about['prompt']!r} was read as {about['rewritten']!r}.")
+    elif "not_rewritten" in about:
+        console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
 
 
 def _check(items: Iterable[Item], bundle: Bundle) -> None:

@@ -55,12 +55,13 @@ def serve() -> None:
 def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
     from shared.bundles import choose_bundle
     from shared.errors import InvalidInput
+    from shared.text.keys import as_served
     from shared.text.pipeline import TextPipeline
 
     spec = choose_bundle(model, verify=False).manifest.text
     if spec is None:
         raise InvalidInput(f"{model!r} does not read prompts", hint="Name a generator.")
-    pipeline = TextPipeline.load(spec)
+    pipeline = TextPipeline.load(as_served(spec))
     for start in range(0, len(texts), BATCH):
         for graph in pipeline.parse(texts[start : start + BATCH]):
             yield graph.to_json()
