@@ -1,4 +1,5 @@
-"""MOGO frame by frame with random weights: frames a second of one session and of several, windows, guidance, memory.
+"""MOGO frame by frame with random weights: frames a second of one session and of several, windows, guidance, cache,
+memory.
 
 `paper` on two CPU threads, as its goal is set; `starter` beside it, with the whole way to a finished frame (decoder,
 pose, feet), and the time to the first frame.
@@ -7,7 +8,9 @@ pose, feet), and the time to the first frame.
 from __future__ import annotations
 
 import resource
+import statistics
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +29,8 @@ from workers.mogo.streaming import Streams
 THREADS = 2
 FRAMES = 100
 """Of one measurement, behind a full window."""
+LENGTHS = (12, 49, 98, 196)
+"""Frames behind which one is drawn with and without cache."""
 ENDLESS = 10_000
 
 
@@ -41,36 +46,61 @@ def main() -> None:
 
 
 def _paper(generator: Generator) -> None:
-    config = generator.config.inference
     runs: dict[str, Callable[[], object]] = {}
-    for name, settings, window in (
-        ("window 196 (goal: 30 frames/s)", Settings(guidance=1.0), 196),
-        ("window 98", Settings(guidance=1.0), 98),
-        ("window 196, guidance", Settings(guidance=3.0), 196),
+    for name, guidance, window in (
+        ("window 196 (goal: 30 frames/s)", 1.0, 196),
+        ("window 98", 1.0, 98),
+        ("window 196, guidance", 3.0, 196),
     ):
-        inference = replace(settings.inference(config), window=window)
-        streams = Streams(generator.transformer, 1, inference, dtype=generator.dtype)
-        streams.start(torch.zeros(generator.config.condition.text_width), 1)
+        streams = _streams(generator, guidance, window)
+        streams.start(_sentence(generator), 1)
         _run(streams.step, window)
         runs[name] = lambda streams=streams: _run(streams.step, FRAMES)
     timings = measure(runs, repeats=6, warm_up=0, seconds=120)
     rates = ", ".join(f"{t.name}: {FRAMES / t.median:.1f}" for t in timings)
-    note = f"Frames/s: {rates}. {generator.dtype}, {THREADS} threads."
+    note = f"Frames/s: {rates}. {generator.dtype}, {torch.get_num_threads()} threads."
     print(table(f"MOGO paper, tokens alone, {FRAMES} frames", timings, note=note))
+    _without_cache(generator)
+
+
+def _without_cache(generator: Generator) -> None:
+    """A frame behind so many others, against reading them all again for it (goal: 20 times at 196)."""
+    streams = _streams(generator, 1.0, max(LENGTHS))
+    codes = generator.config.tokenizer.codes
+    past = torch.randint(codes, (max(LENGTHS), generator.config.tokenizer.levels))
+
+    def again(frames: int) -> None:
+        streams.stop(streams.start(_sentence(generator), 1, past=past[:frames]))
+
+    for frames in LENGTHS:
+        cached = _streams(generator, 1.0, max(LENGTHS))
+        cached.start(_sentence(generator), 1, past=past[:frames])
+        runs = {"cached": cached.step, "read again": lambda frames=frames: again(frames)}
+        timings = measure(runs, repeats=7, seconds=30)
+        ratio = timings[1].median / timings[0].median
+        print(table(f"MOGO {generator.config.name}, frame {frames}", timings, note=f"{ratio:.1f} times as fast."))
 
 
 def _starter(generator: Generator) -> None:
-    runs: dict[str, Callable[[], object]] = {}
-    for sessions in (1, 4, 8):
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # as `marey worker` does for small networks
+    print(f"MOGO starter, finished frames, one thread, {FRAMES} of each session (goal of one: 100 frames/s)\n")
+    print("| sessions | frames/s of each | frames/s of all | 99th percentile of a step |\n|---|---|---|---|")
+    for sessions in (1, 2, 4, 8, 16, 32):
         room = LiveRoom(generator, sessions)
         for seed in range(sessions):
             room.start(_text(generator), seed)
         _run(room.step, generator.config.inference.window)
-        runs[f"{sessions} sessions"] = lambda room=room: _run(room.step, FRAMES)
-    timings = measure(runs, repeats=6, warm_up=0, seconds=60)
-    rates = ", ".join(f"{t.name}: {FRAMES / t.median:.0f}" for t in timings)
-    note = f"Frames/s of each session: {rates} (goal of one: 100)."
-    print(table(f"MOGO starter, finished frames, {FRAMES} of each", timings, note=note))
+        steps = sorted(_seconds(room.step) for _ in range(FRAMES))
+        rate = 1 / statistics.median(steps)
+        print(f"| {sessions} | {rate:.0f} | {rate * sessions:.0f} | {steps[int(0.99 * FRAMES)] * 1e3:.1f} ms |")
+    print()
+    _without_cache(generator)
+    _first_frame(generator)
+    torch.set_num_threads(threads)
+
+
+def _first_frame(generator: Generator) -> None:
     room, text = LiveRoom(generator, 1), _text(generator)
 
     def first() -> None:
@@ -84,6 +114,21 @@ def _starter(generator: Generator) -> None:
     before = _memory_mib()
     _run(room.step, ENDLESS)
     print(f"Memory over {ENDLESS} frames: {before:.1f} → {_memory_mib():.1f} MiB (resident, peak)\n")
+
+
+def _streams(generator: Generator, guidance: float, window: int) -> Streams:
+    inference = replace(Settings(guidance=guidance).inference(generator.config.inference), window=window)
+    return Streams(generator.transformer, 1, inference, dtype=generator.dtype)
+
+
+def _sentence(generator: Generator) -> torch.Tensor:
+    return torch.zeros(generator.config.condition.text_width)
+
+
+def _seconds(step: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    step()
+    return time.perf_counter() - began
 
 
 def _text(generator: Generator) -> TextFeatures:

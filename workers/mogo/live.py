@@ -251,7 +251,7 @@ def create_show() -> Show:
     if bundle.manifest.text is None:
         raise InvalidBundle("it does not read prompts", where=str(bundle.path))
     generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
-    if chosen.threads == 0 and is_small(generator.transformer):
+    if is_small(generator.transformer):
         torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(as_served(bundle.manifest.text))
     return Show(
