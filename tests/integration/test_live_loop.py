@@ -12,10 +12,12 @@ import sqlalchemy as sa
 
 from shared.jobs import StreamState, get_job, list_items, stream_prompts, transaction
 from shared.jobs.states import STREAM_TRANSITIONS, ItemState
+from shared.runtime.live import keeper
 from shared.runtime.live.port import LiveFrame
 from shared.runtime.queue import redis_client
 from shared.settings import Settings as Configuration
 from shared.storage import FolderStore
+from shared.streams.bell import Bell
 from shared.streams.control import Control
 from shared.streams.frames import Frame
 from tests.support.live_loop import LiveWorker, Studio
@@ -55,6 +57,19 @@ def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Itera
     yield begin
     for worker in workers:
         worker.stop()
+
+
+def test_a_worker_hears_that_a_stream_has_begun(
+    studio: Studio, start: Start, client: redis.Redis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keeper, "TAKE_SECONDS", 3600.0)  # after its first look at the rows it hears, or never knows
+    start()
+    first = studio.begin("a person walks")
+    Bell(client).ring()
+    studio.until(lambda: studio.row(first).state is StreamState.LIVE, "the first stream")
+    second = studio.begin("a person waves")
+    Bell(client).ring()
+    studio.until(lambda: studio.row(second).state is StreamState.LIVE, "the second stream")
 
 
 def whole(studio: Studio, stream: UUID) -> list[Frame]:

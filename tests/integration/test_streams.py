@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from shared.errors import Conflict, InvalidInput, Unreachable
 from shared.runtime.embedded import start_valkey
 from shared.runtime.queue import redis_client
+from shared.streams.bell import Bell
 from shared.streams.control import START, Control, ControlQueue
 from shared.streams.frames import Frame, decode_frame
 from shared.streams.redis import LEASE_MS, FrameStream, Gap, Lease, LeaseLost, StoredFrame
@@ -425,3 +426,24 @@ def test_a_redis_that_is_full_is_unreachable_and_what_stands_can_be_read(short_h
         with pytest.raises(Unreachable, match="Redis does not serve"):
             stream.write(lease, frames(1, 1))
         assert numbers(stream.reader().read()) == [0]
+
+
+def test_every_worker_hears_the_bell_once(client: redis.Redis) -> None:
+    ours, theirs = Bell(client), Bell(client)
+    ours.rang(), theirs.rang()
+    assert (ours.rang(), theirs.rang()) == (False, False)
+    Bell(client).ring()
+    assert (ours.rang(), theirs.rang()) == (True, True)
+    assert (ours.rang(), theirs.rang()) == (False, False)
+    Bell(client).ring()
+    Bell(client).ring()
+    assert (ours.rang(), ours.rang()) == (True, False)
+
+
+def test_a_bell_without_redis_says_so(tmp_path: Path) -> None:
+    server = start_valkey(tmp_path)
+    with redis_client(server.url) as client:
+        server.stop()
+        for use in (Bell(client).ring, Bell(client).rang):
+            with pytest.raises(Unreachable):
+                use()

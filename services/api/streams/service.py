@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from uuid import UUID
 
 import sqlalchemy as sa
+import structlog
 
 from services.api.catalogue import Catalogue, Offer
 from services.api.context import Context
@@ -25,7 +26,10 @@ from shared.jobs import (
     transaction,
 )
 from shared.jobs.states import OPEN_STREAMS
+from shared.streams.bell import Bell
 from shared.streams.control import Control, ControlQueue
+
+log = structlog.get_logger(__name__)
 
 STOPPED = "stopped"
 NEVER_TAKEN = 0
@@ -52,11 +56,16 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
         InvalidInput: of a prompt, name, seed or setting that cannot be used, or a model that cannot stream.
         Busy: the key has as many as it may.
     """
-    hub_of(shared)
+    hub = hub_of(shared)
     new = _new_stream(key, body, shared.catalogue)
     with transaction(shared.engine) as conn:
         stream = create_stream(conn, new, limit=shared.config.streams_per_key)
-        return detail(conn, shared, get_stream(conn, key.tenant, stream))
+        view = detail(conn, shared, get_stream(conn, key.tenant, stream))
+    try:
+        Bell(hub.redis).ring()
+    except Unreachable as error:  # workers find the row without it
+        log.warning("not_rung", stream=str(stream), error=error.message)
+    return view
 
 
 def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetailView:

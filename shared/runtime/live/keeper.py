@@ -33,6 +33,7 @@ from shared.runtime.live.held import Held
 from shared.runtime.live.loop import LiveLoop, Over
 from shared.runtime.live.port import Parse, Room
 from shared.runtime.logs import logger
+from shared.streams.bell import Bell
 from shared.streams.control import Control, ControlQueue
 from shared.streams.recording import Recording
 from shared.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
@@ -75,9 +76,11 @@ class Keeper(threading.Thread):
         self._idle_seconds = idle_seconds
         self._stopping = stopping
         self._over: queue.SimpleQueue[Over] = queue.SimpleQueue()
+        self._bell = Bell(client)
         self._held: dict[str, Held] = {}
         self._rounds = (
             _Round(self._listen, LISTEN_SECONDS),
+            _Round(self._answer, LISTEN_SECONDS),
             _Round(self._take, TAKE_SECONDS),
             _Round(self._record, RECORD_SECONDS),
         )
@@ -133,6 +136,10 @@ class Keeper(threading.Thread):
         log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
 
     # --- taking ---
+
+    def _answer(self) -> None:
+        if self._bell.rang():
+            self._take()
 
     def _take(self) -> None:
         if len(self._held) >= self._room.capacity:
