@@ -1,10 +1,9 @@
 """Train, cross-validate and pack the `light` role labeller.
 
-    python -m workers.training.labeller --gold srl-kit-dev.json --captions kit-captions.json -o models/srl-light
+    python -m workers.training.labeller --gold srl-kit-dev.json -o models/srl-light
 
-Minutes on one CPU core a head. With `--captions`, several heads label captions that nobody labelled, and the head that
-is shipped learns from those as well; in cross-validation its teachers know no more than it does. Folds are grouped by
-caption without case and punctuation; augmentation draws its phrases from the training folds alone.
+Minutes on one CPU core a head. Folds are grouped by caption without case and punctuation; augmentation draws its
+phrases from the training folds alone.
 """
 
 from __future__ import annotations
@@ -29,9 +28,8 @@ from shared.text.roles import Frame
 from workers.training.labeller_card import card
 from workers.training.labeller_data import corrected, distinct, fold_of, read_gold
 from workers.training.labeller_fit import FitConfig, fit, tag_set
-from workers.training.labeller_grammar import Example, Words
+from workers.training.labeller_grammar import Example
 from workers.training.labeller_score import Scores, confusions
-from workers.training.labeller_teach import Teachers, read_captions
 
 SOURCE = DataSource(
     name="AllenNLP SRL-BERT labels of 655 KIT-ML captions",
@@ -64,30 +62,16 @@ class Validation:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a head is made.
-
-    Attributes:
-        captions: for teachers to label; none = no teachers.
-        teachers: how many.
-    """
+    """How a head is made."""
 
     states: WordStates
     network: LightConfig
     config: FitConfig
     seed: int
-    captions: Sequence[Words] = ()
-    teachers: int = 4
 
     def make(self, gold: Sequence[Example]) -> LightNetwork:
-        """A head from annotated sentences alone, or with what heads made of them teach."""
-        train = corrected(gold)
-        if not self.captions:
-            return fit(train, self.states, self.network, self.config, self.seed)
-        seeds = range(self.seed + 1, self.seed + 1 + self.teachers)
-        heads = [fit(train, self.states, self.network, self.config, seed) for seed in seeds]
-        taught = Teachers(heads, self.states).label(self.captions)
-        _say(f"{self.teachers} teachers labelled {len(taught)} of {len(self.captions)} captions")
-        return fit(train, self.states, self.network, self.config, self.seed, taught=taught)
+        """A head from annotated sentences."""
+        return fit(corrected(gold), self.states, self.network, self.config, self.seed)
 
 
 def cross_validate(gold: Sequence[Example], recipe: Recipe, folds: int) -> Validation:
@@ -127,7 +111,7 @@ def pack(
     tensors = {name: value.numpy() for name, value in head.state_dict().items()}
     with BundleWriter(output, overwrite=True) as writer:
         writer.add_part("labeller", tensors)
-        writer.add_card(card(result, len(recipe.captions)))
+        writer.add_card(card(result))
         return writer.finish(
             name=output.name,
             version="1",
@@ -141,8 +125,6 @@ def pack(
             training={
                 "command": "python -m workers.training.labeller",
                 "seed": recipe.seed,
-                "teachers": recipe.teachers if recipe.captions else 0,
-                "captions": len(recipe.captions),
                 **asdict(recipe.config),
             },
         )
@@ -157,8 +139,6 @@ def main(arguments: list[str] | None = None) -> int:
     """The command line of this module; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m workers.training.labeller", description="Train the role labeller.")
     parser.add_argument("--gold", type=Path, required=True, help="srl-kit-dev.json")
-    parser.add_argument("--captions", type=Path, help="kit-captions.json: more captions, for teachers to label")
-    parser.add_argument("--teachers", type=int, default=Recipe.teachers)
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the bundle")
     parser.add_argument("--folds", type=int, default=5, help="0 = no cross-validation")
     parser.add_argument("--steps", type=int, default=FitConfig.steps)
@@ -173,9 +153,7 @@ def main(arguments: list[str] | None = None) -> int:
         minilm = find_weights("minilm")
         network = LightConfig(tags=tag_set(gold))
         states = WordStates(minilm, network.layers)
-        known = [example.words for example in gold]
-        captions = read_captions(options.captions, known) if options.captions else ()
-        recipe = Recipe(states, network, config, options.seed, captions, options.teachers)
+        recipe = Recipe(states, network, config, options.seed)
         result = None
         if options.folds:
             result = cross_validate(gold, recipe, options.folds)

@@ -23,7 +23,7 @@ their PropBank roles. Marey's semantic graphs are made of them. The network is `
 - Silver: sentences of a small grammar (`workers/training/labeller_grammar.py`) for what the captions hardly have:
   bows, waves, raised hands, punches, slashes, dances, styles, imperatives. It was written with the whole gold in
   sight, so the numbers below are a little kind to it.
-{taught}
+
 The weights are under Apache-2.0; MiniLM (all-MiniLM-L6-v2, Apache-2.0) is not part of them.
 
 ## Quality
@@ -39,21 +39,13 @@ The weights are under Apache-2.0; MiniLM (all-MiniLM-L6-v2, Apache-2.0) is not p
 
 ## How it was made
 
-    python -m workers.training.labeller --gold srl-kit-dev.json{option} -o models/srl-light
-"""
-TAUGHT = """- Taught: {captions} other captions of KIT Motion-Language, labelled by several heads together that were
-  trained on the gold with different seeds (in cross-validation on the training folds alone), where these were in no
-  doubt.
+    python -m workers.training.labeller --gold srl-kit-dev.json -o models/srl-light
 """
 
 
-def card(result: Validation | None, captions: int = 0) -> str:
-    """The card, with the scores of cross-validation where there are some; `captions` were given to teachers."""
-    return TEXT.format(
-        quality="Not measured." if result is None else _quality(result),
-        taught=TAUGHT.format(captions=captions) if captions else "",
-        option=" --captions kit-captions.json" if captions else "",
-    )
+def card(result: Validation | None) -> str:
+    """The card, with the scores of cross-validation where there are some."""
+    return TEXT.format(quality="Not measured." if result is None else _quality(result))
 
 
 def _quality(result: Validation) -> str:

@@ -30,8 +30,6 @@ class FitConfig:
     grammar: int = 1000  # silver sentences
     gold_weight: float = 2.0
     grammar_weight: float = 0.7
-    taught_weight: float = 0.5  # of captions that teachers labelled
-    taught_steps: int = 1600  # where there are such
     predicate_weight: float = 2.0
     average: float = 0.995
 
@@ -91,13 +89,10 @@ def fit(
     config: FitConfig,
     seed: int,
     progress: Callable[[int, float], None] | None = None,
-    *,
-    taught: Sequence[Example] = (),
 ) -> LightNetwork:
     """Train a head on `gold`, its variants and the grammar; the weights are an average over the run.
 
     Args:
-        taught: captions that teachers labelled.
         progress: called with the step and its loss.
     """
     torch.manual_seed(seed)
@@ -106,10 +101,9 @@ def fit(
     average = [weight.detach().clone() for weight in network.parameters()]
     allowed = torch.tensor(transition_scores(network_config.tags), dtype=torch.float32)
     optimizer = torch.optim.AdamW(network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
-    steps = config.taught_steps if taught else config.steps
-    batches = _batches(gold, taught, states, network_config, config, rng)
-    for step, batch in enumerate(itertools.islice(batches, steps)):
-        done = step / steps
+    batches = _batches(gold, states, network_config, config, rng)
+    for step, batch in enumerate(itertools.islice(batches, config.steps)):
+        done = step / config.steps
         for parameters in optimizer.param_groups:
             parameters["lr"] = config.learning_rate * _schedule(done)
         loss = _loss(network, batch, allowed, config.predicate_weight)
@@ -135,7 +129,6 @@ def _schedule(done: float) -> float:
 
 def _batches(
     gold: Sequence[Example],
-    taught: Sequence[Example],
     states: WordStates,
     network: LightConfig,
     config: FitConfig,
@@ -145,7 +138,6 @@ def _batches(
     pool = [(example, config.gold_weight) for example in gold]
     pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in gold]
     pool += [(augmenter.noise(sentence(rng)), config.grammar_weight) for _ in range(config.grammar)]
-    pool += [(augmenter.noise(example), config.taught_weight) for example in taught]
     encoded = [encode(example, states, network.tags) for example, _ in pool]
     weights = [weight for _, weight in pool]
     while True:

@@ -22,7 +22,6 @@ from workers.training.labeller_data import Augmenter, corrected, distinct, fold_
 from workers.training.labeller_fit import FitConfig, fit, tag_set
 from workers.training.labeller_grammar import Example, sentence
 from workers.training.labeller_score import Scores
-from workers.training.labeller_teach import Teachers, read_captions
 
 WALK = Example(
     ("A", "person", "slowly", "walks", "forward."),
@@ -192,25 +191,3 @@ def test_cross_validation_never_scores_a_caption_it_trained_on(
     assert trained[0] | trained[1] == everything
     assert not trained[0] & trained[1]
     assert "2-fold" in card(result)
-
-
-def test_teachers_label_what_they_are_sure_of_and_a_head_learns_from_it(tiny: LightConfig, states: WordStates) -> None:
-    config = FitConfig(steps=120, taught_steps=120, batch=8, variants=0, grammar=0)
-    heads = [fit([WALK, WAVE], states, tiny, config, seed) for seed in (1, 2)]
-    teachers = Teachers(heads, states)
-    assert teachers.label([WALK.words, WAVE.words]) == [WALK, WAVE]
-    lone = LightLabeller(heads[0], states, "")
-    frames, certainty = Teachers(heads[:1], states).frames(WAVE.words)
-    assert frames == lone.frames(WAVE.words)
-    assert 0 < certainty <= 0.5
-    pupil = fit([WALK], states, tiny, config, 3, taught=teachers.label([WAVE.words]))
-    assert LightLabeller(pupil, states, "").label([WAVE.words]) == [WAVE.frames]
-
-
-def test_captions_for_teachers_are_single_sentences_that_nobody_labelled(tmp_path: Path) -> None:
-    file = tmp_path / "captions.json"
-    file.write_text(json.dumps(["He bows.", "he bows", "Someone waves his left hand!", "He runs. He stops.", "x"]))
-    assert read_captions(file, [WAVE.words]) == [("He", "bows.")]
-    file.write_text("3")
-    with pytest.raises(InvalidFile):
-        read_captions(file, [])
