@@ -63,4 +63,4 @@ def across(joints: Array, skeleton: Skeleton, *, hips: float = 1.0) -> Array:
 def facing(joints: Array, skeleton: Skeleton) -> Array:
     """Where the body looks: unit vectors (..., 3) in the floor plane, up x across."""
     right = across(joints, skeleton)
-    return normalize(cross(np.broadcast_to(UP, right.shape), right))
+    return normalize(cross(UP, right))

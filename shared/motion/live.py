@@ -1,8 +1,8 @@
-"""From a model's features to what drives a rig, frame by frame: decode, solve, lock the feet, solve again.
+"""From a model's features to what drives a rig, frame by frame: decode, fit the bones, lock the feet, solve.
 
 The live form of `finish.py`, for the layout's own rate. Joints of a decoder have bones that change a little from frame
-to frame; the first solution gives them the lengths of the skeleton, so that feet that are locked after it stay where
-they are in the second.
+to frame; they are put where the solver would put them, on bones of the skeleton's lengths, before the feet are locked:
+so locked feet stay where they are when it solves the pose.
 """
 
 from __future__ import annotations
@@ -29,9 +29,8 @@ class LiveState(Rows):
     """What the next frame of S streams needs to know."""
 
     root: RootState
-    decoded: PoseState
     feet: FeetState
-    final: PoseState
+    poses: PoseState
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +70,7 @@ class LiveMotion:
 
     def start(self, streams: int = 1) -> LiveState:
         """The state before the first frame."""
-        poses = self._poses.start(streams)
-        return LiveState(self._decoder.start(streams), poses, self._feet.start(streams), poses)
+        return LiveState(self._decoder.start(streams), self._feet.start(streams), self._poses.start(streams))
 
     def after(self, features: Array) -> LiveState:
         """The state of one stream behind frames that were made before, (T, D), T at least 1.
@@ -98,8 +96,9 @@ class LiveMotion:
             InvalidInput: wrong shape, numbers that are not finite, or a state of other streams.
         """
         decoded, root = self._decoder.step(features, state.root)
-        solved, first = self._poses.step(decoded, state.decoded)
-        joints, contacts, feet = self._feet.step(solved.joints, state.feet)
-        pose, final = self._poses.step(joints, state.final)
-        rotations, place, places = (values.astype(np.float32) for values in (pose.rotations, pose.root, pose.joints))
-        return LiveFrames(rotations, place, places, contacts), LiveState(root, first, feet, final)
+        joints, contacts, feet = self._feet.step(self._poses.places(decoded), state.feet)
+        pose, poses = self._poses.step(joints, state.poses)
+        rotations, place, places = (
+            np.ascontiguousarray(values, np.float32) for values in (pose.rotations, pose.root, pose.joints)
+        )
+        return LiveFrames(rotations, place, places, contacts), LiveState(root, feet, poses)

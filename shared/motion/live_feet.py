@@ -23,11 +23,12 @@ from shared.motion.feet import FLOOR_BAND, RELEASE, RULE, Bool, ContactRule, nee
 from shared.motion.kinematics import facing
 from shared.motion.legs import draw_foot, foot_chain, leg_lengths, soft_stretch, two_bone_knee
 from shared.motion.pose import checked_joints
-from shared.motion.rotations import Array
-from shared.motion.rows import Rows, choose
+from shared.motion.rotations import Array, length
+from shared.motion.rows import Rows
 from shared.motion.skeleton import Skeleton
 
-FLAT = [0, 2]  # X and Z: the floor plane
+FLAT = slice(0, 3, 2)  # X and Z: the floor plane
+TOES = slice(1, 4, 2)  # of ankles and toes in the order of `Skeleton.feet`
 STRAY = 0.10  # metres that a lock may move a toe by; a clip, which sees where the foot ends up, allows 0.15
 REACHED = 1e-6  # metres by which a held toe may miss its place
 GROUND_RISE = 0.02  # m/s at which the height of standing toes is let up, so that one low frame does not count for ever
@@ -66,13 +67,16 @@ class LiveFeet:
         self.fps = fps
         self.rule = rule
         ankle, toe = skeleton.rest[list(skeleton.feet[:2]), 1].astype(np.float64)
-        self._ankle_over_toe = ankle - toe
+        self._over_toe = np.array([ankle - toe, 0.0] * 2)  # (4,) heights in the T-pose, metres
+        self._low = np.array([rule.ankle_height, rule.toe_height] * 2)  # (4,)
         self._highest_ground = max(FLOOR_BAND[1], toe)
-        r_hip, l_hip = skeleton.facing[:2]
-        self._chains = [foot_chain(skeleton, toe) for toe in skeleton.feet[1::2]]
-        self._legs = [
-            [hip, skeleton.children[hip][0], chain[-1]] for hip, chain in zip((l_hip, r_hip), self._chains, strict=True)
-        ]
+        self._feet = np.array(skeleton.feet)
+        # Left and right are rows of one array: (2, n) toe, …, ankle, and (2, 3) hip, knee, ankle.
+        self._chains = np.array([foot_chain(skeleton, toe) for toe in skeleton.feet[TOES]])
+        hips = skeleton.facing[1::-1]
+        self._legs = np.array(
+            [[hip, skeleton.children[hip][0], chain[-1]] for hip, chain in zip(hips, self._chains, strict=True)]
+        )
 
     def start(self, streams: int = 1) -> FeetState:
         """The state before the first frame."""
@@ -99,22 +103,24 @@ class LiveFeet:
         before = checked_joints(joints, self.skeleton)
         if len(state) != len(before):
             raise InvalidInput(f"{len(before)} frames for the {len(state)} streams of the state", where="live feet")
-        places = before[:, list(self.skeleton.feet)]
+        places = before.take(self._feet, 1)
+        toes = places[:, TOES, FLAT]
         ground = self._ground(places, state)
         stay, enter = self._contacts(places, ground, state)
-        stands = np.where(state.stands, stay, enter)
-        locked, shift, start, age = self._shifts(before, places, stay, state)
-        joints = before.copy()
-        for side in range(2):
-            self._place(side, before, joints, shift[:, side])
-        barred = stay[:, 1::2] & (state.barred | (state.stands[:, 1::2] & ~locked))
-        stands[:, 1::2] = locked | (enter[:, 1::2] & ~barred)
+        stood, stands = state.stands[:, TOES], np.where(state.stands, stay, enter)
+        held = state.anchor - toes
+        fading, start, age = self._release(state)
+        locked, feet = self._lock(before, stood & stay[:, TOES], held, fading)
+        barred = stay[:, TOES] & (state.barred | (stood & ~locked))
+        stands[:, TOES] = locked | (enter[:, TOES] & ~barred)
         # A toe that is locked now keeps the place where this frame puts it, its leg's reach included.
-        toes = joints[:, list(self.skeleton.feet[1::2])][..., FLAT]
-        anchor = np.where(locked[..., None], state.anchor, toes)
-        shift = np.where(stands[:, 1::2, None], anchor - places[:, 1::2][..., FLAT], shift)
-        started = np.ones(len(joints), bool)
-        return joints, stands, FeetState(started, places, stands, barred, ground, anchor, shift, start, age)
+        hold = locked[..., None]
+        anchor = np.where(hold, state.anchor, feet[:, :, 0, FLAT])
+        shift = np.where(stands[:, TOES, None], anchor - toes, np.where(hold, held, fading))
+        start, age = np.where(hold, state.start, start), np.where(locked, RELEASE, age)
+        started = np.ones(len(before), bool)
+        state = FeetState(started, places, stands, barred, ground, anchor, shift, start, age)
+        return self._with_feet(before, feet), stands, state
 
     def run(self, joints: Array, state: FeetState) -> tuple[Array, Bool, FeetState]:
         """The next frames (T, J, 3) of one stream: the same, bit for bit, as T steps.
@@ -132,46 +138,61 @@ class LiveFeet:
 
     def _ground(self, places: Array, state: FeetState) -> Array:
         """(S,) the lowest that toes have stood, rising slowly; in `FLOOR_BAND`, or up to where the T-pose has them."""
-        lowest = np.clip(places[:, 1::2, 1].min(axis=1), FLOOR_BAND[0], self._highest_ground)
-        return choose(state.started, np.minimum(lowest, state.ground + GROUND_RISE / self.fps), lowest)
+        lower = np.minimum(places[:, 1, 1], places[:, 3, 1])
+        lowest = np.minimum(np.maximum(lower, FLOOR_BAND[0]), self._highest_ground)
+        return np.where(state.started, np.minimum(lowest, state.ground + GROUND_RISE / self.fps), lowest)
 
     def _contacts(self, places: Array, ground: Array, state: FeetState) -> tuple[Bool, Bool]:
         """(S, 4) feet that stand on if they stood, and that begin to if they did not."""
-        moved = np.linalg.norm(places - state.places, axis=-1) * self.fps
-        speed = choose(state.started, moved, 0.0 * moved)
-        over = np.array([self._ankle_over_toe, 0.0] * 2)
-        low = places[..., 1] - ground[:, None] - over < np.array([self.rule.ankle_height, self.rule.toe_height] * 2)
+        speed = np.where(state.started[:, None], length(places - state.places) * self.fps, 0.0)
+        low = places[..., 1] - ground[:, None] - self._over_toe < self._low
         return low & (speed < self.rule.leave_speed), low & (speed < self.rule.enter_speed)
 
-    def _shifts(self, joints: Array, places: Array, stay: Bool, state: FeetState) -> tuple[Bool, Array, Array, Array]:
-        """Which toes are held on (S, 2), and by what toes are moved: shift, its start and its age."""
-        held = state.anchor - places[:, 1::2][..., FLAT]
-        locked = state.stands[:, 1::2] & stay[:, 1::2] & (np.linalg.norm(held, axis=-1) <= STRAY)
-        for side in range(2):
-            locked[:, side] &= self._foot(side, joints, held[:, side])[1]
-        free = state.stands[:, 1::2] & ~locked
-        start = np.where(free[..., None], state.shift, state.start)
-        age = np.where(free, 0.0, state.age) + 1.0 / self.fps
-        age = np.where(locked, RELEASE, np.minimum(age, RELEASE))
+    def _release(self, state: FeetState) -> tuple[Array, Array, Array]:
+        """By what toes are moved that are not held (S, 2, 2), the shift that this fades from (S, 2, 2), since when."""
+        stood = state.stands[:, TOES]
+        start = np.where(stood[..., None], state.shift, state.start)
+        age = np.minimum(np.where(stood, 0.0, state.age) + 1.0 / self.fps, RELEASE)
         part = age / RELEASE
-        fading = start * (1.0 - part**2 * (3.0 - 2.0 * part))[..., None]
-        return locked, np.where(locked[..., None], held, fading), start, age
+        return start * (1.0 - part * part * (3.0 - 2.0 * part))[..., None], start, age
 
-    def _foot(self, side: int, joints: Array, shift: Array) -> tuple[Array, Bool]:
-        """A foot (S, n, 3), toe first, moved in the floor plane and out of the floor as far as its leg lets it; and
-        (S,) whether the leg lets its toe all the way."""
-        chain, leg = self._chains[side], joints[:, self._legs[side]]
-        foot = joints[:, chain].copy()
-        foot[..., FLAT] += shift[:, None]
-        foot[..., 1] += (over_floor(foot[:, 0, 1]) - foot[:, 0, 1])[:, None]
-        was, now = np.linalg.norm(leg[:, 2] - leg[:, 0], axis=1), np.linalg.norm(foot[:, -1] - leg[:, 0], axis=1)
-        thigh, shank = leg_lengths(leg)
-        drawn = draw_foot(foot, leg[:, 0], soft_stretch(was, now, thigh + shank), np.ones(len(foot)))
-        return drawn, np.linalg.norm(drawn[:, 0] - foot[:, 0], axis=1) < REACHED
+    def _lock(self, joints: Array, may: Bool, held: Array, fading: Array) -> tuple[Bool, Array]:
+        """Which toes are held on (S, 2), and feet (S, 2, n, 3), toe first, that are held or let go.
 
-    def _place(self, side: int, before: Array, joints: Array, shift: Array) -> None:
-        """Move one foot and have its leg follow, in place."""
-        leg = self._legs[side]
-        joints[:, self._chains[side]] = self._foot(side, before, shift)[0]
-        ahead = facing(before, self.skeleton)
-        joints[:, leg[1]] = two_bone_knee(before[:, leg], before[:, leg[0]], joints[:, leg[2]], ahead)
+        Args:
+            joints: (S, J, 3) as they came in.
+            may: (S, 2) toes that were held and are still low and slow.
+            held, fading: (S, 2, 2) what moves a toe, X and Z, when it is held and when it is not.
+        """
+        feet, reached = self._moved(joints, np.array([held, fading]))
+        locked: Bool = may & (length(held) <= STRAY) & reached[0]
+        free: Array = feet[1]
+        return locked, np.where(locked[..., None, None], feet[0], free)
+
+    def _moved(self, joints: Array, shifts: Array) -> tuple[Array, Bool]:
+        """Feet (W, S, 2, n, 3), toe first, moved in W ways in the floor plane and out of the floor as far as their legs
+        let them; and (W, S, 2) whether the legs let the toes all the way.
+
+        Args:
+            joints: (S, J, 3).
+            shifts: (W, S, 2, 2) X and Z.
+        """
+        legs = joints.take(self._legs, 1)
+        hips, ankles = legs[:, :, 0], legs[:, :, 2]
+        feet = np.repeat(joints.take(self._chains, 1)[None], len(shifts), axis=0)
+        feet[..., FLAT] += shifts[..., None, :]
+        height = feet[..., :1, 1]
+        feet[..., 1] += over_floor(height) - height
+        thigh, shank = leg_lengths(legs)
+        wanted = soft_stretch(length(ankles - hips), length(feet[..., -1, :] - hips), thigh + shank)
+        drawn = draw_foot(feet, hips[None], wanted, np.ones(wanted.shape))
+        return drawn, length(drawn[..., 0, :] - feet[..., 0, :]) < REACHED
+
+    def _with_feet(self, before: Array, feet: Array) -> Array:
+        """(S, J, 3) with the feet (S, 2, n, 3) where they were moved to, and knees that follow."""
+        legs, ankles = before.take(self._legs, 1), feet[:, :, -1]
+        joints = before.copy()
+        joints[:, self._chains] = feet
+        ahead = facing(before, self.skeleton)[:, None]
+        joints[:, self._legs[:, 1]] = two_bone_knee(legs, legs[:, :, 0], ankles, ahead)
+        return joints

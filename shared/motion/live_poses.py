@@ -15,6 +15,7 @@ frame, so the size of chunks changes no bit.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,8 @@ from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
 from shared.motion.pose import PLANE_PRIOR, Pose, checked_joints
-from shared.motion.rotations import Array
-from shared.motion.rows import Rows, choose
+from shared.motion.rotations import Array, dot
+from shared.motion.rows import Rows
 from shared.motion.skeleton import Skeleton
 from shared.motion.solver import FrameSolver
 
@@ -89,10 +90,18 @@ class LivePoses:
             raise InvalidInput(f"{len(joints)} frames for the {len(state)} streams of the state", where="live poses")
         past = _Past(state, self.fps)
         local, places = self._solver.solve(joints, past)
-        backwards = np.einsum("sji,sji->sj", local, state.rotations) < 0
-        first = _positive(local)
-        local = choose(state.started, np.where(backwards[..., None], -local, local), first)
+        # Signs follow the frame before; in a first one, w is positive.
+        behind = np.where(state.started[:, None], dot(local, state.rotations), local[..., 0]) < 0
+        local = np.where(behind[..., None], -local, local)
         return Pose(self.skeleton, local, joints[:, 0].copy(), places), past.after(local)
+
+    def places(self, joints: Array) -> Array:
+        """Where `step` puts joints (S, J, 3), in a fraction of its time: no state has a part in that.
+
+        Raises:
+            InvalidInput: wrong shape, or numbers that are not finite.
+        """
+        return self._solver.places(checked_joints(joints, self.skeleton))
 
     def run(self, joints: Array, state: PoseState) -> tuple[Pose, PoseState]:
         """The next frames (T, J, 3) of one stream: the same, bit for bit, as T steps.
@@ -115,7 +124,13 @@ class _Past:
     def __init__(self, state: PoseState, fps: float) -> None:
         self.state = state
         self.seconds = 1.0 / fps
-        self.seen, self.angle, self.speed = state.seen.copy(), state.angle.copy(), state.speed.copy()
+        # In a first frame, what went before weighs nothing.
+        keep = np.where(state.started, math.exp(-self.seconds / SEEN_SECONDS), 0.0)  # (S,)
+        self.decay = np.where(state.started, math.exp(-SPRING * self.seconds), 0.0)  # (S,)
+        self.unwound = np.where(state.started, math.exp(-self.seconds / UNTWIST_SECONDS), 0.0)  # (S,)
+        self.fresh = (1.0 - keep)[:, None]  # (S, 1)
+        self.seen = keep[:, None, None] * state.seen  # the part of what went before; `bend` adds that of this frame
+        self.angle, self.speed = state.angle.copy(), state.speed.copy()
         self.turned, self.turns = state.twist.copy(), state.turns.copy()
 
     def after(self, rotations: Array) -> PoseState:
@@ -124,36 +139,27 @@ class _Past:
         return PoseState(started, self.seen, self.angle, self.speed, self.turned, self.turns, rotations)
 
     def signs(self, q: Array) -> Array:
-        return _positive(q)
+        return np.where(q[..., :1] < 0, -q, q)
 
     def bend(self, limb: int, seen: Array) -> Array:
-        before, started = self.state, self.state.started
-        keep = np.exp(-self.seconds / SEEN_SECONDS)
-        mean = choose(started, keep * before.seen[:, limb] + (1 - keep) * seen, seen)
+        mean = self.seen[:, limb] + self.fresh * seen
         aim = np.arctan2(mean[:, 1], mean[:, 0] + PLANE_PRIOR)
         # The exact motion of a critically damped spring over one frame, on the circle: the shorter way round.
-        off = _principal(before.angle[:, limb] - aim)
-        decay = np.exp(-SPRING * self.seconds)
-        push = (before.speed[:, limb] + SPRING * off) * self.seconds
-        self.seen[:, limb] = mean
-        self.angle[:, limb] = choose(started, _principal(aim + (off + push) * decay), aim)
-        self.speed[:, limb] = choose(started, (before.speed[:, limb] - SPRING * push) * decay, 0.0 * aim)
-        return self.angle[:, limb]
+        off, speed = _principal(self.state.angle[:, limb] - aim), self.state.speed[:, limb]
+        push = (speed + SPRING * off) * self.seconds
+        angle = _principal(aim + (off + push) * self.decay)
+        self.seen[:, limb], self.angle[:, limb] = mean, angle
+        self.speed[:, limb] = (speed - SPRING * push) * self.decay
+        return angle
 
     def twist(self, chain: int, angles: Array) -> Array:
         now = _principal(angles)
-        passed = 2 * np.pi * np.round((self.state.twist[:, chain] - now) / (2 * np.pi))
-        decay = np.exp(-self.seconds / UNTWIST_SECONDS)
+        passed = 2 * np.pi * np.rint((self.state.twist[:, chain] - now) / (2 * np.pi))
         self.turned[:, chain] = now
-        self.turns[:, chain] = choose(self.state.started, decay * (self.state.turns[:, chain] + passed), 0.0 * now)
+        self.turns[:, chain] = self.unwound * (self.state.turns[:, chain] + passed)
         return now + self.turns[:, chain]
 
 
 def _principal(angles: Array) -> Array:
     """The same angles between -pi and pi."""
-    return angles - 2 * np.pi * np.round(angles / (2 * np.pi))
-
-
-def _positive(q: Array) -> Array:
-    """Quaternions (..., 4) with the sign of which w is not negative."""
-    return np.where(q[..., :1] < 0, -q, q)
+    return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))

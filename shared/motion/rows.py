@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shared.motion.rotations import Array
 
@@ -38,8 +37,3 @@ class Rows:
             return type(first).join(values) if isinstance(first, Rows) else np.concatenate(values)
 
         return cls(**{f.name: merge([getattr(state, f.name) for state in states]) for f in fields(cls)})
-
-
-def choose(mask: NDArray[np.bool_], yes: Array, no: Array) -> Array:
-    """`yes` (S, ...) in the rows where the mask (S,) holds, else `no`."""
-    return np.where(mask.reshape(-1, *[1] * (max(yes.ndim, no.ndim) - 1)), yes, no)

@@ -14,26 +14,35 @@ do not add up along a limb.
 
 Three things need more than one frame, and a `Moments` decides them: `pose.py` from a whole clip, `live_poses.py` from
 the past alone.
+
+What a single frame costs is numpy calls, not arithmetic. So joints that are ready at the same time and turn in the same
+way form a group that is turned at once: all rigid bodies, arms and legs, elbows and knees.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shared.motion.rigid import BodyFit, bodies_of
 from shared.motion.rotations import (
+    IDENTITY,
     Array,
+    aimed,
     between,
     conjugate,
     cross,
+    dot,
+    length,
     multiply,
     normalize,
     rotate,
-    unroll,
 )
 from shared.motion.skeleton import Skeleton
 
@@ -48,7 +57,7 @@ class Moments(Protocol):
     """How the rows of one call hang together: successive frames of a clip, or one frame each of live streams."""
 
     def signs(self, q: Array) -> Array:
-        """Rotations (T, 4) with the sign chosen of each."""
+        """Rotations (T, B, 4) of rigid bodies with the sign chosen of each."""
         ...
 
     def bend(self, limb: int, seen: Array) -> Array:
@@ -89,11 +98,12 @@ class FrameSolver:
         self.skeleton = skeleton
         self.offsets = skeleton.offsets.astype(np.float64)
         self.limbs = _limbs(skeleton.parents, skeleton.facing)
-        self._points = bodies_of(skeleton)
-        self._rest = {j: rest_vectors(skeleton, self.offsets, j, points) for j, points in self._points.items()}
-        chains = _spines(skeleton.parents, frozenset(self._points))
+        bodies = bodies_of(skeleton)
+        chains = _spines(skeleton.parents, frozenset(bodies))
         self.spines = tuple(chains[j] for j in sorted(chains))
-        self._parents = np.array([max(p, 0) for p in skeleton.parents])
+        self._parents = np.array(skeleton.parents)
+        self._bodies = BodyFit(skeleton, self.offsets, bodies) if bodies else None
+        self._groups = tuple(self._in_order(bodies))
 
     def solve(self, joints: Array, moments: Moments) -> tuple[Array, Array]:
         """Local rotations (T, J, 4), in any sign, and where they put the joints (T, J, 3).
@@ -102,175 +112,231 @@ class FrameSolver:
             joints: (T, J, 3) float64, finite.
             moments: how the rows hang together.
         """
-        world, places = _Pass(self, joints, moments).run()
-        local = multiply(conjugate(world[:, self._parents]), world)
-        local[:, 0] = world[:, 0]
-        return local, places
+        rows = _Rows(joints, moments)
+        if self._bodies:
+            rows.world[:, self._bodies.joints] = moments.signs(self._bodies.fit(joints))
+        for group in self._groups:
+            group.turn(rows)
+        local = multiply(conjugate(rows.world.take(self._parents, 1)), rows.world[:, :-1])
+        return np.ascontiguousarray(local), rows.places
 
-    def fit(self, j: int, joints: Array) -> Array:
-        """(T, 4) best rotation of a rigid body: its T-pose bones onto the bones as they are."""
-        return fit_rotation(self._rest[j], joints[:, self._points[j]] - joints[:, j : j + 1])
+    def places(self, joints: Array) -> Array:
+        """Where `solve` puts the joints (T, J, 3) whatever the moments are, in a fifth of its time.
 
-    def is_body(self, j: int) -> bool:
-        """Whether joint j carries several bones."""
-        return j in self._points
+        A rigid body carries its bones, every other bone points from where its joint comes to lie at where its child
+        should be, and no joint moves when a bone twists. (A joint with several bones that is no body, such as
+        SnapMoGen's pelvis, aims all of them here; `solve` can aim one.)
 
-
-class _Pass:
-    """One pass from the root outwards. `world` (T, J, 4) and `places` (T, J, 3) are filled joint by joint."""
-
-    def __init__(self, solver: FrameSolver, joints: Array, moments: Moments) -> None:
-        self.solver = solver
-        self.target = joints
-        self.moments = moments
-        self.tree = solver.skeleton
-        self.offsets = solver.offsets
-        self.world = np.empty((*joints.shape[:2], 4))
-        self.places = np.empty_like(joints)
-        self.places[:, 0] = joints[:, 0]
-
-    def run(self) -> tuple[Array, Array]:
-        limbs = {limb.upper: k for k, limb in enumerate(self.solver.limbs)}
-        spines = {chain[0]: k for k, chain in enumerate(self.solver.spines)}
-        in_spines = {j for chain in self.solver.spines for j in chain}
-        for j in range(len(self.tree)):
-            if j:
-                self.places[:, j] = self.places[:, self.tree.parents[j]] + rotate(
-                    self.world[:, self.tree.parents[j]], self.offsets[j]
-                )
-            if j in spines:
-                self._spine(spines[j])  # all of the chain at once
-            elif j in in_spines:
-                continue
-            elif self.solver.is_body(j):
-                self.world[:, j] = self._body(j)
-            elif j in limbs:
-                self._limb(limbs[j])
+        Args:
+            joints: (T, J, 3) float64, finite.
+        """
+        places = np.empty_like(joints)
+        places[:, 0] = joints[:, 0]
+        carried = self._bodies.carry(joints) if self._bodies else joints
+        for bones in self._bones:
+            above = places.take(bones.parents, 1)
+            if len(bones.carried):
+                places[:, bones.joints] = above + carried.take(bones.carried, 1)
             else:
-                self._swing(j)
-        return self.world, self.places
+                places[:, bones.joints] = above + bones.aim(joints.take(bones.joints, 1) - above)
+        return places
 
-    def _parent(self, j: int) -> Array:
-        """(T, 4) world rotation of the parent, the identity above the root."""
-        p = self.tree.parents[j]
-        return self.world[:, p] if p >= 0 else np.tile([1.0, 0.0, 0.0, 0.0], (len(self.target), 1))
+    def _in_order(self, bodies: Mapping[int, object]) -> Iterator[_Group]:
+        """Groups from the root outwards. Limbs wait until nothing else can be turned, so that the legs, which are ready
+        first, come with the arms; joints without children come last."""
+        limbs = {limb.upper: number for number, limb in enumerate(self.limbs)}
+        above = {j: child for chain in self.spines for j, child in pairwise(chain)}
+        tops = {chain[-2]: number for number, chain in enumerate(self.spines)}
+        children = self.skeleton.children
 
-    def _direction(self, j: int, child: int) -> Array:
-        """(T, 3) from where joint j lies to where its child should."""
-        return self.target[:, child] - self.places[:, j]
+        def rank(j: int) -> int:
+            return 0 if j in above else 1 if j in bodies else 3 if j in limbs else 2 if children[j] else 4
 
-    def _swing(self, j: int) -> None:
-        """The shortest way from the parent that aims the bone at the child."""
-        before = self._parent(j)
-        children = self.tree.children[j]
-        if children:
-            swing = between(rotate(before, self.offsets[children[0]]), self._direction(j, children[0]))
-            before = multiply(swing, before)
-        self.world[:, j] = before
+        for joints in _rounds(self.skeleton.parents, rank):
+            match rank(joints[0]):
+                case 0:
+                    yield _Swings(self, joints, [above[j] for j in joints])
+                    yield from (_Twists(self, tops[j]) for j in joints if j in tops)
+                case 1:
+                    yield _Bodies(self, joints)
+                case 2:
+                    yield _Swings(self, joints, [children[j][0] for j in joints])
+                case 3:
+                    yield _Limbs(self, [limbs[j] for j in joints])
+                case _:
+                    yield _Ends(self, joints)
 
-    def _body(self, j: int) -> Array:
-        return self.moments.signs(self.solver.fit(j, self.target))
+    @cached_property
+    def _bones(self) -> tuple[_Bones, ...]:
+        """Joints below the root, from there outwards: what bodies carry before what is aimed."""
+        children = self._bodies.children if self._bodies else []
+        _, *rounds = _rounds(self.skeleton.parents, lambda j: 0 if j in children else 1)
+        return tuple(_Bones(self, joints, children) for joints in rounds)
 
-    def _spine(self, number: int) -> None:
-        """Joints from below one rigid body up to the next, which share the twist between them."""
-        chain = self.solver.spines[number]
-        body = chain[-1]
-        self.world[:, body] = self._body(body)
-        before = self._parent(chain[0])
-        swings: list[Array] = []
-        for j, child in pairwise(chain):
-            if j != chain[0]:
-                self.places[:, j] = self.places[:, self.tree.parents[j]] + rotate(before, self.offsets[j])
-            before = multiply(between(rotate(before, self.offsets[child]), self._direction(j, child)), before)
-            swings.append(before)
-        rest = multiply(conjugate(before), self.world[:, body])
-        along = np.einsum("ti,i->t", rest[:, 1:], normalize(self.offsets[body]))
-        twist = self.moments.twist(number, 2 * np.arctan2(along, rest[:, 0]))
-        for k, (j, swing) in enumerate(zip(chain[:-1], swings, strict=True), start=1):
-            bone = normalize(self.offsets[chain[k]])
-            self.world[:, j] = multiply(swing, _turn(bone, twist * k / len(chain)))
 
-    def _limb(self, number: int) -> None:
-        """Upper arm or thigh: aimed at the hinge, and turned so that the hinge bends in its plane."""
-        limb = self.solver.limbs[number]
-        bone = normalize(self.offsets[limb.hinge])
-        neutral = normalize(np.array(limb.neutral))
-        upper, lower = self._direction(limb.upper, limb.hinge), self.target[:, limb.end] - self.target[:, limb.hinge]
-        upper, lower = normalize(upper), normalize(lower)
-        before = self._parent(limb.upper)
-        swing = multiply(between(rotate(before, neutral), upper), multiply(before, between(bone, neutral)))
-        rest = np.array(limb.normal) - bone * (bone @ limb.normal)
-        across = rotate(swing, normalize(rest))  # where the hinge's axis would be, square to `upper`
+def _rounds(parents: Sequence[int], rank: Callable[[int], int]) -> Iterator[list[int]]:
+    """Joints in lists, from the root outwards: of those whose parents were in lists before, all of the lowest rank."""
+    waiting, done = list(range(len(parents))), {-1}
+    while waiting:
+        ready = [j for j in waiting if parents[j] in done]
+        lowest = min(map(rank, ready))
+        done.update(j for j in ready if rank(j) == lowest)
+        yield [j for j in ready if j in done]
+        waiting = [j for j in waiting if j not in done]
+
+
+class _Rows:
+    """The T rows of one call, filled from the root outwards.
+
+    Attributes:
+        target: (T, J, 3) where joints should be.
+        places: (T, J, 3) where they come to lie.
+        world: (T, J + 1, 4) world rotations; the last is the identity, which stands for the parent of the root.
+    """
+
+    def __init__(self, target: Array, moments: Moments) -> None:
+        self.target = target
+        self.moments = moments
+        self.places = np.empty_like(target)
+        self.places[:, 0] = target[:, 0]
+        self.world = np.empty((len(target), target.shape[1] + 1, 4))
+        self.world[:, -1] = IDENTITY
+
+
+class _Joints:
+    """G joints that are done at once, after their parents."""
+
+    def __init__(self, solver: FrameSolver, joints: Sequence[int]) -> None:
+        self.joints = np.array(joints)  # (G,)
+        self.parents = np.array([solver.skeleton.parents[j] for j in joints])  # (G,)
+        self.offsets = solver.offsets[None, self.joints]  # (1, G, 3)
+
+
+class _Bones(_Joints):
+    """Joints at the ends of bones, which rigid bodies carry or which are aimed."""
+
+    def __init__(self, solver: FrameSolver, joints: Sequence[int], children: Sequence[int]) -> None:
+        super().__init__(solver, joints)
+        self.carried = np.array([children.index(j) for j in joints if j in children], np.intp)  # (G,), or none
+        self.lengths = length(self.offsets)[..., None]  # (1, G, 1)
+
+    def aim(self, ways: Array) -> Array:
+        """The bones (T, G, 3) on the ways (T, G, 3) from where they begin to where they should end; as in the T-pose
+        where a way has no length, so shows no direction."""
+        far = length(ways)[..., None]
+        seen = far > 0
+        return np.where(seen, ways * (self.lengths / np.where(seen, far, 1.0)), self.offsets)
+
+
+class _Group(_Joints):
+    """Joints that turn in the same way."""
+
+    def place(self, rows: _Rows) -> Array:
+        """Put the joints where their parents take them; (T, G, 4) the world rotations of those."""
+        before = rows.world.take(self.parents, 1)
+        if self.parents[0] >= 0:  # the root is where it should be
+            rows.places[:, self.joints] = rows.places.take(self.parents, 1) + rotate(before, self.offsets)
+        return before
+
+    def turn(self, rows: _Rows) -> None:
+        """Place and turn the joints."""
+        raise NotImplementedError
+
+
+class _Bodies(_Group):
+    """Rigid bodies, whose rotations are known from the start."""
+
+    def turn(self, rows: _Rows) -> None:
+        self.place(rows)
+
+
+class _Ends(_Group):
+    """Joints without children do not turn."""
+
+    def turn(self, rows: _Rows) -> None:
+        rows.world[:, self.joints] = self.place(rows)
+
+
+class _Swings(_Group):
+    """The shortest way from the parent that aims a bone at the child."""
+
+    def __init__(self, solver: FrameSolver, joints: Sequence[int], children: Sequence[int]) -> None:
+        super().__init__(solver, joints)
+        self.children = np.array(children)  # (G,)
+        self.bones = normalize(solver.offsets[None, self.children])  # (1, G, 3)
+
+    def turn(self, rows: _Rows) -> None:
+        before = self.place(rows)
+        aim = rows.target.take(self.children, 1) - rows.places.take(self.joints, 1)
+        rows.world[:, self.joints] = aimed(before, self.bones, aim)
+
+
+class _Twists(_Group):
+    """Joints from below one rigid body up to the next, which swung and now share the twist between the two."""
+
+    def __init__(self, solver: FrameSolver, spine: int) -> None:
+        *joints, self.body = chain = solver.spines[spine]
+        super().__init__(solver, joints)
+        self.spine = spine
+        self.axes = normalize(solver.offsets[None, chain[1:]])  # (1, G, 3)
+        self.shares = np.arange(1, len(chain)) / len(chain)  # (G,)
+
+    def turn(self, rows: _Rows) -> None:
+        swung = rows.world.take(self.joints, 1)
+        rest = multiply(conjugate(swung[:, -1]), rows.world[:, self.body])
+        twist = rows.moments.twist(self.spine, 2 * np.arctan2(dot(rest[:, 1:], self.axes[:, -1]), rest[:, 0]))
+        rows.world[:, self.joints] = multiply(swung, _turn(self.axes, twist[:, None] * self.shares))
+
+
+class _Limbs(_Group):
+    """Upper arms and thighs: aimed at the hinge, and turned so that the hinge bends in its plane."""
+
+    def __init__(self, solver: FrameSolver, numbers: Sequence[int]) -> None:
+        limbs = [solver.limbs[number] for number in numbers]
+        super().__init__(solver, [limb.upper for limb in limbs])
+        self.numbers = numbers
+        self.hinges = np.array([limb.hinge for limb in limbs])  # (G,)
+        self.ends = np.array([limb.end for limb in limbs])  # (G,)
+        self.one_way = np.array([limb.one_way for limb in limbs])  # (G,)
+        self.bones = normalize(solver.offsets[None, self.hinges])  # (1, G, 3), as all that follow
+        self.neutral = normalize(np.array([[limb.neutral for limb in limbs]]))
+        self.to_neutral = between(self.bones, self.neutral)  # (1, G, 4)
+        normal = np.array([[limb.normal for limb in limbs]])
+        self.axes = normalize(normal - self.bones * dot(self.bones, normal)[..., None])  # square to the bones
+
+    def turn(self, rows: _Rows) -> None:
+        before = self.place(rows)
+        hinges = rows.target.take(self.hinges, 1)
+        upper = normalize(hinges - rows.places.take(self.joints, 1))
+        lower = normalize(rows.target.take(self.ends, 1) - hinges)
+        swing = multiply(aimed(before, self.neutral, upper), self.to_neutral)
+        across = rotate(swing, self.axes)  # where the hinge's axis would be, square to `upper`
         axis = cross(upper, lower)  # where it is seen to be, as long as the sine of the bend
-        along, beside = np.einsum("ti,ti->t", axis, across), np.einsum("ti,ti->t", axis, cross(upper, across))
-        twist = self.moments.bend(number, _evidence(along, beside, limb.one_way))
-        self.world[:, limb.upper] = multiply(swing, _turn(bone, twist))
+        seen = _evidence(dot(axis, across), dot(axis, cross(upper, across)), self.one_way)
+        twist = [rows.moments.bend(number, seen[:, k]) for k, number in enumerate(self.numbers)]
+        rows.world[:, self.joints] = multiply(swing, _turn(self.bones, np.array(twist).T))
 
 
-def _evidence(along: Array, beside: Array, one_way: bool) -> Array:
-    """(T, 2) what `Moments.bend` is given, from cosine and sine of the twist, both times the sine of the bend."""
-    squared = along**2 + beside**2
-    weight = squared / (squared + BEND_SEEN**2)
-    if one_way:
-        weight = weight * (along > 0)
-    length = np.sqrt(np.maximum(squared, 1e-18))
-    return np.stack([weight * along / length, weight * beside / length], axis=1)
-
-
-def _turn(axis: Array, angle: Array) -> Array:
-    """(T, 4) rotations about one unit axis (3,) by angles (T,)."""
-    return np.concatenate([np.cos(angle / 2)[:, None], np.sin(angle / 2)[:, None] * axis], axis=1)
-
-
-def fit_rotation(rest: Array, seen: Array) -> Array:
-    """The rotation that best turns one set of vectors into another, in the sense of least squares.
-
-    Davenport's q-method: the eigenvector of the largest eigenvalue of a symmetric 4 x 4 matrix. Where the vectors leave
-    a rotation open (all on one line) the smaller one is taken, by a prior of a billionth.
+def _evidence(along: Array, beside: Array, one_way: NDArray[np.bool_]) -> Array:
+    """(T, G, 2) what `Moments.bend` is given, from cosine and sine of the twist, both times the sine of the bend.
 
     Args:
-        rest: (K, 3). seen: (T, K, 3).
-
-    Returns:
-        (T, 4).
+        along, beside: (T, G). one_way: (G,).
     """
-    b = np.einsum("tki,kj->tij", seen, rest)
-    b = b + 1e-9 * np.maximum(np.einsum("ki,ki->", rest, rest), 1e-12) * np.eye(3)
-    k = np.empty((len(b), 4, 4))
-    trace = np.einsum("tii->t", b)
-    k[:, 1:, 1:] = b + b.transpose(0, 2, 1) - trace[:, None, None] * np.eye(3)
-    k[:, 0, 0] = trace
-    z = np.stack([b[:, 2, 1] - b[:, 1, 2], b[:, 0, 2] - b[:, 2, 0], b[:, 1, 0] - b[:, 0, 1]], axis=1)
-    k[:, 0, 1:] = z
-    k[:, 1:, 0] = z
-    return unroll(np.linalg.eigh(k)[1][:, :, -1])
+    squared = along * along + beside * beside
+    weight = np.where(one_way & (along <= 0), 0.0, squared / (squared + BEND_SEEN**2))
+    sine = np.sqrt(np.maximum(squared, 1e-18))
+    seen = np.empty((*squared.shape, 2))
+    seen[..., 0], seen[..., 1] = weight * along / sine, weight * beside / sine
+    return seen
 
 
-def rest_vectors(skeleton: Skeleton, offsets: Array, j: int, points: tuple[int, ...]) -> Array:
-    """(K, 3) from joint j to its descendants in the T-pose."""
-    return np.stack([_rest_vector(skeleton, offsets, j, k) for k in points])
-
-
-def _rest_vector(skeleton: Skeleton, offsets: Array, j: int, k: int) -> Array:
-    """(3,) from joint j to its descendant k in the T-pose."""
-    vector = np.zeros(3)
-    while k != j:
-        vector, k = vector + offsets[k], skeleton.parents[k]
-    return vector
-
-
-def bodies_of(skeleton: Skeleton) -> dict[int, tuple[int, ...]]:
-    """Joints with several bones, and their ends; a child at no distance (SnapMoGen's pelvis) is the same body."""
-    lengths = np.linalg.norm(skeleton.offsets, axis=-1)
-
-    def points(j: int) -> tuple[int, ...]:
-        found: list[int] = []
-        for child in skeleton.children[j]:
-            found.extend((child,) if lengths[child] > 1e-6 else points(child))
-        return tuple(found)
-
-    every = {j: points(j) for j in range(len(skeleton)) if j == 0 or lengths[j] > 1e-6}
-    return {j: found for j, found in every.items() if len(found) > 1}
+def _turn(axes: Array, angles: Array) -> Array:
+    """(T, G, 4) rotations about unit axes (1, G, 3) by angles (T, G)."""
+    half = angles / 2
+    q = np.empty((*half.shape, 4))
+    q[..., 0], q[..., 1:] = np.cos(half), np.sin(half)[..., None] * axes
+    return q
 
 
 @lru_cache(maxsize=64)

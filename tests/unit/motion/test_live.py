@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
@@ -76,6 +78,21 @@ def test_streams_join_and_leave_without_a_trace_on_the_others():
         frames, state = live.step(np.stack([motions[2][frame], motions[1][20 + frame]]), state)
         np.testing.assert_array_equal(frames.rotations[0], alone[2][0][frame, 0])
         np.testing.assert_array_equal(frames.rotations[1], alone[1][0][20 + frame, 0])
+
+
+@pytest.mark.parametrize("streams", [2, 3, 5, 8])
+def test_no_bit_of_a_stream_depends_on_how_many_are_beside_it(streams):
+    motions = [features_of(seed)[:40] for seed in range(streams)]
+    live = LiveMotion(HUMANML3D_263, HUMANML3D)
+    together, alone = live.start(streams), [live.start() for _ in motions]
+    for frame in np.stack(motions, axis=1):
+        _, together = live.step(frame, together)
+        alone = [live.step(frame[[k]], state)[1] for k, state in enumerate(alone)]
+    for part in ("root", "feet", "poses"):
+        states = [getattr(state, part) for state in alone]
+        for field in fields(states[0]):
+            rows = np.concatenate([getattr(state, field.name) for state in states])
+            np.testing.assert_array_equal(getattr(getattr(together, part), field.name), rows, err_msg=field.name)
 
 
 def test_a_skeleton_without_feet_is_refused():

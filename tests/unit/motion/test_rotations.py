@@ -101,3 +101,40 @@ def test_unroll_leaves_no_sign_change_between_frames():
     flipped = q * np.where(np.random.default_rng(0).random(50) < 0.5, -1, 1)[:, None]
     steps = np.einsum("ti,ti->t", *(lambda u: (u[1:], u[:-1]))(r.unroll(flipped)))
     assert steps.min() > 0.9
+
+
+@given(quaternions, vectors, vectors)
+def test_aimed_is_the_shortest_way_from_where_the_bone_points(q, bone, aim):
+    bone = r.normalize(np.where(np.linalg.norm(bone, axis=-1, keepdims=True) < 1e-2, [1.0, 0, 0], bone))
+    expected = r.multiply(r.between(r.rotate(q, bone), aim), q)
+    opposite = r.dot(r.rotate(q, bone), r.normalize(aim)) < -0.999999  # any axis across will do
+    assert r.angle_between(r.aimed(q, bone, aim), expected)[~opposite].max(initial=0) < 1e-6
+
+
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_aimed_at_the_opposite_is_half_a_turn_and_at_nothing_is_none(axis):
+    q = r.about("X", np.array([0.3]))
+    back = r.aimed(q, axis[None], -r.rotate(q, axis[None]))
+    np.testing.assert_allclose(r.rotate(back, axis), -r.rotate(q, axis), atol=1e-9)
+    np.testing.assert_allclose(r.aimed(q, axis[None], np.zeros((1, 3))), q, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("function", "widths"),
+    [
+        (r.dot, (3, 3)),
+        (r.length, (4,)),
+        (r.normalize, (4,)),
+        (r.cross, (3, 3)),
+        (r.multiply, (4, 4)),
+        (r.rotate, (4, 3)),
+        (r.between, (3, 3)),
+        (r.aimed, (4, 3, 3)),
+    ],
+)
+def test_no_bit_of_a_row_depends_on_the_rows_beside_it(function, widths):
+    random = np.random.default_rng(0)
+    rows = [r.normalize(random.normal(size=(9, 5, width))) for width in widths]
+    together = function(*rows)
+    for k in range(9):
+        np.testing.assert_array_equal(function(*(v[k : k + 1] for v in rows))[0], together[k])
