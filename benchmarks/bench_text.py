@@ -1,4 +1,4 @@
-"""Text on one thread: labelling a caption of 12 words, encoding it, and a whole new prompt."""
+"""Text on one thread: labelling captions, encoding one, and a whole new prompt."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ from shared.text.minilm import MiniLM
 from shared.text.pipeline import TextPipeline
 
 CAPTION = "a person walks forward in a circle and then waves his hand"
+LONG = (
+    "a person walks slowly forward while holding the handrail with the left hand and then turns around to the right "
+    "before he sits down on a chair and waves twice"
+)
 
 
 def main() -> None:
@@ -28,6 +32,7 @@ def main() -> None:
         functions = {
             "MiniLM int8, one sentence": lambda: coarse.states(ids),
             "label 12 words (goal: 5 ms)": lambda: pipeline.labeller.label([words]),
+            "label 30 words": lambda: pipeline.labeller.label([LONG.split()]),
             "MiniLM float32, one sentence": lambda: pipeline.encoder.encode(CAPTION),
             "features of a prompt with new words": lambda: pipeline.features([f"{CAPTION} x{next(numbers)}"]),
         }

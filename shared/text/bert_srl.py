@@ -77,7 +77,7 @@ class BertLabeller:
         hidden = self._model(input_ids=torch.tensor([ids]), token_type_ids=indicator).last_hidden_state[0]
         probabilities = torch.softmax(hidden @ self._weight.T + self._bias, dim=-1).double().numpy()
         # AllenNLP adds up probabilities, not their logarithms; so do we, to decode what it decodes
-        path = viterbi(probabilities, self._transitions, self._start)
+        (path,) = viterbi(probabilities[None], self._transitions, self._start)
         tags = [self._tags[path[start]] for start in starts]
         return Frame(predicate, tuple(a for a in spans_to_arguments(tags) if predicate not in a.words))
 

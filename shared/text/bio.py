@@ -27,22 +27,26 @@ def start_scores(tags: Sequence[str]) -> NDArray[np.float64]:
 
 def viterbi(
     emissions: NDArray[np.floating], transitions: NDArray[np.floating], start: NDArray[np.floating]
-) -> list[int]:
-    """The best sequence of tags.
+) -> list[list[int]]:
+    """The best sequence of tags of each of B frames, which go through the words side by side.
 
     Args:
-        emissions: (T, K) score of each tag at each word, T >= 1.
+        emissions: (B, T, K) score of each tag at each word, T >= 1.
         transitions: (K, K) from, to.
         start: (K,).
     """
-    scores = emissions[0] + start
-    back: list[NDArray[np.intp]] = []
-    for emission in emissions[1:]:
-        candidates = scores[:, None] + transitions  # (from, to)
-        best = candidates.argmax(axis=0)
-        back.append(best)
-        scores = candidates[best, np.arange(len(best))] + emission
-    path = [int(scores.argmax())]
-    for best in reversed(back):
-        path.append(int(best[path[-1]]))
-    return path[::-1]
+    frames, length, tags = emissions.shape
+    scores = emissions[:, 0] + start  # (B, K): the best sequence up to this word that ends in this tag
+    history: list[NDArray[np.floating]] = []
+    candidates = np.empty((tags, frames, tags), scores.dtype)  # (from, B, to): the maximum is quick over the first axis
+    for word in range(1, length):
+        history.append(scores)
+        np.add(scores.T[:, :, None], transitions[:, None], out=candidates)
+        scores = np.maximum.reduce(candidates) + emissions[:, word]
+    best = scores.argmax(axis=1)
+    path = [best]
+    arriving = transitions.T
+    for scores in reversed(history):  # where the tags of the path came from; nobody asks it of the others
+        best = (scores + arriving[best]).argmax(axis=1)
+        path.append(best)
+    return np.stack(path[::-1], axis=1).tolist()

@@ -1,7 +1,7 @@
 """The forward pass of MiniLM (Wang et al. 2020, arXiv 2002.10957; BERT's layers), written for short sentences.
 
 `transformers`' BertModel gives the same numbers, but takes twice as long at batch 1 (11 ms against 5.4 ms for 12
-words on one core) and two seconds to import. The int8 copy takes 1.1 ms: reading the weights is most of the work.
+words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`shared.text.compiled`).
 It is the labeller's; node features come from the float32 one, since "left hand" and "right hand" lie closer together
 (cosine .9) than int8 is exact (cosine .98).
 
@@ -21,17 +21,14 @@ import torch.nn.functional as F
 from safetensors import SafetensorError
 from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariableType]
 from tokenizers import Tokenizer
-from torch import nn
+from torch import Tensor, nn
 
 from shared.errors import InvalidFile
 from shared.nn.packed import PackedLinear, can_pack
+from shared.text.compiled import compiled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    Linear = Callable[[torch.Tensor], torch.Tensor]
-    Groups = Sequence[tuple[int, int]]
-    """How many texts of which number of tokens follow each other."""
+    from collections.abc import Sequence
 
 WIDTH = 384
 LAYERS = 6
@@ -59,22 +56,20 @@ class MiniLM:
             weights["embeddings.position_embeddings.weight"] + weights["embeddings.token_type_embeddings.weight"][0]
         )
         self._norm = (weights["embeddings.LayerNorm.weight"], weights["embeddings.LayerNorm.bias"])
-        self._layers = [_Layer(weights, f"encoder.layer.{i}.", int8=int8) for i in range(LAYERS)]
+        layers = _Layers([_Layer(weights, f"encoder.layer.{i}.", int8=int8) for i in range(LAYERS)])
+        self._layers = compiled(layers) if int8 else layers
 
     @torch.inference_mode()
-    def states(self, ids: list[int]) -> list[torch.Tensor]:
+    def states(self, ids: list[int]) -> list[Tensor]:
         """Hidden states of one sentence: 1 + 6 tensors (T, 384), embeddings first.
 
         Args:
             ids: token ids with [CLS] and [SEP], at most 256.
         """
-        states = [self._embed(torch.tensor(ids), torch.arange(len(ids)))]
-        for layer in self._layers:
-            states.append(layer(states[-1], [(1, len(ids))]))
-        return states
+        return self._layers(self._embed(torch.tensor(ids), self._positions[: len(ids)]), [(1, len(ids))])
 
     @torch.inference_mode()
-    def last(self, texts: Sequence[list[int]]) -> list[torch.Tensor]:
+    def last(self, texts: Sequence[list[int]]) -> list[Tensor]:
         """Last hidden states (T, 384) of several texts.
 
         Args:
@@ -84,28 +79,53 @@ class MiniLM:
         lengths = [len(texts[row]) for row in order]
         groups = [(len(list(same)), length) for length, same in itertools.groupby(lengths)]
         places = torch.cat([torch.arange(length) for length in lengths])
-        hidden = self._embed(torch.tensor([token for row in order for token in texts[row]]), places)
-        for layer in self._layers:
+        tokens = torch.tensor([token for row in order for token in texts[row]])
+        hidden = self._embed(tokens, self._positions[places])
+        for layer in self._layers.layers:
             hidden = layer(hidden, groups)
         parts = dict(zip(order, torch.split(hidden, lengths), strict=True))
         return [parts[row] for row in range(len(texts))]
 
-    def _embed(self, tokens: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
-        return F.layer_norm(self._words[tokens] + self._positions[places], (WIDTH,), *self._norm, EPS)
+    def _embed(self, tokens: Tensor, positions: Tensor) -> Tensor:
+        return F.layer_norm(F.embedding(tokens, self._words) + positions, (WIDTH,), *self._norm, EPS)
 
 
-class _Layer:
-    """Post-norm self-attention and feed-forward of BERT, query, key and value in one product."""
+class _Layers(nn.Module):
+    """All layers, one after the other."""
 
-    def __init__(self, weights: dict[str, torch.Tensor], prefix: str, *, int8: bool) -> None:
-        def linear(*names: str) -> Linear:
+    def __init__(self, layers: Sequence[_Layer]) -> None:
+        super().__init__()
+        self.layers = nn.ModuleList(layers)
+
+    def forward(self, hidden: Tensor, groups: list[tuple[int, int]]) -> list[Tensor]:
+        """Embeddings (N, 384) to those and the states after each layer; `groups` as in `_Layer`."""
+        states = [hidden]
+        for layer in self.layers:
+            states.append(layer(states[-1], groups))
+        return states
+
+
+class _Layer(nn.Module):
+    """Post-norm self-attention and feed-forward of BERT, query, key and value in one product.
+
+    In int8 it is compiled, so it may use what TorchScript knows: no globals, for example.
+    """
+
+    def __init__(self, weights: dict[str, Tensor], prefix: str, *, int8: bool) -> None:
+        super().__init__()
+
+        def linear(*names: str) -> nn.Module:
             weight = torch.cat([weights[f"{prefix}{name}.weight"] for name in names])
             bias = torch.cat([weights[f"{prefix}{name}.bias"] for name in names])
-            return _int8_linear(weight, bias) if int8 else _linear(weight, bias)
+            return _Int8Linear(weight, bias) if int8 else _linear(weight, bias)
 
-        def norm(name: str) -> tuple[torch.Tensor, torch.Tensor]:
-            return weights[f"{prefix}{name}.LayerNorm.weight"], weights[f"{prefix}{name}.LayerNorm.bias"]
+        def norm(name: str) -> nn.LayerNorm:
+            norm = nn.LayerNorm(WIDTH, EPS).requires_grad_(False)
+            norm.weight.copy_(weights[f"{prefix}{name}.LayerNorm.weight"])
+            norm.bias.copy_(weights[f"{prefix}{name}.LayerNorm.bias"])
+            return norm
 
+        self.heads = HEADS
         self.project = linear("attention.self.query", "attention.self.key", "attention.self.value")
         self.attended = linear("attention.output.dense")
         self.attended_norm = norm("attention.output")
@@ -113,36 +133,53 @@ class _Layer:
         self.outer = linear("output.dense")
         self.outer_norm = norm("output")
 
-    def __call__(self, hidden: torch.Tensor, groups: Groups) -> torch.Tensor:
-        """(N, 384) to the same; texts of equal length stand together."""
-        sizes = [texts * tokens for texts, tokens in groups]
-        projected = torch.split(self.project(hidden), sizes)
-        mixed = torch.cat([_attend(part, *group) for part, group in zip(projected, groups, strict=True)])
-        hidden = F.layer_norm(hidden + self.attended(mixed), (WIDTH,), *self.attended_norm, EPS)
-        return F.layer_norm(hidden + self.outer(F.gelu(self.inner(hidden))), (WIDTH,), *self.outer_norm, EPS)
+    def forward(self, hidden: Tensor, groups: list[tuple[int, int]]) -> Tensor:
+        """(N, 384) to the same.
+
+        Args:
+            hidden: the tokens of all texts; texts of equal length stand together.
+            groups: how many texts of which number of tokens follow each other.
+        """
+        projected = self.project(hidden)
+        mixed: list[Tensor] = []
+        start = 0
+        for texts, tokens in groups:
+            stop = start + texts * tokens
+            mixed.append(_attend(projected[start:stop], texts, tokens, self.heads))
+            start = stop
+        attended = self.attended(mixed[0] if len(mixed) == 1 else torch.cat(mixed))
+        hidden = self.attended_norm(hidden + attended)
+        return self.outer_norm(hidden + self.outer(F.gelu(self.inner(hidden))))
 
 
-def _attend(projected: torch.Tensor, texts: int, tokens: int) -> torch.Tensor:
+def _attend(projected: Tensor, texts: int, tokens: int, heads: int) -> Tensor:
     """Self-attention of texts of equal length: (B T, 3 * 384) to (B T, 384)."""
-    query, key, value = projected.view(texts, tokens, 3, HEADS, -1).permute(2, 0, 3, 1, 4)  # (B, H, T, 32)
-    return F.scaled_dot_product_attention(query, key, value).transpose(1, 2).reshape(texts * tokens, WIDTH)
+    query, key, value = projected.view(texts, tokens, 3, heads, -1).permute(2, 0, 3, 1, 4).unbind()  # (B, H, T, 32)
+    return F.scaled_dot_product_attention(query, key, value).transpose(1, 2).reshape(texts * tokens, -1)
 
 
-def _linear(weight: torch.Tensor, bias: torch.Tensor) -> Linear:
+def _linear(weight: Tensor, bias: Tensor) -> nn.Module:
     linear = nn.Linear(weight.shape[1], weight.shape[0], device="meta").requires_grad_(False)
     linear.weight, linear.bias = nn.Parameter(weight, False), nn.Parameter(bias, False)
     return PackedLinear(linear) if can_pack(linear) else linear
 
 
-def _int8_linear(weight: torch.Tensor, bias: torch.Tensor) -> Linear:
-    scale = (weight.abs().amax(dim=1) / 127).clamp(min=1e-8).double()
-    zero = torch.zeros(len(weight), dtype=torch.long)
-    operators: Any = torch.ops.quantized
-    with warnings.catch_warnings():  # "deprecated": torch is pinned, and its successor needs another package
-        warnings.simplefilter("ignore", UserWarning)
-        quantized: Any = torch.quantize_per_channel(weight, scale, zero, 0, torch.qint8)
-        packed = operators.linear_prepack(quantized, bias)
-    return lambda x: operators.linear_dynamic(x, packed, True)  # True: one bit less on x, no overflow without VNNI
+class _Int8Linear(nn.Module):
+    """Weights in int8 with a scale for each output; inputs in int8 with one scale for all, found in each call."""
+
+    def __init__(self, weight: Tensor, bias: Tensor) -> None:
+        super().__init__()
+        scale = (weight.abs().amax(dim=1) / 127).clamp(min=1e-8).double()
+        zero = torch.zeros(len(weight), dtype=torch.long)
+        with warnings.catch_warnings():  # "deprecated": torch is pinned, and its successor needs another package
+            warnings.simplefilter("ignore", UserWarning)
+            quantized: Any = torch.quantize_per_channel(weight, scale, zero, 0, torch.qint8)
+            self.packed: Any = torch.ops.quantized.linear_prepack(quantized, bias)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(N, in) to (N, out)."""
+        # True: one bit less on x, no overflow without VNNI
+        return torch.ops.quantized.linear_dynamic(x, self.packed, True)
 
 
 def load_tokenizer(file: Path) -> Tokenizer:
@@ -160,7 +197,7 @@ def load_tokenizer(file: Path) -> Tokenizer:
     return tokenizer
 
 
-def _load(file: Path) -> dict[str, torch.Tensor]:
+def _load(file: Path) -> dict[str, Tensor]:
     try:
         weights = load_file(file)
     except (SafetensorError, OSError) as error:

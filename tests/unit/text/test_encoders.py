@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle, InvalidFile, NotFound
@@ -37,7 +38,6 @@ def check_alignment(encoding: Encoding, text: str, word: str) -> None:
 
 
 def test_minilm_gives_what_transformers_gives(minilm: MiniLMEncoder) -> None:
-    import torch
     from transformers import AutoTokenizer, BertModel
 
     folder = find_weights("minilm")
@@ -59,6 +59,19 @@ def test_minilm_int8_is_close_but_not_equal() -> None:
     coarse = MiniLM(find_weights("minilm"), int8=True).states(ids)[-1]
     similarity = float((exact * coarse).sum() / exact.norm() / coarse.norm())
     assert 0.9 < similarity < 0.9999
+
+
+def test_minilm_int8_gives_the_same_bits_compiled_and_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = [[101, 1037, 2711, 7365, 102], [101, 2711, 102], [101, 7365, 2830, 102], [101, 1037, 102]]
+    folder = find_weights("minilm")
+    compiled = MiniLM(folder, int8=True)
+    monkeypatch.setattr("shared.text.minilm.compiled", lambda module: module)
+    plain = MiniLM(folder, int8=True)
+    for ids in [*texts, *texts]:  # torch compiles a script again in its second call
+        for one, other in zip(compiled.states(ids), plain.states(ids), strict=True):
+            assert torch.equal(one, other)
+    for one, other in zip(compiled.last(texts), plain.last(texts), strict=True):
+        assert torch.equal(one, other)
 
 
 def test_minilm_vectors_are_unit_and_tell_sides_apart(minilm: MiniLMEncoder) -> None:

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidBundle
+from shared.text.encoders import find_weights
 from shared.text.labellers import load_labeller
 from shared.text.light import LightLabeller, WordStates, segments
 from shared.text.light_network import LightConfig, LightNetwork, sentence_dropout
+from shared.text.minilm import MiniLM
 from shared.text.roles import Frame
 
 
@@ -171,15 +173,68 @@ def test_pads_do_not_change_the_scores() -> None:
     assert torch.allclose(padded, network.tag_logits(cut, at, mask[:, :3]), atol=1e-5)
 
 
+@pytest.fixture
+def network() -> LightNetwork:
+    torch.manual_seed(0)
+    return LightNetwork(LightConfig(tags=("O", "B-ARG0", "I-ARG0"), layers=(0, 6), width=24, heads=2))
+
+
+@pytest.mark.parametrize("script", [True, False])
+@pytest.mark.parametrize("length", [1, 5, 40])
+@torch.inference_mode()
+def test_the_copy_for_labelling_says_what_the_network_says(
+    network: LightNetwork, length: int, script: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not script:
+        monkeypatch.setattr("shared.text.light_network.compiled", lambda module: module)
+    states, surface = torch.randn(length, 2, 384), torch.randint(0, 3, (length, 3))
+    copy = network.eval().for_inference()
+    mask = torch.ones(1, length, dtype=torch.bool)
+    hidden = network.read(states[None], surface[None], mask)
+    probabilities = torch.sigmoid(network.predicate_logits(hidden)[0])
+    threshold = float(probabilities.median()) - 1e-3
+    at = (probabilities > threshold).nonzero()[:, 0]
+    logits = network.tag_logits(hidden.expand(len(at), -1, -1), at, mask.expand(len(at), -1))
+    for _ in range(4):  # torch compiles a script again in its second call
+        read, found = copy.find(states, surface, threshold)
+        assert torch.allclose(read, hidden, atol=1e-5)
+        assert found.tolist() == at.tolist()
+        scores = copy.tag_scores(read, found.tolist())
+        assert torch.allclose(scores, torch.log_softmax(logits, -1).double(), atol=1e-5)
+
+
+def test_the_copy_for_labelling_leaves_the_network_to_be_trained(network: LightNetwork) -> None:
+    states, surface = torch.randn(1, 5, 2, 384), torch.randint(0, 3, (1, 5, 3))
+    network.train().for_inference()
+    network.predicate_logits(network.read(states, surface)).sum().backward()
+    assert network.training
+    assert network.states.weight.grad is not None
+    assert network.states.weight.is_contiguous()
+
+
 def test_dropout_drops_the_same_features_of_every_word() -> None:
     dropped = sentence_dropout(torch.ones(2, 7, 50), 0.5)
     assert (dropped == dropped[:, :1]).all()
     assert (dropped == 0).any()
 
 
-def test_word_states_leave_out_punctuation() -> None:
-    from shared.text.encoders import find_weights
+WORDS = ["a", "jumping-jack,", "(naïve)", "3x", "counterclockwise...", "#!?", "\u200b", "🕺", "it's", "左手"]
 
+
+def test_word_states_are_means_over_the_pieces_of_the_sentence() -> None:
+    folder = find_weights("minilm")
+    minilm = MiniLM(folder, int8=True)
+    encoded = minilm.tokenizer.encode(WORDS, is_pretokenized=True)
+    hidden = minilm.states(encoded.ids)[6]
+    found = WordStates(folder, (6,))(WORDS)
+    for word, state in enumerate(found[:, 0]):
+        pieces = [index for index, owner in enumerate(encoded.word_ids) if owner == word]
+        content = [index for index in pieces if any(c.isalnum() for c in encoded.tokens[index])]
+        wanted = hidden[content or pieces].mean(0) if pieces else torch.zeros(384)
+        assert torch.allclose(state, wanted, atol=1e-6), WORDS[word]
+
+
+def test_word_states_leave_out_punctuation() -> None:
     states = WordStates(find_weights("minilm"), (0,))
     (plain,), (stopped,) = states(["forward"]), states(["forward."])
     # embeddings (layer 0) of one token at one position: equal only if the full stop's are not averaged in
