@@ -44,12 +44,28 @@ class PackedLinear(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """(…, in) -> (…, out), no gradient."""
         if x.numel() == x.shape[-1] and self.dtype == torch.float32:
-            two = self._product(x.reshape(1, -1).expand(2, -1))
-            return two[0].view(*x.shape[:-1], -1)
+            row = self._product(x.reshape(1, -1).expand(2, -1))[0]
+            for _ in range(x.dim() - 1):
+                row = row[None]
+            return row
         return self._product(x.to(self.dtype)).to(x.dtype)
 
     def _product(self, x: Tensor) -> Tensor:
         return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, self.activation, [], "none")
+
+
+class SmallLinear(nn.Module):
+    """The inference twin of a linear layer whose matrix is small: torch's own product, on its columns."""
+
+    def __init__(self, linear: nn.Linear) -> None:
+        super().__init__()
+        self.columns = linear.weight.detach().float().T.contiguous()  # (in, out)
+        bias = _bias(linear)
+        self.bias = self.columns.new_zeros(linear.out_features) if bias is None else bias.float()
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(R, in) -> (R, out), no gradient."""
+        return torch.addmm(self.bias, x, self.columns)
 
 
 class GroupedLinear(nn.Module):
@@ -71,29 +87,20 @@ class GroupedLinear(nn.Module):
         """
         super().__init__()
         self.group = group
-        self.bias = _bias(linear)
-        self.columns: Tensor | None = None  # (in, out)
-        self.packed: PackedLinear | None = None
-        if linear.weight.numel() <= SMALL:
-            self.columns = linear.weight.detach().float().T.contiguous()
-        else:
-            self.packed = PackedLinear(linear, dtype)
+        small = linear.weight.numel() <= SMALL
+        self.product = SmallLinear(linear) if small else PackedLinear(linear, dtype)
 
     def forward(self, x: Tensor) -> Tensor:
         """(S, R, in) -> (S, R, out), or (R, in) -> (R, out); no gradient."""
-        if x.ndim == 2:
-            return self._product(x)
-        if len(x) == self.group:
-            return self._product(x.flatten(0, 1)).view(*x.shape[:2], -1)
-        whole = F.pad(x, (0, 0, 0, 0, 0, -len(x) % self.group)).view(-1, self.group * x.shape[1], x.shape[2])
-        products = torch.stack([self._product(part) for part in whole])
-        return products.view(-1, x.shape[1], products.shape[-1])[: len(x)]
-
-    def _product(self, x: Tensor) -> Tensor:
-        if self.packed is not None:
-            return self.packed(x)
-        assert self.columns is not None
-        return x @ self.columns if self.bias is None else torch.addmm(self.bias, x, self.columns)
+        if x.dim() == 2:
+            return self.product(x)
+        sessions, rows = x.size(0), x.size(1)
+        if sessions == self.group:
+            return self.product(x.flatten(0, 1)).view(sessions, rows, -1)
+        missing = (self.group - sessions % self.group) % self.group
+        whole = F.pad(x, (0, 0, 0, 0, 0, missing)).view(-1, self.group * rows, x.size(2))
+        products = torch.stack([self.product(part) for part in whole.unbind()])
+        return products.view(sessions + missing, rows, -1)[:sessions]
 
 
 def is_small(module: nn.Module) -> bool:

@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.text.compiled import compiled
+from shared.nn.compiled import compiled
 from shared.text.minilm import WIDTH as STATE_WIDTH
 
 SUFFIX_BUCKETS = 1024

@@ -24,8 +24,8 @@ from tokenizers import Tokenizer
 from torch import Tensor, nn
 
 from shared.errors import InvalidFile
+from shared.nn.compiled import compiled
 from shared.nn.packed import PackedLinear, can_pack
-from shared.text.compiled import compiled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,7 @@ from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime import committer as committer_module
 from shared.runtime import loop as loop_module
 from shared.runtime.handler import Batch, BatchControl, Outcome
-from shared.storage import Digest, FolderStore
+from shared.storage import FolderStore, NewObject
 from tests.support.runtime import Loop
 from tests.support.toy import FITS, ToyHandler
 from tests.support.toy_jobs import TEXT_KEY, audit, ended, job_row, states, submit_toys
@@ -326,28 +326,43 @@ def test_loading_a_bundle_may_take_longer_than_a_stall(
 
 
 class Flaky(FolderStore):
-    """A store that is away for the first `failures` PUTs."""
+    """A store that is away for the first `failures` batches of PUTs, each time after `before` objects."""
 
-    def __init__(self, root: Path, failures: int) -> None:
+    def __init__(self, root: Path, failures: int, before: int = 0) -> None:
         super().__init__(root)
         self.failures = failures
-        self._lock = threading.Lock()
+        self.before = before
+        self.tries = 0
+        self.stored: list[str] = []
 
-    def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
-        with self._lock:
-            self.failures -= 1
-            if self.failures >= 0:
-                raise Unreachable("the store is away")
-        return super().put(key, source, media_type=media_type)
+    def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
+        self.tries += 1
+        away = self.tries <= self.failures
+        for key in super().put_all(objects[: self.before] if away else objects):
+            self.stored.append(key)
+            yield key
+        if away:
+            raise Unreachable("the store is away")
 
 
 def test_a_short_outage_of_the_store_is_ridden_out(
     engine: sa.Engine, make_loop: Callable[..., Loop], tmp_path: Path
 ) -> None:
-    store = Flaky(tmp_path / "flaky", failures=12)
+    store = Flaky(tmp_path / "flaky", failures=2)
     job = submit_toys(engine, ["walk"] * 6)
     make_loop(store, ToyHandler()).run()
     assert job_row(engine, job).succeeded == 6
+    assert audit(engine, store) == []
+
+
+def test_what_was_stored_before_an_outage_is_not_stored_again(
+    engine: sa.Engine, make_loop: Callable[..., Loop], tmp_path: Path
+) -> None:
+    store = Flaky(tmp_path / "flaky", failures=2, before=5)
+    job = submit_toys(engine, ["walk"] * 8)
+    make_loop(store, ToyHandler()).run()
+    assert job_row(engine, job).succeeded == 8
+    assert sorted(store.stored) == list(store.keys())
     assert audit(engine, store) == []
 
 
@@ -375,7 +390,7 @@ def test_a_stop_does_not_wait_for_a_store_that_is_away(
     loop = make_loop(store, ToyHandler())
     thread = threading.Thread(target=loop.run)
     thread.start()
-    wait(lambda: store.failures < 10**9 - 10)
+    wait(lambda: store.tries > 1)
     loop.stopping.set()
     thread.join(15.0)  # the store's patience is a minute
     assert not thread.is_alive()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import stat
 import threading
 import time
 from pathlib import Path
@@ -15,7 +17,7 @@ import urllib3
 from shared.errors import InvalidInput, NotFound, Unreachable
 from shared.jobs import asset_key
 from shared.settings import Settings
-from shared.storage import AssetStore, FolderStore, open_store
+from shared.storage import AssetStore, FolderStore, NewObject, open_store
 from shared.storage import s3 as s3_module
 from shared.storage.s3 import S3Store
 from tests.servers.swift import Swift
@@ -138,6 +140,29 @@ def test_sixteen_threads_put_at_once(store: AssetStore) -> None:
     assert list(store.keys()) == sorted({key_of(content) for content in contents})
 
 
+def test_a_batch_comes_back_and_tells_each_key(store: AssetStore) -> None:
+    contents = [f"motion {n}".encode() * n for n in range(70)]
+    told = list(store.put_all([NewObject(key_of(content), content, "model/x") for content in contents]))
+    assert sorted(told) == sorted(map(key_of, contents))
+    assert list(store.keys()) == sorted(told)
+    assert all(store.get(key_of(content)) == content for content in contents)
+
+
+def test_a_batch_may_hold_what_is_there_and_the_same_twice(store: AssetStore) -> None:
+    store.put(key_of(b"walk"), b"walk")
+    batch = [NewObject(key_of(content), content) for content in (b"walk", b"run", b"run")]
+    assert set(store.put_all(batch)) == {key_of(b"walk"), key_of(b"run")}
+    assert store.get(key_of(b"walk")) == b"walk"
+    assert list(store.put_all([])) == []
+
+
+def test_other_content_in_a_batch_is_refused(store: AssetStore) -> None:
+    told: list[str] = []
+    with pytest.raises(InvalidInput, match="SHA-256"):
+        told.extend(store.put_all([NewObject(key_of(b"walk"), b"walk"), NewObject(key_of(b"run"), b"crawl")]))
+    assert not store.exists(key_of(b"run"))
+
+
 def test_a_store_that_works_passes_its_check_and_may_be_prepared_again(store: AssetStore) -> None:
     store.put(key_of(b"walk"), b"walk")
     store.prepare()
@@ -151,7 +176,8 @@ def test_a_store_that_works_passes_its_check_and_may_be_prepared_again(store: As
 def test_a_folder_that_cannot_be_written_is_unreachable(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder")
     store = FolderStore(tmp_path / "file" / "assets")
-    for use in (store.check, lambda: store.put(key_of(b"x"), b"x")):
+    batch = [NewObject(key_of(b"x"), b"x")]
+    for use in (store.check, lambda: store.put(key_of(b"x"), b"x"), lambda: list(store.put_all(batch))):
         with pytest.raises(Unreachable, match="MAREY_STORE"):
             use()
 
@@ -160,6 +186,45 @@ def test_a_put_that_fails_leaves_nothing_behind(folder_store: FolderStore, tmp_p
     with pytest.raises(InvalidInput):
         folder_store.put(key_of(b"walk"), b"run")
     assert [path for path in folder_store.root.rglob("*") if path.is_file()] == []
+
+
+def test_a_batch_that_fails_leaves_nothing_behind(folder_store: FolderStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    batch = [NewObject(key_of(content), content) for content in (b"walk", b"run")]
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", refuse)
+        with pytest.raises(Unreachable, match="No space left"):
+            list(folder_store.put_all(batch))
+    assert [path for path in folder_store.root.rglob("*") if path.is_file()] == []
+    assert len(list(folder_store.put_all(batch))) == 2
+
+
+def test_a_key_is_told_when_its_file_and_every_folder_above_it_are_on_disk(
+    folder_store: FolderStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files before they get their name, folders after what was made in them got its own."""
+    synced: dict[int, list[str]] = {}
+
+    def remember(descriptor: int) -> None:
+        about = os.fstat(descriptor)
+        entries = os.listdir(descriptor) if stat.S_ISDIR(about.st_mode) else []
+        synced[about.st_ino] = entries
+
+    monkeypatch.setattr(os, "fsync", remember)
+    folder_store.prepare()
+    for key in folder_store.put_all([NewObject(key_of(bytes([n])), bytes([n])) for n in range(70)]):
+        path = folder_store.path(key)
+        assert path.stat().st_ino in synced
+        while path != folder_store.root:
+            assert path.name in synced[path.parent.stat().st_ino]
+            path = path.parent
+
+
+def test_only_its_user_can_read_an_object(folder_store: FolderStore) -> None:
+    folder_store.put(key_of(b"walk"), b"walk")
+    assert stat.S_IMODE(folder_store.path(key_of(b"walk")).stat().st_mode) == 0o600
 
 
 def test_preparing_removes_what_killed_writers_left_but_not_what_is_being_written(folder_store: FolderStore) -> None:
@@ -230,6 +295,7 @@ def test_an_outage_is_told_and_passes(swift: Swift, monkeypatch: pytest.MonkeyPa
         for use in (
             store.check,
             lambda: store.put(key_of(b"run"), b"run"),
+            lambda: list(store.put_all([NewObject(key_of(b"run"), b"run")] * 20)),
             lambda: store.get(key_of(b"walk")),
             lambda: store.exists(key_of(b"walk")),
             lambda: list(store.keys()),

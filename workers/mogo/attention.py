@@ -9,6 +9,7 @@ A sequence is [prompts | frames]: every prompt stands at position 0 and reads it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 import torch.nn.functional as F
@@ -25,16 +26,6 @@ class Reach:
     prompts: int  # P
     to_prompt: Tensor  # (1 or N, n) int64: relative distance of each frame to position 0
     hidden: Tensor  # (1 or N, 1, n, P + n) bool: prompts and later frames that a frame may not read
-
-
-@dataclass(frozen=True)
-class Slots:
-    """Where S sessions stand in what they remember: worked out once a frame, for all layers."""
-
-    rows: Tensor  # (S,) 0 … S - 1
-    newest: Tensor  # (S,) int64: the slot of the newest frame
-    distance: Tensor  # (S, 1, 1, slots) int64: relative distance of each slot
-    hidden: Tensor  # (S, 1, 1, slots): `HIDDEN` where nothing may be read, else 0
 
 
 class RelativeAttention(nn.Module):
@@ -86,29 +77,49 @@ class RelativeAttention(nn.Module):
         shifted = F.pad(among, (1, 0)).view(*among.shape[:2], size + 1, size)[:, :, 1:]
         return torch.cat([to_prompt, shifted], -1)
 
-    def look_back(self, x: Tensor, memory: Tensor, terms: Tensor, slots: Slots) -> Tensor:
-        """One new position of S sessions, L lanes each, over what they remember: (S, L, w) -> (S, L, w).
+    def _heads(self, vector: Tensor) -> Tensor:
+        return vector.view(1, self.heads, 1, -1)
+
+
+class Slots(NamedTuple):
+    """Where S sessions stand in what they remember: worked out once a frame, for all layers."""
+
+    rows: Tensor  # (S,) 0 … S - 1
+    newest: Tensor  # (S,) int64: the slot of the newest frame
+    distance: Tensor  # (S, 1, 1, slots) int64: relative distance of each slot
+    hidden: Tensor  # (S, 1, 1, slots): `HIDDEN` where nothing may be read, else 0
+
+
+class LookBack(nn.Module):
+    """`RelativeAttention` for one new position of S sessions, L lanes each, over kept keys and values."""
+
+    def __init__(self, attention: RelativeAttention) -> None:
+        """Share the layers of `attention`, packed or not."""
+        super().__init__()
+        self.heads = attention.heads
+        self.qkv, self.out = attention.qkv, attention.out
+        self.u = attention.u.detach().view(1, attention.heads, 1, -1)
+        self.v = attention.v.detach().view(1, attention.heads, 1, -1)
+
+    def forward(self, x: Tensor, memory: Tensor, terms: Tensor, slots: Slots) -> Tensor:
+        """(S, L, w) -> (S, L, w).
 
         Args:
             x: (S, L, w).
             memory: (2, S, H, L, slots, w / H) keys and values; the new position's are put into it.
-            terms: from `terms`.
+            terms: from `RelativeAttention.terms`.
             slots: where the sessions stand.
         """
-        sessions, lanes, _ = x.shape
+        sessions, lanes = x.size(0), x.size(1)
         qkv = self.qkv(x).view(sessions, lanes, 3, self.heads, -1).permute(0, 2, 3, 1, 4)  # (S, 3, H, L, w / H)
         query = qkv[:, 0]
         memory[:, slots.rows, :, :, slots.newest] = qkv[:, 1:]
         # session by session: with more rows some processors' products add in another order
-        positions = torch.stack([torch.bmm(each, terms) for each in query + self._heads(self.v)])  # (S, H, L, D + 1)
-        bias = positions.gather(-1, slots.distance.expand(-1, self.heads, lanes, -1)) + slots.hidden
-        key, value = memory.flatten(1, 3)  # (S · H · L, slots, w / H)
-        content = (query + self._heads(self.u)).reshape(len(key), 1, -1)
-        scores = torch.baddbmm(
-            bias.view(len(key), 1, -1), content, key.transpose(1, 2), alpha=content.shape[-1] ** -0.5
-        )
-        mixed = torch.bmm(scores.softmax(-1), value).view(query.shape)
+        about = (query + self.v).unbind()
+        positions = torch.stack([torch.bmm(each, terms) for each in about])  # (S, H, L, D + 1)
+        bias = positions.gather(3, slots.distance.expand(-1, self.heads, lanes, -1)) + slots.hidden
+        key, value = memory[0].flatten(0, 2), memory[1].flatten(0, 2)  # (S · H · L, slots, w / H)
+        content = (query + self.u).reshape(key.size(0), 1, -1)
+        scores = torch.baddbmm(bias.view(key.size(0), 1, -1), content, key.transpose(1, 2), alpha=key.size(2) ** -0.5)
+        mixed = torch.bmm(scores.softmax(-1), value).view(sessions, self.heads, lanes, -1)
         return self.out(mixed.transpose(1, 2).reshape(sessions, lanes, -1))
-
-    def _heads(self, vector: Tensor) -> Tensor:
-        return vector.view(1, self.heads, 1, -1)

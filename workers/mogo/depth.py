@@ -43,31 +43,61 @@ class DepthHead(nn.Module):
 class DepthFrame:
     """One frame through the depth head level by level, as codes are drawn; keys and values below are kept."""
 
-    def __init__(self, head: DepthHead, states: Tensor) -> None:
-        """Begin with trunk states (S, b, V, w) of S sessions, b branches each."""
+    def __init__(self, head: DepthHead, step: DepthStep, states: Tensor) -> None:
+        """Begin with trunk states (S, b, V, w) of S sessions, b branches each; `step` is the head's."""
         sessions, branches, levels, _ = states.shape
-        self._head, self._states, self._level = head, states, 0
+        self._step, self._states, self._level = step, states, 0
         self._entered = head.state(states.flatten(1, 2)).view(sessions, branches, levels, -1) + head.level
         heads, width = head.layers[0].attention.heads, self._entered.shape[-1]
         self._memory = states.new_empty(len(head.layers), sessions, branches, 2, heads, levels, width // heads)
 
     def next(self, below: Tensor | None) -> Tensor:
         """The state (S, b, w) of the next level, given the embedding (S, w) of the code just drawn (None: level 0)."""
-        head, level = self._head, self._level
+        level = self._level
         self._level += 1
-        x = self._entered[:, :, level]
-        if below is not None:
-            x = x + head.code(below[:, None])
-        for block, memory in zip(head.layers, self._memory, strict=True):
-            x = x + self._attend(block, x, memory, level)
-            x = x + block.feedforward(block.norm2(x))
-        return self._states[:, :, level] + head.leave(head.norm(x))
+        return self._step(self._states[:, :, level], self._entered[:, :, level], below, self._memory, level)
 
-    @staticmethod
-    def _attend(block: Block, x: Tensor, memory: Tensor, level: int) -> Tensor:
-        """(S, b, dw) of one level over it and those below; `memory` (S, b, 2, H, V, dw / H)."""
-        qkv = block.attention.qkv(block.norm1(x)).view(*x.shape[:2], 3, block.attention.heads, 1, -1)
+
+class DepthStep(nn.Module):
+    """One level through the depth head: the same layers as in `DepthHead.forward`, over kept keys and values."""
+
+    def __init__(self, head: DepthHead) -> None:
+        """Share the layers of `head`, packed or not."""
+        super().__init__()
+        self.code, self.norm, self.leave = head.code, head.norm, head.leave
+        self.blocks = nn.ModuleList(_StepBlock(block) for block in head.layers)
+
+    def forward(self, state: Tensor, x: Tensor, below: Tensor | None, memory: Tensor, level: int) -> Tensor:
+        """The level's state (S, b, w).
+
+        Args:
+            state: (S, b, w) of the trunk.
+            x: (S, b, dw) what it enters the head as.
+            below: (S, w) embedding of the code of the level below; None on level 0.
+            memory: (blocks, S, b, 2, H, V, dw / H) keys and values; this level's are put into it.
+            level: from 0.
+        """
+        if below is not None:
+            x = x + self.code(below[:, None])
+        for number, block in enumerate(self.blocks):
+            x = block(x, memory[number], level)
+        return state + self.leave(self.norm(x))
+
+
+class _StepBlock(nn.Module):
+    """`Block` for one level."""
+
+    def __init__(self, block: Block) -> None:
+        super().__init__()
+        self.heads = block.attention.heads
+        self.norm1, self.qkv, self.out = block.norm1, block.attention.qkv, block.attention.out
+        self.norm2, self.wide, self.gelu, self.narrow = block.norm2, block.wide, block.gelu, block.narrow
+
+    def forward(self, x: Tensor, memory: Tensor, level: int) -> Tensor:
+        """(S, b, dw) of one level over it and those below."""
+        qkv = self.qkv(self.norm1(x)).view(x.size(0), x.size(1), 3, self.heads, 1, -1)
         memory[..., level : level + 1, :] = qkv[:, :, 1:]
-        key, value = memory[..., : level + 1, :].flatten(0, 1).unbind(1)  # (S · b, H, level + 1, dw / H)
-        mixed = F.scaled_dot_product_attention(qkv[:, :, 0].flatten(0, 1), key, value)
-        return block.attention.out(mixed.view(x.shape))
+        past = memory[..., : level + 1, :].flatten(0, 1)  # (S · b, 2, H, level + 1, dw / H)
+        mixed = F.scaled_dot_product_attention(qkv[:, :, 0].flatten(0, 1), past[:, 0], past[:, 1])
+        x = x + self.out(mixed.reshape(x.size(0), x.size(1), x.size(2)))
+        return x + self.narrow(self.gelu(self.wide(self.norm2(x))))

@@ -7,6 +7,7 @@ must keep elsewhere, to go on after its worker died, are its tokens and prompts 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,9 @@ from workers.mogo.bundle import MODEL
 from workers.mogo.generate import Generator, Settings
 from workers.mogo.streaming import Streams, sessions_of_product
 from workers.mogo.tokenizer import DecoderState
+
+WARM_FRAMES = 3
+"""Compiled code watches two calls and is made ready in the third."""
 
 
 @dataclass
@@ -254,8 +258,21 @@ def create_show() -> Show:
     if is_small(generator.transformer):
         torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(as_served(bundle.manifest.text))
+
+    def parse(prompt: str) -> TextFeatures:
+        return pipeline.features([prompt])[0]
+
     return Show(
-        open_room=lambda slots: LiveRoom(generator, slots),
-        parse=lambda prompt: pipeline.features([prompt])[0],
+        open_room=lambda slots: _warm(LiveRoom(generator, slots), parse),
+        parse=parse,
         device=str(generator.device),
     )
+
+
+def _warm(room: LiveRoom, parse: Callable[[str], TextFeatures]) -> LiveRoom:
+    """The room, whose first frames will not wait for what torch does once."""
+    session = room.start(parse("a person stands"), 0)
+    for _ in range(WARM_FRAMES):
+        room.step()
+    room.stop(session)
+    return room

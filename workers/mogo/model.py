@@ -22,7 +22,7 @@ from torch import Tensor, nn
 
 from shared.nn.convolution import frame_mask
 from shared.nn.transformer import dropout, initialize, sinusoidal_positions
-from workers.mogo.attention import Reach, RelativeAttention
+from workers.mogo.attention import LookBack, Reach, RelativeAttention, Slots
 from workers.mogo.config import MOGOConfig, TransformerConfig
 from workers.mogo.depth import DepthHead
 
@@ -76,6 +76,21 @@ class TrunkBlock(nn.Module):
 
     def _drop(self, x: Tensor) -> Tensor:
         return dropout(x, self.dropout, training=self.training)
+
+
+class TrunkStep(nn.Module):
+    """A block of the trunk for one new position of each session: the same layers as in `TrunkBlock`."""
+
+    def __init__(self, block: TrunkBlock) -> None:
+        """Share the layers of `block`, packed or not."""
+        super().__init__()
+        self.attention = LookBack(block.attention)
+        self.wide, self.narrow, self.norm1, self.norm2 = block.wide, block.narrow, block.norm1, block.norm2
+
+    def forward(self, x: Tensor, memory: Tensor, terms: Tensor, slots: Slots) -> Tensor:
+        """(S, L, w) -> (S, L, w); see `LookBack.forward`."""
+        x = x + self.attention(self.norm1(x), memory, terms, slots)
+        return x + self.narrow(F.gelu(self.wide(self.norm2(x))))
 
 
 class Trunk(nn.Module):

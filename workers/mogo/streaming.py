@@ -18,12 +18,13 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from shared.errors import InvalidInput
+from shared.nn.compiled import compiled
 from shared.nn.packed import is_small, pack_linears
 from shared.nn.sampling import guide, sample_top_k, uniform
 from workers.mogo.attention import HIDDEN, RelativeAttention, Slots
 from workers.mogo.config import InferenceConfig
-from workers.mogo.depth import DepthFrame
-from workers.mogo.model import RQHCTransformer
+from workers.mogo.depth import DepthFrame, DepthStep
+from workers.mogo.model import RQHCTransformer, TrunkStep
 
 NEVER = 2**62
 """More frames than any session makes."""
@@ -112,6 +113,8 @@ class Streams:
         self.blocks = self.model.trunk.layers
         self.terms = [block.attention.terms(self.model.trunk.sinusoids).contiguous() for block in self.blocks]
         pack_linears(self.model, dtype, group=group)
+        self._steps = [compiled(TrunkStep(block)) for block in self.blocks]
+        self._depth = None if self.model.depth is None else compiled(DepthStep(self.model.depth))
 
     def start(
         self, sentence: Tensor, seed: int, *, ends_from: int = NEVER, past: Tensor | None = None, skipped: int = 0
@@ -175,9 +178,8 @@ class Streams:
         active, state = len(self.sessions), self.state
         slots = self._slots(active)
         x = self.model.columns(state.last[:active, None])[:, :, 0].repeat(1, self.branches, 1)  # (s, L, w)
-        for layer, block in enumerate(self.blocks):
-            memory, terms = state.memory[layer, :, :active], self.terms[layer]
-            x = block(x, lambda h, b=block, m=memory, t=terms: b.attention.look_back(h, m, t, slots))
+        for layer, step in enumerate(self._steps):
+            x = step(x, state.memory[layer, :, :active], self.terms[layer], slots)
         return torch.where((state.made[:active] == 0)[:, None, None], state.opening[:active], self.model.trunk.norm(x))
 
     def accept(self, columns: Tensor) -> None:
@@ -248,7 +250,8 @@ class Streams:
             logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
         else:
-            frame, drawn = DepthFrame(model.depth, states), list[Tensor]()
+            assert self._depth is not None
+            frame, drawn = DepthFrame(model.depth, self._depth, states), list[Tensor]()
             for level in range(levels):
                 below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
                 logits = model.head(frame.next(below))[:, :, None]

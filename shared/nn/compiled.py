@@ -1,8 +1,9 @@
-"""TorchScript for networks that read one sentence: their operators are so small that calling them is half the work.
+"""TorchScript, where calling operators is half the work: for networks that read one sentence, or draw one frame.
 
 MiniLM in int8 reads 12 words in 3.3 ms instead of 5.3 (one core of a Xeon at 2.5 GHz), with the same bits. A third of
 the gain is `quantized::linear_dynamic`: to take its packed weights from Python costs 30 µs a call, 24 times a sentence.
-In return, loading the labeller takes 0.2 s longer and its first two sentences 0.1 s each.
+A frame of MOGO's `starter` takes 8.7 ms instead of 13. In return, loading the labeller takes 0.2 s longer, and the
+first two calls 0.1 s each.
 """
 
 from __future__ import annotations
