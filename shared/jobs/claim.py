@@ -10,7 +10,7 @@ from uuid import UUID, uuid4
 import sqlalchemy as sa
 
 from shared.jobs import schema
-from shared.jobs.journal import CLOCK, LockedJob, among, interval, lock_job, record
+from shared.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
 from shared.jobs.policy import Policy, policy
 from shared.jobs.states import ItemState, JobControl, Stage
 from shared.jobs.types import Claim, ClaimedItem, Heartbeat
@@ -38,7 +38,8 @@ LANES = sa.text("""
     ORDER BY place
 """)
 
-PICK = sa.text("""
+# One statement, for each costs a round trip while the job is locked. Without an item that is free it writes nothing.
+TAKE = sa.text("""
     WITH picked AS MATERIALIZED (
         SELECT id FROM item
         WHERE job_id = :job AND queue = :queue AND batch_key = :batch_key
@@ -46,11 +47,24 @@ PICK = sa.text("""
         ORDER BY position
         LIMIT :limit
         FOR UPDATE SKIP LOCKED
+    ), held AS (
+        INSERT INTO lease (token, job_id, queue, worker, solo, claimed_at, progress_at, expires_at)
+        SELECT :token, :job, :queue, :worker, :solo, now, now, now + make_interval(secs => :seconds)
+        FROM clock_timestamp() AS now
+        WHERE EXISTS (SELECT FROM picked)
+    ), emptied AS (
+        UPDATE lane SET ready = ready - CASE WHEN :solo THEN 0 ELSE taken.items END,
+                        solo = solo - CASE WHEN :solo THEN taken.items ELSE 0 END,
+                        waiting_since = clock_timestamp()
+        FROM (SELECT count(*) AS items FROM picked) AS taken
+        WHERE job_id = :job AND queue = :queue AND batch_key = :batch_key AND taken.items > 0
     )
     UPDATE item SET state = 'leased', lease_token = :token FROM picked WHERE item.id = picked.id
     RETURNING item.id, item.position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle,
               item.text_key, item.seed, item.seconds, item.settings, item.tags, item.attempts, item.stage
 """)
+
+TEXTS = sa.text("SELECT key, blob FROM text_features WHERE key = ANY(:keys)")
 
 WAITING = sa.text("""
     SELECT lane.queue, sum(ceil(lane.ready::numeric / size.items) + lane.solo)::int AS batches
@@ -131,9 +145,7 @@ def heartbeat(
 
 def load_texts(conn: sa.Connection, keys: Sequence[str]) -> dict[str, bytes]:
     """The feature blobs of these keys, those that are known, in one query."""
-    table = schema.text_features.c
-    rows = conn.execute(sa.select(table.key, table.blob).where(among(table.key, set(keys))))
-    return {row.key: row.blob for row in rows}
+    return {row.key: row.blob for row in conn.execute(TEXTS, {"keys": list(set(keys))})}
 
 
 def waiting_batches(conn: sa.Connection, batch_sizes: Mapping[str, int]) -> dict[str, int]:
@@ -191,35 +203,15 @@ def _take(
     if job.control is not JobControl.RUN:
         return None
     token = uuid4()
-    conn.execute(
-        sa.insert(schema.lease).values(
-            token=token,
-            job_id=job.id,
-            queue=queue,
-            worker=worker,
-            solo=False,
-            claimed_at=CLOCK,
-            progress_at=CLOCK,
-            expires_at=CLOCK + interval(rules.lease),
-        )
-    )
-    of_lane = {"job": job.id, "queue": queue, "batch_key": batch_key, "token": token}
+    lane = {"job": job.id, "queue": queue, "batch_key": batch_key}
+    lease = {"token": token, "worker": worker, "seconds": rules.lease}
     solo = False
-    rows = conn.execute(PICK, of_lane | {"solo": False, "limit": limit}).mappings().all()
+    rows = conn.execute(TAKE, {**lane, **lease, "solo": False, "limit": limit}).mappings().all()
     if not rows:  # those that lost a lease in company run alone, after the others
         solo = True
-        rows = conn.execute(PICK, of_lane | {"solo": True, "limit": 1}).mappings().all()
+        rows = conn.execute(TAKE, {**lane, **lease, "solo": True, "limit": 1}).mappings().all()
     if not rows:
         return None
-    if solo:
-        conn.execute(sa.update(schema.lease).where(schema.lease.c.token == token).values(solo=True))
-    lane = schema.lane.c
-    conn.execute(
-        sa.update(schema.lane)
-        .where(lane.job_id == job.id, lane.queue == queue, lane.batch_key == batch_key)
-        .values({(lane.solo if solo else lane.ready): (lane.solo if solo else lane.ready) - len(rows)})
-        .values(waiting_since=CLOCK)
-    )
     record(conn, job, moved={(ItemState.READY, ItemState.LEASED): len(rows)})
     items = sorted((_claimed(row) for row in rows), key=lambda item: item.position)
     stage = Stage(rows[0]["stage"])

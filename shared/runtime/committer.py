@@ -7,7 +7,6 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from uuid import UUID
 
@@ -33,13 +32,12 @@ from shared.runtime.faults import as_problem, patiently
 from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, TextDone
 from shared.runtime.lease import Heartbeat, HeldLease
 from shared.runtime.logs import logger
-from shared.storage import AssetStore
+from shared.storage import AssetStore, NewObject
 
 log = logger(__name__)
 
 GROUP = 64  # outcomes of one transaction, at most: a commit costs an fsync and the lock of its job row
 GROUP_SECONDS = 2.0  # but what a killed child would lose is kept small
-PUTS_AT_ONCE = 8
 STORE_PATIENCE = 60.0  # seconds; rides out a restart of the store, after that the items are given back
 DATABASE_PATIENCE = 120.0
 
@@ -78,7 +76,6 @@ class Committer(threading.Thread):
         self._slots = threading.Semaphore(2)
         self._idle = threading.Condition()
         self._pending = 0
-        self._puts = ThreadPoolExecutor(PUTS_AT_ONCE, thread_name_prefix="put")
 
     # --- the loop's side ---
 
@@ -225,22 +222,17 @@ class Committer(threading.Thread):
         self._commit(lease, "motions", lambda conn, token: commit_motions(conn, token, rows))
 
     def _put_files(self, lease: HeldLease, motions: Sequence[_Exported]) -> None:
-        until = time.monotonic() + STORE_PATIENCE
-        contents = {digest.sha256: file for motion in motions for file, digest in motion.files}
+        left = {
+            asset_key(lease.claim.tenant, digest.sha256): file for motion in motions for file, digest in motion.files
+        }
 
-        def put(sha256: str, file: ExportedFile) -> None:
-            key = asset_key(lease.claim.tenant, sha256)
-            patiently(
-                lambda: self._store.put(key, file.content, media_type=file.media_type),
-                seconds=max(0.0, until - time.monotonic()),
-                stopping=self._stopping,
-            )
-            lease.progress(0, 0)
+        def put() -> None:
+            objects = [NewObject(key, file.content, file.media_type) for key, file in left.items()]
+            for key in self._store.put_all(objects):
+                del left[key]
+                lease.progress(0, 0)
 
-        futures = [self._puts.submit(put, sha256, file) for sha256, file in contents.items()]
-        errors = [error for future in futures if (error := future.exception()) is not None]
-        if errors:
-            raise errors[0]
+        patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
 
     def _commit(self, lease: HeldLease, what: str, write: Callable[[sa.Connection, UUID], Committed]) -> None:
         def attempt() -> Committed:

@@ -12,13 +12,14 @@ from pathlib import Path
 from shared.errors import InvalidInput
 from shared.settings import Settings
 from shared.storage.folder import FolderStore
-from shared.storage.port import PRESIGN_SECONDS, AssetStore, Digest, Opened, asset_digest
+from shared.storage.port import PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
 
 __all__ = [
     "PRESIGN_SECONDS",
     "AssetStore",
     "Digest",
     "FolderStore",
+    "NewObject",
     "Opened",
     "asset_digest",
     "open_store",

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
-import shutil
+import secrets
 import tempfile
 import time
-from collections.abc import Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO, TypeVar
 
 from shared.errors import Unreachable
 from shared.storage.port import (
+    CHUNK,
     PRESIGN_SECONDS,
     Digest,
+    NewObject,
     Opened,
-    asset_digest,
     check_content,
     checked_key,
     no_such_object,
@@ -27,6 +31,12 @@ from shared.storage.port import (
 ABANDONED_SECONDS = 3600.0  # no writer takes so long
 INCOMING = ".incoming"
 """Folder of files being written; its name is no key's, so listings never show it."""
+FILES_AT_ONCE = 64  # two for each item of a batch; macOS lets a process open 256
+SYNCS_AT_ONCE = 32  # threads that only wait for the disk; 64 are no faster
+CREATE = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # O_BINARY: Windows alone has it
+
+Value = TypeVar("Value")
+Result = TypeVar("Result")
 
 
 class FolderStore:
@@ -34,6 +44,7 @@ class FolderStore:
 
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
+        self._syncs = ThreadPoolExecutor(SYNCS_AT_ONCE, thread_name_prefix="fsync")
 
     def prepare(self) -> None:
         """See `AssetStore.prepare`."""
@@ -46,25 +57,15 @@ class FolderStore:
 
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
         """See `AssetStore.put`. The media type is the caller's to keep."""
-        path = self.path(key)
-        with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as content, _outages(self.root):
-            incoming = self.root / INCOMING
-            incoming.mkdir(parents=True, exist_ok=True)
-            descriptor, name = tempfile.mkstemp(dir=incoming)
-            temporary = Path(name)
-            try:
-                with os.fdopen(descriptor, "wb") as file:
-                    shutil.copyfileobj(content, file)
-                    file.flush()
-                    os.fsync(file.fileno())
-                digest = asset_digest(temporary)  # of what was written, not of what was meant
-                check_content(key, digest)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                temporary.replace(path)
-                _fsync_folder(path.parent)
-            finally:
-                temporary.unlink(missing_ok=True)
-        return digest
+        with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as content:
+            return self._put_together([(key, content)])[0]
+
+    def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
+        """See `AssetStore.put_all`."""
+        for first in range(0, len(objects), FILES_AT_ONCE):
+            group = objects[first : first + FILES_AT_ONCE]
+            self._put_together([(one.key, io.BytesIO(one.content)) for one in group])
+            yield from (one.key for one in group)
 
     def get(self, key: str) -> bytes:
         """See `AssetStore.get`."""
@@ -124,6 +125,48 @@ class FolderStore:
         """The file of a key: always inside the folder, for `checked_key` lets no part begin with a dot."""
         return self.root / checked_key(key)
 
+    def _put_together(self, contents: Sequence[tuple[str, BinaryIO]]) -> list[Digest]:
+        """Each step for all of them, so that the fsyncs of a step wait for the disk at the same time.
+
+        A flush of the disk takes milliseconds and serves everybody who asked for one before it began: two files an item
+        cost 2 to 3 ms when each of eight threads took them one by one, 0.3 ms like this.
+        """
+        paths = [self.path(key) for key, _ in contents]
+        with _outages(self.root), self._incoming(len(contents)) as temporaries:
+            digests = self._write(temporaries, contents)
+            for temporary, path in zip(temporaries, paths, strict=True):
+                _move(temporary, path)
+            self._at_once(_fsync_folder, {path.parent for path in paths})
+        return digests
+
+    @contextmanager
+    def _incoming(self, count: int) -> Generator[list[Path]]:
+        """Names for files being written; what was not moved away goes when something fails."""
+        incoming = self.root / INCOMING
+        names = [incoming / secrets.token_hex(8) for _ in range(count)]
+        try:
+            yield names
+        except BaseException:
+            for name in names:
+                with suppress(OSError):  # the first error is the one to tell
+                    name.unlink()
+            raise
+
+    def _write(self, temporaries: Sequence[Path], contents: Sequence[tuple[str, BinaryIO]]) -> list[Digest]:
+        """Write and fsync what the keys say."""
+        with ExitStack() as opened:
+            files: list[tuple[int, str, BinaryIO]] = []
+            for temporary, (key, content) in zip(temporaries, contents, strict=True):
+                files.append((_create(temporary), key, content))
+                opened.callback(os.close, files[-1][0])
+            return self._at_once(_write_one, files)
+
+    def _at_once(self, action: Callable[[Value], Result], values: Iterable[Value]) -> list[Result]:
+        """What `action` makes of each value; returns, or raises the first error, when no call is under way any more."""
+        futures = [self._syncs.submit(action, value) for value in values]
+        wait(futures)
+        return [future.result() for future in futures]
+
 
 def _keys_of(root: Path, folder: str, folders: list[str], files: list[str]) -> Iterator[str]:
     if INCOMING in folders:
@@ -136,6 +179,52 @@ def _keys_of(root: Path, folder: str, folders: list[str], files: list[str]) -> I
 def _raise(error: OSError) -> None:
     if not isinstance(error, FileNotFoundError):  # a folder not made yet holds nothing
         raise error
+
+
+def _create(path: Path) -> int:
+    """A descriptor of a new file that only this user can read."""
+    try:
+        return os.open(path, CREATE, 0o600)
+    except FileNotFoundError:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return os.open(path, CREATE, 0o600)
+
+
+def _write_one(file: tuple[int, str, BinaryIO]) -> Digest:
+    """Write to a descriptor what its key says, durably."""
+    descriptor, key, content = file
+    digest = _copy(content, descriptor)
+    check_content(key, digest)
+    os.fsync(descriptor)
+    return digest
+
+
+def _copy(content: BinaryIO, descriptor: int) -> Digest:
+    """Write all of the content; says what was written."""
+    sha256, size = hashlib.sha256(), 0
+    while chunk := content.read(CHUNK):
+        sha256.update(chunk)
+        size += len(chunk)
+        left = memoryview(chunk)
+        while left:
+            left = left[os.write(descriptor, left) :]
+    return Digest(sha256.hexdigest(), size)
+
+
+def _move(temporary: Path, path: Path) -> None:
+    try:
+        temporary.replace(path)
+    except FileNotFoundError:
+        _make_folder(path.parent)
+        temporary.replace(path)
+
+
+def _make_folder(folder: Path) -> None:
+    """Make a folder and those above it, durably: without its name, what lies in it is lost."""
+    if not folder.parent.is_dir():
+        _make_folder(folder.parent)
+    folder.mkdir(exist_ok=True)
+    _fsync_folder(folder.parent)
 
 
 def _fsync_folder(folder: Path) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -19,6 +20,7 @@ from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
     Digest,
+    NewObject,
     Opened,
     asset_digest,
     check_content,
@@ -31,6 +33,7 @@ from shared.storage.port import (
 CONNECT_SECONDS = 3.0
 READ_SECONDS = 15.0
 RETRIES = 2
+PUTS_AT_ONCE = 8  # of one batch; the pool of connections holds 16
 MISSING = frozenset({"NoSuchKey", "NoSuchBucket", "404"})
 
 
@@ -53,6 +56,7 @@ class S3Store:
     def __init__(self, options: S3Options) -> None:
         self.options = options
         self._client = _client(options, options.endpoint)
+        self._puts = ThreadPoolExecutor(PUTS_AT_ONCE, thread_name_prefix="put")
         public = options.public_endpoint
         self._public = _client(options, public) if public and public != options.endpoint else self._client
 
@@ -81,6 +85,24 @@ class S3Store:
             else:
                 self._client.fput_object(self.options.bucket, key, str(source), content_type=media_type)
         return digest
+
+    def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
+        """See `AssetStore.put_all`. After an error, what has not begun is left for the next try."""
+        keys = {
+            self._puts.submit(self.put, one.key, one.content, media_type=one.media_type): one.key for one in objects
+        }
+        errors: list[BaseException] = []
+        for future in as_completed(keys):
+            if future.cancelled():
+                continue
+            if (error := future.exception()) is None:
+                yield keys[future]
+            else:
+                errors.append(error)
+                for waiting in keys:
+                    waiting.cancel()
+        if errors:
+            raise errors[0]
 
     def get(self, key: str) -> bytes:
         """See `AssetStore.get`."""
