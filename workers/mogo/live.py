@@ -7,7 +7,6 @@ must keep elsewhere, to go on after its worker died, are its tokens and prompts 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +22,7 @@ from shared.runtime.live.port import LiveFrame, Show
 from shared.settings import settings as configuration
 from shared.streams.frames import Frame
 from shared.text.features import TextFeatures
+from shared.text.graph import Node, SemanticGraph
 from shared.text.keys import as_served
 from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
@@ -31,7 +31,7 @@ from workers.mogo.generate import Generator, Settings
 from workers.mogo.streaming import Streams, sessions_of_product
 from workers.mogo.tokenizer import DecoderState
 
-WARM_FRAMES = 3
+WARM_CALLS = 3
 """Compiled code watches two calls and is made ready in the third."""
 
 
@@ -258,21 +258,20 @@ def create_show() -> Show:
     if is_small(generator.transformer):
         torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(as_served(bundle.manifest.text))
-
-    def parse(prompt: str) -> TextFeatures:
-        return pipeline.features([prompt])[0]
-
     return Show(
-        open_room=lambda slots: _warm(LiveRoom(generator, slots), parse),
-        parse=parse,
+        open_room=lambda slots: _warm(LiveRoom(generator, slots), pipeline),
+        parse=lambda prompt: pipeline.features([prompt])[0],
         device=str(generator.device),
     )
 
 
-def _warm(room: LiveRoom, parse: Callable[[str], TextFeatures]) -> LiveRoom:
-    """The room, whose first frames will not wait for what torch does once."""
-    session = room.start(parse("a person stands"), 0)
-    for _ in range(WARM_FRAMES):
+def _warm(room: LiveRoom, pipeline: TextPipeline) -> LiveRoom:
+    """The room, whose first frames will not wait for what torch does once. No rewriter is asked: it may cost money."""
+    words = ("a", "person", "stands")
+    graph = SemanticGraph(" ".join(words), words, (Node(0, "motion", " ".join(words), (0, 1, 2)),), ())
+    session = room.start(TextFeatures(graph.text, graph.text, graph, pipeline.encode(graph)), 0)
+    for _ in range(WARM_CALLS):
+        pipeline.labeller.label([words])
         room.step()
     room.stop(session)
     return room
