@@ -21,6 +21,7 @@ way form a group that is turned at once: all rigid bodies, arms and legs, elbows
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -228,7 +229,7 @@ class _Bones(_Joints):
         return np.where(seen, ways * (self.lengths / np.where(seen, far, 1.0)), self.offsets)
 
 
-class _Group(_Joints):
+class _Group(_Joints, ABC):
     """Joints that turn in the same way."""
 
     def place(self, rows: _Rows) -> Array:
@@ -238,9 +239,9 @@ class _Group(_Joints):
             rows.places[:, self.joints] = rows.places.take(self.parents, 1) + rotate(before, self.offsets)
         return before
 
+    @abstractmethod
     def turn(self, rows: _Rows) -> None:
         """Place and turn the joints."""
-        raise NotImplementedError
 
 
 class _Bodies(_Group):
