@@ -14,22 +14,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from shared.nn.packed import PackedLinear, can_pack, pack_linears
-
-SEQUENCE_MULTIPLE = 16
-"""Sequences padded to a multiple of this give the same bits however much padding follows (see `pad_length`)."""
-PACKED_MULTIPLE = 8
-"""What is enough after `Transformer.lower`: packed products give a row the same bits beside any others, and attention
-pads its own rows and keys on to `SEQUENCE_MULTIPLE`."""
-
-
-def pad_length(size: int, multiple: int = SEQUENCE_MULTIPLE) -> int:
-    """`size` rounded up to a multiple of 16.
-
-    A softmax over keys sums in vectors of 16 lanes and treats a last incomplete vector apart. Where all readable keys
-    lie in whole vectors, masked keys behind them add exact zeros: measured with torch 2.13 on AVX-512, float32 and
-    bfloat16, outputs are equal bit by bit.
-    """
-    return -(-size // multiple) * multiple
+from shared.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
 
 
 def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
@@ -48,32 +33,18 @@ def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:
     return x * (kept.to(x.dtype) * (256 / (256 - cut)))
 
 
-def _attention(query: Tensor, key: Tensor, value: Tensor, mask: Tensor | None, rate: float) -> Tensor:
-    """Scaled dot-product attention written out, for CPUs: queries (B, H, Q, D), keys and values (B, H, S, D), `mask`
-    (B or 1, 1, Q or 1, S).
+def _attention(query: Tensor, key: Tensor, value: Tensor, bias: Tensor, rate: float) -> Tensor:
+    """Scaled dot-product attention written out, for CPUs: queries (B · H, Q, D), keys and values (B · H, S, D), `bias`
+    of the scores (B · H or 1, Q or 1, S or 1).
 
     At 64 rows torch's fused CPU kernel takes twice as long forward, and a third of a training step backward.
     """
-    batch, heads, size, width = query.shape
-    keys = key.shape[2]
-    bias = query.new_zeros(1, 1, 1)
-    if mask is not None:
-        bias = torch.zeros(mask.shape, dtype=query.dtype, device=mask.device).masked_fill(~mask, -1e30)
-        queries = mask.shape[2]  # 1 where all of them read the same
-        bias = bias.expand(batch, heads, queries, keys).reshape(batch * heads, queries, keys)
-    query, key, value = (x.reshape(batch * heads, -1, width) for x in (query, key, value))
-    scores = torch.baddbmm(bias, query, key.transpose(1, 2), alpha=width**-0.5)  # (B · H, Q, S)
+    scores = torch.baddbmm(bias, query, key.transpose(1, 2), alpha=query.shape[-1] ** -0.5)  # (B · H, Q, S)
     if rate > 0 or torch.is_grad_enabled():
         weights = dropout(scores.float().softmax(-1), rate, training=True).to(value.dtype)
     else:
         weights = scores.softmax(-1)
-    return torch.bmm(weights, value).view(batch, heads, size, width)
-
-
-def _whole(rows: Tensor) -> Tensor:
-    """(B, H, S, D), S rounded up to a multiple of 16 with zeros."""
-    missing = -rows.shape[2] % SEQUENCE_MULTIPLE
-    return F.pad(rows, (0, 0, 0, missing)) if missing else rows
+    return torch.bmm(weights, value)
 
 
 class Attention(nn.Module):
@@ -86,7 +57,6 @@ class Attention(nn.Module):
             raise ValueError(f"width {width} does not divide into {heads} heads")
         self.heads = heads
         self.dropout = dropout
-        self.packed = False
         self.qkv = nn.Linear(width, 3 * width)
         self.out = nn.Linear(width, width)
 
@@ -98,14 +68,20 @@ class Attention(nn.Module):
         rate = self.dropout if self.training else 0.0
         if x.device.type != "cpu":
             mixed = F.scaled_dot_product_attention(query, key, value, attn_mask=mask, dropout_p=rate)
-        elif self.packed and mask is not None:
-            query, key, value = (_whole(part) for part in (query, key, value))
-            mixed = _attention(query, key, value, F.pad(mask, (0, key.shape[2] - size)), rate)
         else:
-            mixed = _attention(query, key, value, mask, rate)
+            bias = query.new_zeros(1, 1, 1)
+            if mask is not None:
+                bias = key_bias(mask, query.dtype).expand(batch, self.heads, -1, -1).flatten(0, 1)
+            query, key, value = (part.reshape(batch * self.heads, size, -1) for part in (query, key, value))
+            mixed = _attention(query, key, value, bias, rate).view(batch, self.heads, size, -1)
         # Not before: float32 products of few rows add in another order on some processors.
         mixed = mixed[:, :, : size if rows is None else rows]
         return self.out(mixed.transpose(1, 2).reshape(batch, -1, width))
+
+    def ragged(self, x: Tensor, where: Ragged, kept: Tensor | None = None) -> Tensor:
+        """`forward` of rows without padding: (R, w) -> (R, w), or the rows `kept` of it; no gradient."""
+        query, key, value = where.sequences(self.qkv(x))
+        return self.out(where.rows(_attention(query, key, value, where.bias, 0.0), kept))
 
 
 class Block(nn.Module):
@@ -132,11 +108,19 @@ class Block(nn.Module):
         x = self.norm1(x[:, :rows] + self._drop(self.attention(x, mask, rows)))
         return self.norm2(x + self.feedforward(x))
 
+    def ragged(self, x: Tensor, where: Ragged, kept: Tensor | None = None) -> Tensor:
+        """`forward` of rows without padding: (R, w) -> (R, w), or the rows `kept` of it; no gradient."""
+        mine = x if kept is None else x[kept]
+        if self.norm_first:
+            x = mine + self.attention.ragged(self.norm1(x), where, kept)
+            return x + self.feedforward(self.norm2(x))
+        x = self.norm1(mine + self.attention.ragged(x, where, kept))
+        return self.norm2(x + self.feedforward(x))
+
     def pack(self, dtype: torch.dtype) -> None:
         """Pack the matrices for inference on a CPU, GELU into the first of the feed-forward."""
         if isinstance(self.wide, nn.Linear):
             self.wide, self.gelu = PackedLinear(self.wide, dtype, gelu=True), nn.Identity()
-        self.attention.packed = True
         pack_linears(self, dtype)
 
     def feedforward(self, x: Tensor) -> Tensor:
@@ -166,9 +150,11 @@ class Transformer(nn.Module):
             Block(width, heads, feedforward, dropout, attention_dropout, norm_first=norm_first) for _ in range(layers)
         )
         self.norm = nn.LayerNorm(width) if norm_first else nn.Identity()
+        self.heads = heads
         self.dropout = dropout
         self.dtype = torch.float32
         self.multiple = SEQUENCE_MULTIPLE  # of rows, for bits that do not depend on padding
+        self.packed = False
 
     def forward(self, x: Tensor, valid: Tensor | None, rows: int | None = None) -> Tensor:
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
@@ -177,6 +163,8 @@ class Transformer(nn.Module):
         After `lower`, and under autocast, everything between runs in bfloat16: casting around each matrix costs more
         than it saves.
         """
+        if self.packed:
+            return self._ragged(x, torch.ones(x.shape[:2], dtype=torch.bool) if valid is None else valid, rows)
         mask = None if valid is None else valid[:, None, None, :]
         kind = x.device.type
         dtype = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else self.dtype
@@ -184,6 +172,15 @@ class Transformer(nn.Module):
         for block in self.blocks[:-1]:
             x = block(x, mask)
         return self.norm(self.blocks[-1](x, mask, rows)).float()
+
+    def _ragged(self, x: Tensor, valid: Tensor, rows: int | None) -> Tensor:
+        where = Ragged.of(valid, self.heads, self.dtype)
+        kept, place = where.first(x.shape[1] if rows is None else rows)
+        x = x.flatten(0, 1)[where.taken].to(self.dtype)
+        blocks = [block for block in self.blocks if isinstance(block, Block)]
+        for block in blocks[:-1]:
+            x = block.ragged(x, where)
+        return self.norm(blocks[-1].ragged(x, where, kept))[place].float()
 
     def lower(self, dtype: torch.dtype) -> None:
         """Cast to `dtype` for inference, for good; what goes in and comes out stays float32."""
@@ -193,7 +190,7 @@ class Transformer(nn.Module):
             for block in self.blocks:
                 if isinstance(block, Block):
                     block.pack(dtype)
-            self.multiple = PACKED_MULTIPLE
+            self.packed, self.multiple = True, 1
 
 
 def sinusoidal_positions(size: int, width: int) -> Tensor:

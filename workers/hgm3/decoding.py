@@ -14,7 +14,7 @@ from torch import Tensor
 
 from shared.nn.convolution import frame_mask
 from shared.nn.masking import remaining_masks
-from shared.nn.sampling import guide, sample_top_k, uniform
+from shared.nn.sampling import sample_top_k, uniform
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.model import ACTION, MOTION, SPECIFIC, MaskedTransformer, ResidualTransformer
 
@@ -102,7 +102,7 @@ def _base_pass(
     """One pass: predict at the masked tokens, keep all but the `masked_left` (B,) least confident. (B, n) -> (B, n)."""
     size = base.shape[1]
     valid = frame_mask(items.lengths, size)  # (B, n)
-    guided = guide(*_base_logits(model, items, base, valid, level, options), config.guidance)  # (B, n, K)
+    guided = _base_logits(model, items, base, valid, level, config.guidance, options)  # (B, n, K)
     noise = uniform(items.seeds, BASE_STREAM, step, torch.arange(size, device=base.device))
     drawn = sample_top_k(guided, noise, temperature=config.temperature, share=config.top_k)  # (B, n)
     # Confidence = the guided softmax itself, before temperature and top-k.
@@ -116,23 +116,28 @@ def _base_pass(
 
 
 def _base_logits(
-    model: MaskedTransformer, items: Items, base: Tensor, valid: Tensor, level: int, options: DecodeOptions
-) -> tuple[Tensor, Tensor]:
-    """Logits (B, n, K) with and without condition, from one forward of 2 B sequences."""
+    model: MaskedTransformer,
+    items: Items,
+    base: Tensor,
+    valid: Tensor,
+    level: int,
+    guidance: float,
+    options: DecodeOptions,
+) -> Tensor:
+    """Guided logits (B, n, K), from one forward of 2 B sequences."""
     null = torch.cat([model.condition.null.expand_as(items.condition[:, :1]), items.condition[:, 1:]], 1)
     visible = model.condition.visible(items.present, level)
     first = torch.zeros_like(visible)
     first[:, 0] = True
-    logits = model(
+    return model(
         base.repeat(2, 1),
         valid.repeat(2, 1),
         torch.cat([items.condition, null]),
         torch.cat([visible, first]),
         (valid & (base == model.mask_token)).repeat(2, 1),
         trim=options.trim_slots,
+        guidance=guidance,
     )
-    with_condition, without = logits.chunk(2)
-    return with_condition, without
 
 
 def decode_residual(
@@ -146,9 +151,14 @@ def decode_residual(
         total = torch.stack(below).sum(0)  # (B, n, d)
         levels = torch.full_like(items.lengths, level).repeat(2)
         both = torch.cat([items.sentence, model.null.expand_as(items.sentence)])  # (2 B, w')
-        logits = model(total.repeat(2, 1, 1), valid.repeat(2, 1), levels, both, trim=options.trim_slots)
-        with_text, without = logits.chunk(2)
-        guided = guide(with_text, without, config.residual_guidance)
+        guided = model(
+            total.repeat(2, 1, 1),
+            valid.repeat(2, 1),
+            levels,
+            both,
+            trim=options.trim_slots,
+            guidance=config.residual_guidance,
+        )
         noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
         drawn = sample_top_k(
             guided, noise, temperature=config.residual_temperature, share=config.residual_top_k

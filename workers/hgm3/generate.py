@@ -116,8 +116,8 @@ class Generator:
         for part in networks.parts().values():
             part.to(chosen)
         # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.
-        networks.masked.sequence.transformer.lower(dtype)
-        networks.residual.sequence.transformer.lower(dtype)
+        networks.masked.lower(dtype)
+        networks.residual.lower(dtype)
         if dtype != torch.float32:
             networks.tokenizer.decoder.lower(dtype)
         return cls(verified, config, networks, chosen, dtype)

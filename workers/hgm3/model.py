@@ -22,7 +22,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.transformer import Transformer, initialize, pad_length, sinusoidal_positions
+from shared.nn.packed import PackedLinear, can_pack
+from shared.nn.ragged import pad_length
+from shared.nn.sampling import guide
+from shared.nn.transformer import Transformer, initialize, sinusoidal_positions
 from workers.hgm3.config import ConditionConfig, HGM3Config, TransformerConfig
 
 EDGE_TYPES = 12
@@ -197,7 +200,7 @@ class SequenceModel(nn.Module):
         order = torch.argsort(2 - readable.long() - first.long(), dim=1, stable=True)
         longest = int(readable.sum(1).max()) if trim else size + slots
         length = pad_length(longest, self.transformer.multiple)
-        rows = min(pad_length(int(wanted.sum(1).max()) if trim else size), length)
+        rows = min(pad_length(int(wanted.sum(1).max()) if trim else size, self.transformer.multiple), length)
         place = torch.arange(length, device=order.device)
         order = order[:, place.clamp(max=size + slots - 1)]  # (B, Q)
         readable = readable.gather(1, order) & (place < size + slots)
@@ -213,19 +216,42 @@ def at_tokens(outputs: Tensor, index: Tensor, size: int) -> Tensor:
     return placed.scatter(1, index, outputs)[:, :size]
 
 
+def guided(hidden: Tensor, guidance: float | None) -> Tensor:
+    """Classifier-free guidance in front of the last matrix, which is linear: the same logits for half of its work.
+
+    (B, …), the first half with condition and the second without, to (B / 2, …); without `guidance` nothing changes.
+    """
+    if guidance is None:
+        return hidden
+    with_condition, without = hidden.chunk(2)
+    return guide(with_condition, without, guidance)
+
+
+def packed_gelu(dense: nn.Module, gelu: nn.Module, dtype: torch.dtype) -> tuple[nn.Module, nn.Module]:
+    """A linear layer and the GELU behind it, packed into one where that can be done."""
+    if isinstance(dense, nn.Linear) and can_pack(dense):
+        return PackedLinear(dense, dtype, gelu=True), nn.Identity()
+    return dense, gelu
+
+
 class TokenHead(nn.Module):
     """Dense, GELU, norm, and one logit a code (MoMask); `tied` gives the last matrix, else it is learnt."""
 
     def __init__(self, width: int, codes: int, *, tied: bool) -> None:
         super().__init__()
-        self.dense = nn.Linear(width, width)
+        self.dense: nn.Module = nn.Linear(width, width)
+        self.gelu: nn.Module = nn.GELU()
         self.norm = nn.LayerNorm(width)
         self.bias = nn.Parameter(torch.zeros(codes))
         self.codes = None if tied else nn.Linear(width, codes, bias=False)
 
-    def forward(self, x: Tensor, tied: Tensor | None = None) -> Tensor:
-        """(B, n, w) -> (B, n, K) logits, float32."""
-        h = self.norm(F.gelu(self.dense(x)))
+    def lower(self, dtype: torch.dtype) -> None:
+        """Pack the first matrix for inference on a CPU; logits stay float32."""
+        self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
+
+    def forward(self, x: Tensor, tied: Tensor | None = None, guidance: float | None = None) -> Tensor:
+        """(B, n, w) -> (B, n, K) logits, float32; with `guidance` (B / 2, n, K): see `guided`."""
+        h = guided(self.norm(self.gelu(self.dense(x))), guidance)
         logits = self.codes(h) if self.codes is not None else F.linear(h * h.shape[-1] ** -0.5, _given(tied))
         return logits.float() + self.bias
 
@@ -245,17 +271,31 @@ class MaskedTransformer(nn.Module):
         self.head = TokenHead(config.masked.width, codes, tied=config.compact)
         initialize(self)
 
+    def lower(self, dtype: torch.dtype) -> None:
+        """Make ready for inference; matrices in `dtype`."""
+        self.sequence.transformer.lower(dtype)
+        self.head.lower(dtype)
+
     def forward(
-        self, tokens: Tensor, valid: Tensor, condition: Tensor, visible: Tensor, wanted: Tensor, *, trim: bool = True
+        self,
+        tokens: Tensor,
+        valid: Tensor,
+        condition: Tensor,
+        visible: Tensor,
+        wanted: Tensor,
+        *,
+        trim: bool = True,
+        guidance: float | None = None,
     ) -> Tensor:
-        """Logits (B, n, K) at the `wanted` tokens (B, n) bool; elsewhere they mean nothing.
+        """Logits (B, n, K) at the `wanted` tokens (B, n) bool, elsewhere they mean nothing; with `guidance` (B / 2, n,
+        K): see `guided`.
 
         `tokens` (B, n) in 0 … K, K = [MASK], any value where not `valid`; for the rest see `SequenceModel`.
         """
         embedded = self.embedding(tokens.masked_fill(~valid, self.mask_token))
         hidden, index = self.sequence(embedded, valid, condition, visible, wanted=wanted, trim=trim)
-        logits = self.head(hidden, self.embedding.weight[:-1] if self.compact else None)
-        return at_tokens(logits, index, valid.shape[1])
+        logits = self.head(hidden, self.embedding.weight[:-1] if self.compact else None, guidance)
+        return at_tokens(logits, index[: len(logits)], valid.shape[1])
 
 
 class LossPredictor(nn.Module):
@@ -301,7 +341,8 @@ class ResidualTransformer(nn.Module):
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         else:
             self.embedding = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.5)
-            self.dense = nn.Linear(width, width)
+            self.dense: nn.Module = nn.Linear(width, width)
+            self.gelu: nn.Module = nn.GELU()
             self.norm = nn.LayerNorm(width)
             self.output = nn.Parameter(torch.randn(t.levels - 1, t.codes, width) * 0.02)
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
@@ -309,6 +350,12 @@ class ResidualTransformer(nn.Module):
         if config.compact:  # as loud as the positions, like embeddings
             nn.init.normal_(self.enter.weight, std=0.5 * t.code_width**-0.5)
             nn.init.zeros_(self.leave.weight)  # first guess: how often each code occurs
+
+    def lower(self, dtype: torch.dtype) -> None:
+        """Make ready for inference; matrices in `dtype`."""
+        self.sequence.transformer.lower(dtype)
+        if not self.compact:
+            self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
 
     def set_codebooks(self, codebooks: Tensor) -> None:
         """Hand over the tokenizer's codebooks (V, K, d); without effect unless compact."""
@@ -328,8 +375,17 @@ class ResidualTransformer(nn.Module):
         token = self.text(self.normalizer.sentence(features))
         return token if dropped is None else torch.where(dropped[:, None], self.null.to(token.dtype), token)
 
-    def forward(self, total: Tensor, valid: Tensor, level: Tensor, sentence: Tensor, *, trim: bool = True) -> Tensor:
-        """Logits (B, n, K) of level `level` (B,) in 1 … V - 1.
+    def forward(
+        self,
+        total: Tensor,
+        valid: Tensor,
+        level: Tensor,
+        sentence: Tensor,
+        *,
+        trim: bool = True,
+        guidance: float | None = None,
+    ) -> Tensor:
+        """Logits (B, n, K) of level `level` (B,) in 1 … V - 1; with `guidance` (B / 2, n, K): see `guided`.
 
         Args:
             total: (B, n, d or w), sum of `embed` over the levels below.
@@ -341,19 +397,21 @@ class ResidualTransformer(nn.Module):
         condition = torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)  # (B, 2, w)
         visible = torch.ones(condition.shape[:2], dtype=torch.bool, device=valid.device)
         hidden, index = self.sequence(x, valid, condition, visible, trim=trim)
-        return at_tokens(self._logits(hidden, level - 1), index, valid.shape[1])
+        logits = self._logits(hidden, level - 1, guidance)
+        return at_tokens(logits, index[: len(logits)], valid.shape[1])
 
-    def _logits(self, hidden: Tensor, index: Tensor) -> Tensor:
+    def _logits(self, hidden: Tensor, index: Tensor, guidance: float | None) -> Tensor:
         """(B, n, w) -> (B, n, K) float32, with the codes of each sample's own level (B,)."""
+        index = index if guidance is None else index.chunk(2)[0]
         if not self.compact:
-            hidden = self.norm(F.gelu(self.dense(hidden)))
+            hidden = guided(self.norm(self.gelu(self.dense(hidden))), guidance)
             if bool((index == index[0]).all()):  # decoding: one level at a time
                 return F.linear(hidden, self.output[index[0]]).float() + self.bias[index[0]]
             return (
                 torch.bmm(hidden, self.output[index].to(hidden.dtype).transpose(1, 2)).float()
                 + (self.bias[index][:, None])
             )
-        leaving = self.leave(hidden).float() * self.scale[index][:, None, None]  # (B, n, d)
+        leaving = guided(self.leave(hidden), guidance).float() * self.scale[index][:, None, None]  # (B, n, d)
         if bool((index == index[0]).all()):
             return F.linear(leaving, self.codebooks[1 + index[0]]) + self.bias[index[0]]
         codes = self.codebooks[1:][index]  # (B, K, d)

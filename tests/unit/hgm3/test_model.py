@@ -10,6 +10,7 @@ import torch
 
 from shared.motion.features import HUMANML3D_263
 from shared.nn.motion_tokenizer import biased_std
+from shared.nn.sampling import guide
 from tests.support.prepared import graph, made_up_texts, swinging, text_features
 from workers.hgm3.conditions import graph_batch
 from workers.hgm3.config import PAPER, STARTER, TINY, named_config
@@ -308,3 +309,27 @@ def test_every_configuration_builds() -> None:
 
     for name in ("starter", "tiny"):
         Networks.build(named_config(name))
+
+
+@pytest.mark.parametrize("compact", [True, False])
+@torch.inference_mode()
+def test_guidance_in_front_of_the_last_matrix_equals_guidance_of_logits(compact: bool) -> None:
+    torch.manual_seed(0)
+    config = replace(TINY, compact=compact)
+    masked, residual = MaskedTransformer(config).eval(), ResidualTransformer(config).eval()
+    residual.set_codebooks(torch.randn(3, 32, 16))
+    torch.nn.init.normal_(residual.bias)
+    if compact:
+        torch.nn.init.normal_(residual.leave.weight)
+    valid = torch.arange(8)[None].repeat(4, 1) < torch.tensor([[5], [8], [5], [8]])
+    visible = torch.zeros(4, 25, dtype=torch.bool)
+    visible[:, 0] = True
+    visible[:2, 1:3] = True  # the first half has more to read
+    inputs = torch.randint(33, (2, 8)).repeat(2, 1), valid, torch.randn(4, 25, 32), visible, valid
+    with_condition, without = masked(*inputs).chunk(2)
+    found = masked(*inputs, guidance=4.0)
+    torch.testing.assert_close(found[valid[:2]], guide(with_condition, without, 4.0)[valid[:2]])
+    inputs = torch.randn(4, 8, 16 if compact else 32), valid, torch.full((4,), 2), torch.randn(4, 32)
+    with_condition, without = residual(*inputs).chunk(2)
+    found = residual(*inputs, guidance=5.0)
+    torch.testing.assert_close(found[valid[:2]], guide(with_condition, without, 5.0)[valid[:2]], atol=1e-4, rtol=1e-4)

@@ -9,7 +9,8 @@ import torch
 from torch import nn
 
 from shared.nn.ema import WeightAverage, update_average, warm_momentum
-from shared.nn.transformer import Transformer, dropout, pad_length, sinusoidal_positions
+from shared.nn.ragged import pad_length
+from shared.nn.transformer import Transformer, dropout, sinusoidal_positions
 
 
 def transformer(*, norm_first: bool = True) -> Transformer:
@@ -56,6 +57,19 @@ def test_more_padding_and_another_batch_change_no_bit_after_packing(dtype: torch
         assert torch.equal(whole[row, :size], cut[row, :size])
         assert torch.equal(whole[row, :16], wanted[row, :16]) or size < 16
     assert torch.equal(whole[2, :13], alone[0, :13])
+
+
+@pytest.mark.parametrize("norm_first", [True, False])
+@torch.inference_mode()
+def test_rows_without_padding_equal_padded_ones(norm_first: bool) -> None:
+    model = transformer(norm_first=norm_first)
+    x, valid = torch.randn(4, 21, 32), torch.rand(4, 21) < 0.6
+    valid[:, 3] = True
+    padded = model(x, valid, 9)
+    model.lower(torch.float32)
+    assert model.packed
+    exists = valid[:, :9]
+    torch.testing.assert_close(model(x, valid, 9)[exists], padded[exists], atol=1e-5, rtol=1e-5)
 
 
 @torch.inference_mode()
