@@ -24,6 +24,7 @@ from shared.text.graph import Node, SemanticGraph
 from workers.mogo.bundle import random_bundle
 from workers.mogo.generate import Generator, Settings
 from workers.mogo.live import LiveRoom
+from workers.mogo.packed_model import PackedModel
 from workers.mogo.streaming import Streams
 
 THREADS = 2
@@ -118,7 +119,7 @@ def _first_frame(generator: Generator) -> None:
 
 def _streams(generator: Generator, guidance: float, window: int) -> Streams:
     inference = replace(Settings(guidance=guidance).inference(generator.config.inference), window=window)
-    return Streams(generator.transformer, 1, inference, dtype=generator.dtype)
+    return Streams(PackedModel(generator.transformer, dtype=generator.dtype), 1, inference)
 
 
 def _sentence(generator: Generator) -> torch.Tensor:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from workers.generating.port import Control, Limits, NoControl, Request, open_bu
 from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
-from workers.mogo.streaming import Streams, sessions_of_product
+from workers.mogo.packed_model import PackedModel, sessions_of_product
+from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import Tokenizer
 
 MAX_SESSIONS = 32
@@ -95,6 +97,12 @@ class Generator:
         verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
         config, tokenizer, transformer = load_networks(verified)
         return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
+
+    @cached_property
+    def packed(self) -> PackedModel:
+        """What draws motions side by side; products of the same shape for any number of them, so the same tokens."""
+        group = sessions_of_product(self.transformer, MAX_SESSIONS)
+        return PackedModel(self.transformer, dtype=self.dtype, group=group)
 
     def settings(self, values: Mapping[str, Any]) -> Settings:
         """An item's settings, checked. Raises InvalidInput."""
@@ -176,13 +184,7 @@ class _Drawing:
         )
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
-        self.streams = Streams(
-            generator.transformer,
-            max(1, min(MAX_SESSIONS, len(requests))),
-            inference,
-            dtype=generator.dtype,
-            group=sessions_of_product(generator.transformer, MAX_SESSIONS),  # whatever the number: the same tokens
-        )
+        self.streams = Streams(generator.packed, max(1, min(MAX_SESSIONS, len(requests))), inference)
         self._device, self._ends_from = generator.device, generator.config.min_frames
 
     @property

@@ -28,7 +28,8 @@ from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
 from workers.mogo.bundle import MODEL
 from workers.mogo.generate import Generator, Settings
-from workers.mogo.streaming import Streams, sessions_of_product
+from workers.mogo.packed_model import PackedModel, sessions_of_product
+from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import DecoderState
 
 WARM_CALLS = 3
@@ -71,7 +72,8 @@ class LiveRoom:
         self.skeleton = generator.layout.skeleton
         self.capacity = capacity
         group = sessions_of_product(generator.transformer, capacity)
-        self._streams = Streams(generator.transformer, capacity, inference, dtype=generator.dtype, group=group)
+        packed = PackedModel(generator.transformer, dtype=generator.dtype, group=group)
+        self._streams = Streams(packed, capacity, inference)
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # the session in each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)

@@ -9,7 +9,6 @@ beside one are, nor on how many there are (`shared.nn.sampling.uniform`).
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
@@ -18,18 +17,14 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from shared.errors import InvalidInput
-from shared.nn.compiled import compiled
-from shared.nn.packed import is_small, pack_linears
 from shared.nn.sampling import guide, sample_top_k, uniform
 from workers.mogo.attention import HIDDEN, RelativeAttention, Slots
 from workers.mogo.config import InferenceConfig
-from workers.mogo.depth import DepthFrame, DepthStep
-from workers.mogo.model import RQHCTransformer, TrunkStep
+from workers.mogo.depth import DepthFrame
+from workers.mogo.packed_model import PackedModel
 
 NEVER = 2**62
 """More frames than any session makes."""
-MOST_GROUPED = 8
-"""Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
 TOKEN_STREAM = 4
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""
 
@@ -48,9 +43,10 @@ class StreamState:
     memory: Tensor  # (layers, 2, S, H, L, 1 + W, w / H) keys and values
 
     @classmethod
-    def empty(cls, model: RQHCTransformer, sessions: int, lanes: int, window: int) -> StreamState:
+    def empty(cls, packed: PackedModel, sessions: int, branches: int, window: int) -> StreamState:
         """Room for so many sessions."""
-        t, device = model.config.transformer, model.head.weight.device
+        model, device = packed.network, packed.device
+        t, lanes = model.config.transformer, branches * model.levels
         whole = torch.zeros(4, sessions, dtype=torch.long, device=device)
         return cls(
             seeds=whole[0],
@@ -69,52 +65,37 @@ class StreamState:
         return {**rows, "memory": self.memory[:, :, index]}
 
 
-def sessions_of_product(model: RQHCTransformer, sessions: int) -> int:
-    """`group` of `Streams` that serves up to so many `sessions` well: large weights are read once for all of them."""
-    return 1 if is_small(model) else min(sessions, MOST_GROUPED)
-
-
 class Streams:
     """Sessions that share the forward passes of one model; they join, leave and are steered between steps."""
 
     def __init__(
         self,
-        model: RQHCTransformer,
+        packed: PackedModel,
         capacity: int,
         config: InferenceConfig | None = None,
-        *,
-        dtype: torch.dtype = torch.float32,
-        group: int = 1,
     ) -> None:
         """Make room for `capacity` sessions.
 
         Args:
-            model: copied, and the copy packed for inference.
+            packed: the model, shared with other streams.
             capacity: sessions at most.
             config: None = the model's own.
-            dtype: of the packed matrices on a CPU; bfloat16 halves what a frame reads.
-            group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
 
         Raises:
             InvalidInput: a window beyond what the model was trained for.
         """
-        self.config = config or model.config.inference
-        self.window, self.farthest = self.config.window, model.config.max_frames
+        self.packed, self.model = packed, packed.network
+        self.config = config or self.model.config.inference
+        self.window, self.farthest = self.config.window, self.model.config.max_frames
         if not 1 <= self.window <= self.farthest:
             raise InvalidInput(
                 f"a window of {self.window} frames", hint=f"This model can look back 1 to {self.farthest} frames."
             )
         self.branches = 1 if self.config.guidance == 1 else 2
-        self.state = StreamState.empty(model, capacity, self.branches * model.levels, self.window)
+        self.state = StreamState.empty(packed, capacity, self.branches, self.window)
         self.capacity = capacity
-        self.model = copy.deepcopy(model).eval().requires_grad_(False)
         self.sessions: list[int] = []  # the session in each row: the active rows come first
         self._started = 0
-        self.blocks = self.model.trunk.layers
-        self.terms = [block.attention.terms(self.model.trunk.sinusoids).contiguous() for block in self.blocks]
-        pack_linears(self.model, dtype, group=group)
-        self._steps = [compiled(TrunkStep(block)) for block in self.blocks]
-        self._depth = None if self.model.depth is None else compiled(DepthStep(self.model.depth))
 
     def start(
         self, sentence: Tensor, seed: int, *, ends_from: int = NEVER, past: Tensor | None = None, skipped: int = 0
@@ -178,8 +159,8 @@ class Streams:
         active, state = len(self.sessions), self.state
         slots = self._slots(active)
         x = self.model.columns(state.last[:active, None])[:, :, 0].repeat(1, self.branches, 1)  # (s, L, w)
-        for layer, step in enumerate(self._steps):
-            x = step(x, state.memory[layer, :, :active], self.terms[layer], slots)
+        for layer, step in enumerate(self.packed.steps):
+            x = step(x, state.memory[layer, :, :active], self.packed.terms[layer], slots)
         return torch.where((state.made[:active] == 0)[:, None, None], state.opening[:active], self.model.trunk.norm(x))
 
     def accept(self, columns: Tensor) -> None:
@@ -218,13 +199,13 @@ class Streams:
         reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
         position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1
         slots = torch.cat([position.new_zeros(1), 1 + position % self.window])
-        for layer, block in enumerate(self.blocks):
+        for layer, block in enumerate(self.packed.blocks):
 
             def attend(h: Tensor, i: int = layer, attention: RelativeAttention = block.attention) -> Tensor:
                 query, key, value = (part.unflatten(0, (-1, len(slots))) for part in attention.project(h))
                 for kept, part in zip(self.state.memory[i, :, row], (key, value), strict=True):
                     kept[:, :, slots] = part.permute(2, 0, 1, 3)  # (L, 1 + n, H, w / H), heads first
-                return attention.out(attention.mix(query, key, value, self.terms[i], reach).flatten(0, 1))
+                return attention.out(attention.mix(query, key, value, self.packed.terms[i], reach).flatten(0, 1))
 
             x = block(x, attend)
         self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, 0])
@@ -250,8 +231,8 @@ class Streams:
             logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
         else:
-            assert self._depth is not None
-            frame, drawn = DepthFrame(model.depth, self._depth, states), list[Tensor]()
+            assert self.packed.depth is not None
+            frame, drawn = DepthFrame(model.depth, self.packed.depth, states), list[Tensor]()
             for level in range(levels):
                 below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
                 logits = model.head(frame.next(below))[:, :, None]

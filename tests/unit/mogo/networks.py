@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import torch
 
-from workers.mogo.config import TINY, MOGOConfig
+from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
+from workers.mogo.packed_model import PackedModel
+from workers.mogo.streaming import Streams
 
 
 def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:
@@ -17,6 +19,18 @@ def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:
     made.prompt.mean.normal_()
     made.prompt.std.uniform_(0.5, 1.5)
     return made
+
+
+def opened(
+    model: RQHCTransformer,
+    capacity: int,
+    config: InferenceConfig | None = None,
+    *,
+    dtype: torch.dtype = torch.float32,
+    group: int = 1,
+) -> Streams:
+    """Room for sessions of a model of its own."""
+    return Streams(PackedModel(model, dtype=dtype, group=group), capacity, config)
 
 
 def columns(frames: int, batch: int = 1, config: MOGOConfig = TINY) -> torch.Tensor:

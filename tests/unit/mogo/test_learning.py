@@ -11,11 +11,10 @@ import torch
 from workers.mogo.config import TINY
 from workers.mogo.losses import scale_penalty, sequence_loss
 from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
-from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.tokenizing import tokenizer_loss
 
-from .networks import columns, prompts
+from .networks import columns, opened, prompts
 
 LEVELS = TINY.tokenizer.levels
 
@@ -77,7 +76,7 @@ def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    streams = Streams(model, 2)
+    streams = opened(model, 2)
     for row in range(2):
         streams.start(prompts(2)[row, 0], row, ends_from=0)
     drawn = torch.stack([torch.stack(list(streams.step().values())) for _ in range(19)], 1)  # (2, 19, V)

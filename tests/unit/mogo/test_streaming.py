@@ -13,7 +13,7 @@ from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.streaming import Streams
 
-from .networks import columns, prompts, transformer
+from .networks import columns, opened, prompts, transformer
 
 FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
 GUIDED = replace(TINY, inference=replace(TINY.inference, guidance=2.0))
@@ -32,7 +32,7 @@ def run(streams: Streams, frames: int) -> dict[int, torch.Tensor]:
 
 def alone(seed: int, frames: int, model: RQHCTransformer | None = None) -> torch.Tensor:
     """The columns (frames, V) of a session with nobody beside it."""
-    streams = Streams(model or transformer(), 1)
+    streams = opened(model or transformer(), 1)
     session = streams.start(said(seed), seed)
     return run(streams, frames)[session]
 
@@ -46,7 +46,7 @@ def logits_of(model: RQHCTransformer, states: torch.Tensor, column: torch.Tensor
 def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(config: MOGOConfig) -> None:
     model, tokens = transformer(config), columns(WINDOW)
     whole = model(prompts(1), tokens)[0]  # (V, n + 1, K + 1)
-    streams = Streams(model, 2)
+    streams = opened(model, 2)
     streams.start(said(0), 1)
     for frame in range(WINDOW):
         found = logits_of(model, streams.states(), tokens[0, frame])
@@ -56,7 +56,7 @@ def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(confi
 
 def test_a_session_draws_the_same_tokens_beside_others() -> None:
     frames = 2 * WINDOW + 5
-    streams = Streams(transformer(), 5)
+    streams = opened(transformer(), 5)
     names = {streams.start(said(seed), seed): seed for seed in range(5)}
     for session, found in run(streams, frames).items():
         assert torch.equal(found, alone(names[session], frames))
@@ -70,7 +70,7 @@ def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, 
     model = transformer(replace(TINY, transformer=wide))
 
     def states_of(*seeds: int) -> torch.Tensor:
-        streams = Streams(model, len(seeds), dtype=dtype, group=group)
+        streams = opened(model, len(seeds), dtype=dtype, group=group)
         for seed in seeds:
             streams.start(said(seed), seed)
         run(streams, 8)
@@ -83,7 +83,7 @@ def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, 
 
 
 def test_sessions_join_and_leave_between_frames_and_disturb_nobody() -> None:
-    streams = Streams(transformer(), 3)
+    streams = opened(transformer(), 3)
     first = streams.start(said(1), 1)
     second = streams.start(said(2), 2)
     before = run(streams, 7)
@@ -97,7 +97,7 @@ def test_sessions_join_and_leave_between_frames_and_disturb_nobody() -> None:
 
 
 def test_tokens_depend_on_seed_and_prompt() -> None:
-    streams = Streams(transformer(), 3)
+    streams = opened(transformer(), 3)
     a, b, c = streams.start(said(1), 1), streams.start(said(1), 2), streams.start(said(2), 1)
     found = run(streams, 10)
     assert not torch.equal(found[a], found[b])
@@ -106,13 +106,13 @@ def test_tokens_depend_on_seed_and_prompt() -> None:
 
 @pytest.mark.parametrize("frames", [0, 1, 5, WINDOW, 2 * WINDOW + 3])
 def test_a_saved_session_goes_on_with_the_very_same_tokens(frames: int) -> None:
-    streams = Streams(transformer(), 2)
+    streams = opened(transformer(), 2)
     session = streams.start(said(1), 1)
     for _ in range(frames):
         streams.step()
     saved = streams.save(session)
     expected = run(streams, 20)[session]
-    other = Streams(transformer(), 4)
+    other = opened(transformer(), 4)
     other.start(said(9), 9)
     resumed = other.resume({name: tensor.clone() for name, tensor in saved.items()})
     assert torch.equal(run(other, 20)[resumed], expected)
@@ -120,7 +120,7 @@ def test_a_saved_session_goes_on_with_the_very_same_tokens(frames: int) -> None:
 
 @pytest.mark.parametrize("config", [TINY, GUIDED])
 def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None:
-    streams = Streams(transformer(config), 2)
+    streams = opened(transformer(config), 2)
     session = streams.start(said(1), 1)
     beside = streams.start(said(2), 2)
     run(streams, WINDOW + 3)
@@ -135,7 +135,7 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
     for name in ("seeds", "made", "skipped", "ends_from", "ended", "last"):
         assert torch.equal(after[name], before[name])
     assert all(torch.equal(part, other[name]) for name, part in streams.save(beside).items())
-    fresh = Streams(transformer(config), 1)
+    fresh = opened(transformer(config), 1)
     expected = fresh.save(fresh.start(said(3), 5))
     torch.testing.assert_close(now[..., 0, :], expected["memory"][..., 0, :])
 
@@ -143,7 +143,7 @@ def test_a_steer_changes_position_0_and_nothing_else(config: MOGOConfig) -> None
 def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
     model, tokens, seam = transformer(), columns(WINDOW), 6
     whole = model(torch.cat([prompts(1), prompts(1, seed=1)], 1), tokens, seam=torch.tensor([seam]))[0]
-    streams = Streams(model, 1)
+    streams = opened(model, 1)
     session = streams.start(said(0), 1)
     for frame in range(WINDOW):
         if frame == seam:
@@ -154,7 +154,7 @@ def test_a_steered_stream_equals_the_training_forward_with_a_seam() -> None:
 
 
 def test_a_steer_before_the_first_frame_is_a_start_with_that_prompt() -> None:
-    streams = Streams(transformer(), 1)
+    streams = opened(transformer(), 1)
     session = streams.start(said(1), 7)
     streams.steer(session, said(7))
     assert torch.equal(run(streams, 10)[session], alone(7, 10))
@@ -165,7 +165,7 @@ def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
     skipped = 3 * WINDOW + 5
     whole = model(prompts(1), tokens, skipped=torch.tensor([skipped]))[0]
     read = WINDOW - 4
-    streams = Streams(model, 1)
+    streams = opened(model, 1)
     streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped)
     for frame in range(read, WINDOW):
         found = logits_of(model, streams.states(), tokens[0, frame])
@@ -175,7 +175,7 @@ def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
 
 def test_of_a_long_past_the_last_window_is_read() -> None:
     model, tokens = transformer(), columns(60)
-    streams = Streams(model, 2)
+    streams = opened(model, 2)
     streams.start(said(0), 1, past=tokens[0])
     streams.start(said(0), 1, past=tokens[0, -WINDOW:], skipped=60 - WINDOW)
     first, second = streams.states()
@@ -192,7 +192,7 @@ def test_frames_that_left_the_window_are_forgotten_and_the_prompt_is_not() -> No
     other[:-WINDOW] = (other[:-WINDOW] + 1) % TINY.tokenizer.codes
     states = []
     for past, prompt in ((tokens, said(0)), (other, said(0)), (tokens, said(1))):
-        streams = Streams(model, 1)
+        streams = opened(model, 1)
         streams.start(prompt, 1)
         for column in past:
             streams.states()
@@ -203,7 +203,7 @@ def test_frames_that_left_the_window_are_forgotten_and_the_prompt_is_not() -> No
 
 
 def test_endless_motion_needs_no_more_memory() -> None:
-    streams = Streams(transformer(), 1)
+    streams = opened(transformer(), 1)
     streams.start(said(1), 1)
     address = streams.state.memory.data_ptr()
     run(streams, 5 * WINDOW)
@@ -214,7 +214,7 @@ def test_endless_motion_needs_no_more_memory() -> None:
 def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
     model = transformer(FLAT)
     config = InferenceConfig(guidance=2.0, temperature=0, upper_temperature=0, window=WINDOW)
-    streams = Streams(model, 1, config)
+    streams = opened(model, 1, config)
     session = streams.start(said(1), 1)
     plain = model.prompt(said(1)[None])[:, :, None], model.prompt(said(1)[None], torch.tensor([True]))[:, :, None]
     with_prompt, without = (model.score(model.trunk(p.flatten(0, 1), model.reach(0))[:, 0]) for p in plain)
@@ -227,7 +227,7 @@ def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
 def test_a_stream_never_ends_and_a_clip_ends_when_END_is_drawn() -> None:
     model = transformer()
     model.head.bias.data[-1] = 100.0  # END is all but certain
-    streams = Streams(model, 2)
+    streams = opened(model, 2)
     endless, clip = streams.start(said(1), 1), streams.start(said(1), 1, ends_from=0)
     found = run(streams, 5)
     assert (found[endless] >= 0).all()
@@ -239,7 +239,7 @@ def test_a_stream_never_ends_and_a_clip_ends_when_END_is_drawn() -> None:
 def test_levels_have_temperatures_of_their_own() -> None:
     certain = replace(TINY.inference, upper_temperature=0.0)
     model = transformer(FLAT)
-    streams = Streams(model, 40, certain)
+    streams = opened(model, 40, certain)
     for seed in range(40):
         streams.start(said(1), seed)
     first = torch.stack(list(streams.step().values()))
@@ -248,7 +248,7 @@ def test_levels_have_temperatures_of_their_own() -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    streams = Streams(transformer(), 1)
+    streams = opened(transformer(), 1)
     session = streams.start(said(1), 1)
     saved = streams.save(session)
     with pytest.raises(InvalidInput, match="all 1 sessions"):
@@ -259,8 +259,8 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(InvalidInput, match="not given"):
         streams.start(said(1), 1, skipped=4)
     with pytest.raises(InvalidInput, match="window of 25 frames"):
-        Streams(transformer(), 1, replace(TINY.inference, window=25))
-    other = Streams(transformer(), 1, replace(TINY.inference, window=8))
+        opened(transformer(), 1, replace(TINY.inference, window=25))
+    other = opened(transformer(), 1, replace(TINY.inference, window=8))
     with pytest.raises(InvalidInput, match="another model"):
         other.resume(saved)
     assert other.step() == {}

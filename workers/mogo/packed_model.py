@@ -1,0 +1,41 @@
+"""The inference twin of a model: matrices packed, steps compiled, position terms computed once; any number of
+`Streams` share it."""
+
+from __future__ import annotations
+
+import copy
+
+import torch
+
+from shared.nn.compiled import compiled
+from shared.nn.packed import is_small, pack_linears
+from workers.mogo.depth import DepthStep
+from workers.mogo.model import RQHCTransformer, TrunkStep
+
+MOST_GROUPED = 8
+"""Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
+
+
+def sessions_of_product(model: RQHCTransformer, sessions: int) -> int:
+    """`group` of a `PackedModel` that serves up to so many `sessions` well: large weights are read once for all."""
+    return 1 if is_small(model) else min(sessions, MOST_GROUPED)
+
+
+class PackedModel:
+    """A model ready to draw frame by frame; it takes a tenth of a second and more to make, so make it once."""
+
+    def __init__(self, model: RQHCTransformer, *, dtype: torch.dtype = torch.float32, group: int = 1) -> None:
+        """Copy and pack a model.
+
+        Args:
+            model: stays as it is.
+            dtype: of the packed matrices on a CPU; bfloat16 halves what a frame reads.
+            group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
+        """
+        self.network = copy.deepcopy(model).eval().requires_grad_(False)
+        self.device = self.network.head.weight.device
+        self.blocks = self.network.trunk.layers
+        self.terms = [block.attention.terms(self.network.trunk.sinusoids).contiguous() for block in self.blocks]
+        pack_linears(self.network, dtype, group=group)
+        self.steps = [compiled(TrunkStep(block)) for block in self.blocks]
+        self.depth = None if self.network.depth is None else compiled(DepthStep(self.network.depth))
