@@ -7,9 +7,11 @@ import pytest
 
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
 from workers.training.checks.prompts import evaluation_prompts
-from workers.training.data.captions import PAIR, captions, grammar, joined_caption, long_caption, seeded, short_caption
+from workers.training.data.captions import captions, joined_caption, long_caption, seeded, short_caption
 from workers.training.data.describe import ACTS, STYLE_NAMES, describe
 from workers.training.data.english import conjugate, gerund, third, with_adjective
+from workers.training.data.grammar import grammar
+from workers.training.data.phrases import PAIR
 
 FPS = 20.0
 

@@ -1,0 +1,109 @@
+"""The grammar that captions are made of: `grammar.toml`, read once."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a style is said."""
+
+    after: tuple[str, ...]
+    adjective: tuple[str, ...]
+    sentence: tuple[str, ...]
+    who: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Words:
+    """How an act is said.
+
+    Attributes:
+        phrases: verb phrases.
+        nouns: without a verb ("a wave of the left hand").
+        whole: sentences whose subject is the limb ("the left hand goes up").
+        who: subjects that go with the act ("a runner").
+        manners: verb phrases that say a style as well, by style ("trudges").
+    """
+
+    phrases: tuple[str, ...]
+    nouns: tuple[str, ...]
+    whole: tuple[str, ...]
+    who: tuple[str, ...]
+    manners: dict[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Joins:
+    """How acts follow each other.
+
+    Attributes:
+        two, three: frames for any acts.
+        halt: frames for an act in place after travel.
+        same: by act, for two sides of one act.
+        pairs: by `first-second`, for two acts that have words of their own together.
+    """
+
+    two: tuple[str, ...]
+    three: tuple[str, ...]
+    halt: tuple[str, ...]
+    same: dict[str, tuple[str, ...]]
+    pairs: dict[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How a measured detail is said: behind the act, or as a sentence."""
+
+    clause: tuple[str, ...]
+    sentence: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """`grammar.toml`."""
+
+    subjects: tuple[str, ...]
+    acts: dict[str, Words]
+    details: dict[str, Detail]
+    pace: dict[str, tuple[str, ...]]
+    height: dict[str, tuple[str, ...]]
+    lasting: dict[str, tuple[str, ...]]
+    styles: dict[str, Style]
+    joins: Joins
+
+
+@lru_cache(maxsize=1)
+def grammar() -> Grammar:
+    """The grammar of the package."""
+    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("grammar.toml").read_text("utf-8"))
+    return Grammar(
+        subjects=tuple(table["subjects"]),
+        acts={act: _words(rows, table["manners"].get(act, {})) for act, rows in table["acts"].items()},
+        details={
+            name: Detail(tuple(rows["clause"]), tuple(rows["sentence"])) for name, rows in table["details"].items()
+        },
+        pace={name: tuple(rows) for name, rows in table["pace"].items()},
+        height={name: tuple(rows) for name, rows in table["height"].items()},
+        lasting={name: tuple(rows) for name, rows in table["lasting"].items()},
+        styles={
+            name: Style(**{key: tuple(rows[key]) for key in ("after", "adjective", "sentence", "who")})
+            for name, rows in table["styles"].items()
+        },
+        joins=_joins(table["join"]),
+    )
+
+
+def _words(rows: dict[str, Any], manners: dict[str, Any]) -> Words:
+    lists = {key: tuple(rows.get(key, ())) for key in ("phrases", "nouns", "whole", "who")}
+    return Words(**lists, manners={style: tuple(row["phrases"]) for style, row in manners.items()})
+
+
+def _joins(rows: dict[str, Any]) -> Joins:
+    same, pairs = ({name: tuple(p) for name, p in rows[key].items()} for key in ("same", "pairs"))
+    return Joins(tuple(rows["two"]), tuple(rows["three"]), tuple(rows["halt"]), same, pairs)
