@@ -9,17 +9,11 @@ if TYPE_CHECKING:
 
 TEXT = """# srl-light: semantic roles of motion captions
 
-A small tagger on the states of MiniLM (int8): it finds the predicates of a caption and, for each, its arguments with
-their PropBank roles. Marey's semantic graphs are made of them. The network is `shared/text/light_network.py`; the part
-`minilm` holds updates of rank 16, which are added to MiniLM's matrices when the labeller is loaded, and scales of
-features for int8 (Xiao et al. 2022).
+A small tagger on frozen MiniLM states (int8): it finds the predicates of a caption and, for each, its arguments with
+their PropBank roles. Marey's semantic graphs are made of them. The network is `shared/text/light_network.py`.
 
 ## Data and terms
 
-- First, MiniLM's updates and the head learn PropBank: verbs with their roles in 12,114 sentences of at most 30 words of
-  the English Web Treebank. Roles: github.com/propbank/propbank-release; words: UD_English-EWT (Universal Dependencies);
-  both CC BY-SA 4.0, changed as `workers/training/labeller_propbank.py` says. A thousand stay in the
-  second training, which is on the gold, its variants and the silver:
 - Gold: 655 captions of KIT Motion-Language (431 distinct) with the output of AllenNLP's
   `structured-prediction-srl-bert.2020.12.15` (Shi & Lin 2019), from jpthu17/GraphMotion (Jin et al. 2023), Apache-2.0.
   Argument-less auxiliaries ("is" beside "walking") are dropped first. For training (not for the scores below) so are
@@ -30,9 +24,7 @@ features for int8 (Xiao et al. 2022).
   bows, waves, raised hands, punches, slashes, dances, styles, imperatives. It was written with the whole gold in
   sight, so the numbers below are a little kind to it.
 
-The weights are under CC BY-SA 4.0, as PropBank and the treebank are; MiniLM (all-MiniLM-L6-v2, Apache-2.0) is not part
-of them. Credit: the PropBank project (Palmer et al. 2005; Pradhan et al. 2022), the English Web Treebank (Bies et al.
-2012) and its Universal Dependencies (Silveira et al. 2014).
+The weights are under Apache-2.0; MiniLM (all-MiniLM-L6-v2, Apache-2.0) is not part of them.
 
 ## Quality
 
@@ -47,10 +39,7 @@ of them. Credit: the PropBank project (Palmer et al. 2005; Pradhan et al. 2022),
 
 ## How it was made
 
-    git clone https://github.com/propbank/propbank-release
-    git clone https://github.com/UniversalDependencies/UD_English-EWT
-    python -m workers.training.labeller --gold srl-kit-dev.json --propbank propbank-release --words UD_English-EWT \\
-        -o models/srl-light
+    python -m workers.training.labeller --gold srl-kit-dev.json -o models/srl-light
 """
 
 
