@@ -316,13 +316,15 @@ def assemble_bundle(
     return mogo.assemble(data, run, output, mogo_config.named_config(config), card=text, overwrite=overwrite).reference
 
 
-def take_bundle_apart(bundle: str, run: Path) -> str:
+def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) -> str:
     """Write the parts of a bundle into a run folder; the name of its configuration."""
     try:
         from shared.bundles import find_bundle
-        from workers.hgm3.assembly import take_apart
+        from workers.hgm3 import assembly as hgm3
+        from workers.mogo import assembly as mogo
     except ImportError as error:
         raise needs_extra("worker", error) from error
+    take_apart = hgm3.take_apart if model == "hgm3" else mogo.take_apart
     return take_apart(find_bundle(bundle), run).name
 
 

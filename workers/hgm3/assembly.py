@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypeVar
 
 from torch import Tensor
 
 from shared.bundles import Bundle
-from shared.errors import InvalidInput
 from shared.nn.bundling import write_generator
 from workers.hgm3.bundle import MODEL, load_networks
 from workers.hgm3.config import HGM3Config
-from workers.training.assembly import gather
-from workers.training.parts import Part, save_part
+from workers.training.assembly import gather, scatter
 from workers.training.staging import Recipe
-
-T = TypeVar("T")
 
 RECIPE = Recipe(
     read=HGM3Config.from_dict,
@@ -61,40 +56,30 @@ def assemble(
 def take_apart(bundle: Bundle, run: Path) -> HGM3Config:
     """Write the parts of a bundle into a run folder, as if its stages had just finished there.
 
-    What a bundle does not hold is made up as well as can be: the predictor starts as its teacher, the moving sums of
-    the codebooks as their codes. Returns the bundle's configuration.
+    What a bundle does not hold is made up as well as can be: the predictor starts as its teacher.
+
+    Returns:
+        the bundle's configuration.
 
     Raises:
         InvalidInput: the run has parts already.
         InvalidBundle: of another model, or damaged.
     """
     config, networks = load_networks(bundle)
-    present = [name for name in RECIPE.stages if (run / name).exists()]
-    if present:
-        raise InvalidInput(
-            f"has a stage {present[0]} already", where=str(run), hint="Take the bundle apart into a new folder."
-        )
-    tokenizer = networks.tokenizer.state_dict()
-    tokenizer["quantizer.sums"] = tokenizer["quantizer.codebooks"] * tokenizer["quantizer.counts"][..., None]
     predictor = networks.predictor.state_dict()
     states = {
-        "tokenizer": tokenizer,
+        "tokenizer": networks.tokenizer.state_dict(),
         "masked": _over(networks.masked.state_dict(), "masked.")
         | _over(predictor, "predictor.")
         | _over(predictor, "teacher."),
         "residual": networks.residual.state_dict(),
         "length": networks.length.state_dict(),
     }
-    manifest = bundle.manifest
-    data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""
-    origin = {"bundle": bundle.reference}
-    for name, state in states.items():
-        metrics = _under(manifest.metrics, f"{name}/")
-        save_part(run / name / "part", Part(state, config.to_dict(), metrics, data_sha256, origin))
+    scatter(bundle, run, RECIPE, states, config)
     return config
 
 
-def _under(state: Mapping[str, T], prefix: str) -> dict[str, T]:
+def _under(state: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {name.removeprefix(prefix): value for name, value in state.items() if name.startswith(prefix)}
 
 

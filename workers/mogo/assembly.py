@@ -1,4 +1,4 @@
-"""From the parts of a run to a bundle."""
+"""From the parts of a run to a bundle, and back."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from pathlib import Path
 
 from shared.bundles import Bundle
 from shared.nn.bundling import write_generator
-from workers.mogo.bundle import MODEL
+from workers.mogo.bundle import MODEL, load_networks
 from workers.mogo.config import MOGOConfig
-from workers.training.assembly import gather
+from workers.training.assembly import gather, scatter
 from workers.training.staging import Recipe
 
 RECIPE = Recipe(
@@ -37,3 +37,19 @@ def assemble(
         bundle, MODEL, config, states, statistics,
         text=gathered.text, card=card, overwrite=overwrite, **gathered.manifest,
     )  # fmt: skip
+
+
+def take_apart(bundle: Bundle, run: Path) -> MOGOConfig:
+    """Write the parts of a bundle into a run folder, as if its stages had just finished there.
+
+    Returns:
+        the bundle's configuration.
+
+    Raises:
+        InvalidInput: the run has parts already.
+        InvalidBundle: of another model, or damaged.
+    """
+    config, tokenizer, transformer = load_networks(bundle)
+    states = {"tokenizer": tokenizer.state_dict(), "transformer": transformer.state_dict()}
+    scatter(bundle, run, RECIPE, states, config)
+    return config

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from shared.bundles import DataSource, TextSpec
+from torch import Tensor
+
+from shared.bundles import Bundle, DataSource, TextSpec
+from shared.errors import InvalidInput
 from workers.training.data.prepared import PreparedData
-from workers.training.parts import Part
+from workers.training.parts import Part, save_part
 from workers.training.staging import ModelConfig, Recipe
 from workers.training.texts import CaptionTexts
 
@@ -46,6 +49,32 @@ def gather(prepared: Path, run: Path, recipe: Recipe[C], config: C) -> Gathered:
         "training": {"commit": _commit(), "budgets": {name: part.budget for name, part in parts.items()}},
     }
     return Gathered(parts, CaptionTexts.load(data).spec, manifest)
+
+
+def scatter(
+    bundle: Bundle, run: Path, recipe: Recipe[C], states: Mapping[str, Mapping[str, Tensor]], config: C
+) -> None:
+    """Write a part for each stage's state dict into a run folder, as if the stages had just finished there.
+
+    What a bundle does not hold of its `tokenizer` is made up: the moving sums of the codebooks are their codes.
+
+    Raises:
+        InvalidInput: the run has parts already.
+    """
+    present = [name for name in recipe.stages if (run / name).exists()]
+    if present:
+        raise InvalidInput(
+            f"has a stage {present[0]} already", where=str(run), hint="Take the bundle apart into a new folder."
+        )
+    manifest = bundle.manifest
+    data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""
+    for name, state in states.items():
+        state = dict(state)
+        if "quantizer.sums" in state:
+            state["quantizer.sums"] = state["quantizer.codebooks"] * state["quantizer.counts"][..., None]
+        metrics = {k.removeprefix(f"{name}/"): v for k, v in manifest.metrics.items() if k.startswith(f"{name}/")}
+        part = Part(state, config.to_dict(), metrics, data_sha256, {"bundle": bundle.reference})
+        save_part(run / name / "part", part)
 
 
 def _terms(licences: Sequence[str]) -> str:

@@ -147,12 +147,19 @@ def mogo_bundle(
     console.result(roles.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
 
 
-@hgm3.command()
-def unpack(
-    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")],
-    run: Run,
-) -> None:
-    """Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."""
+Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
+UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
+
+
+@hgm3.command("unpack", help=UNPACK)
+def hgm3_unpack(bundle: Packed, run: Run) -> None:
     from services.cli import roles
 
-    console.result(roles.take_bundle_apart(bundle, run))
+    console.result(roles.take_bundle_apart("hgm3", bundle, run))
+
+
+@mogo.command("unpack", help=UNPACK)
+def mogo_unpack(bundle: Packed, run: Run) -> None:
+    from services.cli import roles
+
+    console.result(roles.take_bundle_apart("mogo", bundle, run))

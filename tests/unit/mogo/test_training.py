@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import torch
 
 from shared.errors import InvalidInput, NotFound
 from tests.support.prepared import write_prepared
+from workers.mogo.assembly import assemble, take_apart
 from workers.mogo.config import TINY, MOGOConfig
 from workers.mogo.model import NOT_ASKED, next_targets
 from workers.mogo.stage_transformer import MIN_FRAMES, TransformerStage
@@ -56,6 +58,29 @@ def test_both_stages_train_and_leave_their_parts(prepared: PreparedData, tmp_pat
     assert MOGOConfig.from_dict(load_part(tmp_path / "transformer" / "part").config) == TINY
     with pytest.raises(InvalidInput, match="Known: tokenizer, transformer, all"):
         train_stage("masked", options(prepared, tmp_path, 1))
+
+
+def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
+    prepared: PreparedData, tmp_path: Path
+) -> None:
+    run, again = tmp_path / "run", tmp_path / "again"
+    for stage in ("tokenizer", "transformer"):
+        train_stage(stage, options(prepared, run, 3))
+    bundle = assemble(prepared.path, run, tmp_path / "first", TINY)
+    assert take_apart(bundle, again) == TINY
+    copy = assemble(prepared.path, again, tmp_path / "second", TINY)
+    for stage in ("tokenizer", "transformer"):
+        theirs, ours = bundle.tensors(stage), copy.tensors(stage)
+        assert theirs.keys() == ours.keys()
+        assert all(np.array_equal(theirs[name], ours[name]) for name in theirs)
+        before = load_part(again / stage / "part").state
+        train_stage(stage, replace(options(prepared, again, 1), warm=True))
+        after = load_part(again / stage / "part").state
+        names = [name for name in before if not name.startswith("quantizer.")]  # tiny batches reset codes that are dead
+        moved = max(float((after[k].float() - before[k].float()).abs().max()) for k in names)
+        assert 0 < moved < 0.1, stage  # from the weights that were there, and not from random ones
+    with pytest.raises(InvalidInput, match="has a stage tokenizer already"):
+        take_apart(bundle, again)
 
 
 def test_the_transformer_learns_the_clips_it_sees(prepared: PreparedData, tmp_path: Path) -> None:
