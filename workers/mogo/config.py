@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from shared.configs import ModelConfig, named
+from shared.errors import InvalidInput
 from shared.nn.scaled_quantizer import Scale
 from workers.training.optimisation import StageConfig
 
@@ -43,6 +44,9 @@ class TransformerConfig:
     level_gain: bool = False
     """Ours: each level has its own gains on the shared embedding. Without, a sum of embeddings does not tell which
     level a code came from."""
+    joint: bool = False
+    """Ours: one sequence for all levels, of whole frames; the depth head, which it needs, tells them apart. A sixth of
+    the trunk's work."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,11 @@ class MOGOConfig(ModelConfig):
     train_tokenizer: StageConfig = StageConfig(batch=256, ema=0.0)
     train_transformer: StageConfig = StageConfig(batch=64, learning_rate=1e-4)
 
+    def __post_init__(self) -> None:
+        """Refuse levels that nothing could tell apart."""
+        if self.transformer.joint and not self.depth.layers:
+            raise InvalidInput("one sequence for all levels needs a depth head", where="transformer.joint")
+
 
 PAPER = MOGOConfig()
 
@@ -105,7 +114,9 @@ STARTER = MOGOConfig(
     # 220,000 training frames cannot fill 6 x 8192 codes
     tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, noise=0.3),
-    transformer=TransformerConfig(layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True),
+    transformer=TransformerConfig(
+        layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True, joint=True
+    ),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384),
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),

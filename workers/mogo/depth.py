@@ -31,8 +31,9 @@ class DepthHead(nn.Module):
         return [block for block in self.blocks if isinstance(block, Block)]
 
     def forward(self, states: Tensor, below: Tensor) -> Tensor:
-        """States (N, L, w) of the levels 0 … L - 1 and embeddings (N, L - 1, w) of the codes below each: (N, L, w)."""
-        size = states.shape[1]
+        """States (N, V or 1, w) of the levels, or of all of them, and embeddings (N, V - 1, w) of the codes below
+        each: (N, V, w)."""
+        size = below.shape[1] + 1
         x = self.state(states) + self.level[:size] + F.pad(self.code(below), (0, 0, 1, 0))
         mask = torch.ones(size, size, dtype=torch.bool, device=x.device).tril()[None, None]
         for block in self.layers:

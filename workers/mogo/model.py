@@ -7,9 +7,10 @@
     states         ── one head                            ── logits of the next frame's codes, END on level 0
 
 Fu et al., "MOGO: Residual Quantized Hierarchical Causal Transformer for High-Quality and Real-Time 3D Human Motion
-Generation", 2025. All levels run as rows of one batch: a frame costs one pass.
+Generation", 2025. All levels run as rows of one batch, or as one (`joint`, ours): a frame costs one pass.
 
-Shapes: B batch, n frames, V levels, K codes, W text width, w transformer width, P prompts (2 where a clip is steered).
+Shapes: B batch, n frames, V levels, L lanes (1 or V), K codes, W text width, w transformer width, P prompts (2 where a
+clip is steered).
 """
 
 from __future__ import annotations
@@ -30,8 +31,13 @@ NOT_ASKED = -1
 """Target that counts in no loss."""
 
 
+def lanes(config: MOGOConfig) -> int:
+    """L, sequences of a clip: one a level (the paper's), or one for all of them."""
+    return 1 if config.transformer.joint else config.tokenizer.levels
+
+
 class Prompt(nn.Module):
-    """Sentence features to position 0 of every level (eq. 7)."""
+    """Sentence features to position 0 of every lane (eq. 7)."""
 
     mean: Tensor  # (W,) of the training captions; standardising them is ours, as in HGM³
     std: Tensor  # (W,)
@@ -43,11 +49,11 @@ class Prompt(nn.Module):
         self.register_buffer("mean", torch.zeros(config.condition.text_width))
         self.register_buffer("std", torch.ones(config.condition.text_width))
         self.project = nn.Linear(config.condition.text_width, width)
-        self.level = nn.Embedding(config.tokenizer.levels, width)
+        self.level = nn.Embedding(lanes(config), width)
         self.null = nn.Parameter(torch.zeros(width))  # in place of the prompt, the same at all levels (ours)
 
     def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> Tensor:
-        """p + q_emb: (B, W) -> (B, V, w); the null prompt where `dropped` (B,) bool."""
+        """p + q_emb: (B, W) -> (B, L, w); the null prompt where `dropped` (B,) bool."""
         x = (sentence.float() - self.mean) / self.std
         if self.training and self.noise > 0:
             x = x + self.noise * torch.randn_like(x)
@@ -129,7 +135,7 @@ class RQHCTransformer(nn.Module):
         super().__init__()
         t, levels, width = config.transformer, config.tokenizer.levels, config.transformer.width
         self.config = config
-        self.levels = levels
+        self.levels, self.lanes = levels, lanes(config)
         self.codes = config.tokenizer.codes
         self.prompt = Prompt(config)
         self.embedding = nn.Embedding(self.codes, width)  # one for all levels (Alg. 2)
@@ -169,27 +175,29 @@ class RQHCTransformer(nn.Module):
         training = self.training
         dropped = torch.rand(batch, device=tokens.device) < self.config.condition.drop if training else None
         inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
-        first = torch.stack([self.prompt(p, dropped) for p in prompts.unbind(1)], 2)  # (B, V, P, w)
-        x = torch.cat([first, self.columns(inputs).to(first.dtype)], 2).flatten(0, 1)  # (B · V, P + n, w)
+        first = torch.stack([self.prompt(p, dropped) for p in prompts.unbind(1)], 2)  # (B, L, P, w)
+        x = torch.cat([first, self.columns(inputs).to(first.dtype)], 2).flatten(0, 1)  # (B · L, P + n, w)
         states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
         states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
-        states = states.view(batch, levels, size + 1, -1).transpose(1, 2)  # (B, n + 1, V, w)
+        states = states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)  # (B, n + 1, L, w)
         next_codes = F.pad(tokens, (0, 0, 0, 1), value=-1)[..., :-1]  # (B, n + 1, V - 1): of the frame predicted
         refined = self.refine(states.flatten(0, 1), next_codes.flatten(0, 1))
         return self.score(refined).view(batch, size + 1, levels, -1).transpose(1, 2)
 
     def columns(self, tokens: Tensor) -> Tensor:
-        """Inputs (B, V, n, w) of frames (B, n, V): level l gets the sum over levels up to l; -1 adds nothing."""
+        """Inputs (B, L, n, w) of frames (B, n, V): lane l gets the sum over levels up to l, a single lane that over
+        all; -1 adds nothing."""
         x = self._embed(tokens)  # (B, n, V, w)
         x = x if self.gains is None else x * self.gains
-        return x.cumsum(2).transpose(1, 2)
+        return x.cumsum(2)[:, :, -self.lanes :].transpose(1, 2)
 
     def refine(self, states: Tensor, codes: Tensor) -> Tensor:
-        """States (N, L, w) of levels 0 … L - 1 given the codes (N, L - 1) of the frame they predict."""
+        """States (N, V, w) of the levels from those of the lanes (N, L, w), given the codes (N, V - 1) of the frame
+        they predict."""
         return states if self.depth is None else self.depth(states, self._embed(codes))
 
     def score(self, states: Tensor, level: int = 0) -> Tensor:
-        """Logits (…, L, K + 1), float32, of states (…, L, w) of the levels `level` … `level` + L - 1."""
+        """Logits (…, m, K + 1), float32, of states (…, m, w) of the levels `level` … `level` + m - 1."""
         hidden = self.no_end[level : level + states.shape[-2]]
         return self.head(states).float().masked_fill(hidden, torch.finfo(torch.float32).min)
 
@@ -204,10 +212,10 @@ class RQHCTransformer(nn.Module):
         later = (position[:, None] < position)[None]  # (1, n, n)
         unread = torch.zeros(1, size, prompts, dtype=torch.bool, device=device)
         if seam is not None:
-            steered = position >= seam.repeat_interleave(self.levels)[:, None]  # (N, n)
+            steered = position >= seam.repeat_interleave(self.lanes)[:, None]  # (N, n)
             unread = torch.stack([steered, ~steered], -1)
         hidden = torch.cat([unread, later.expand(len(unread), -1, -1)], -1)[:, None]
-        before = position[None] if skipped is None else skipped.repeat_interleave(self.levels)[:, None] + position
+        before = position[None] if skipped is None else skipped.repeat_interleave(self.lanes)[:, None] + position
         return Reach(prompts, before.clamp(max=farthest), hidden)
 
     def _embed(self, tokens: Tensor) -> Tensor:

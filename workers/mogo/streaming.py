@@ -46,7 +46,7 @@ class StreamState:
     def empty(cls, packed: PackedModel, sessions: int, branches: int, window: int) -> StreamState:
         """Room for so many sessions."""
         model, device = packed.network, packed.device
-        t, lanes = model.config.transformer, branches * model.levels
+        t, lanes = model.config.transformer, branches * model.lanes
         whole = torch.zeros(4, sessions, dtype=torch.long, device=device)
         return cls(
             seeds=whole[0],
@@ -226,7 +226,7 @@ class Streams:
         """Columns (s, V) from trunk states (s, L, w), level by level where a level knows those below."""
         active, levels, model = len(states), self.model.levels, self.model
         noise = self._noise(active)
-        states = states.view(active, self.branches, levels, -1)
+        states = states.view(active, self.branches, model.lanes, -1).expand(-1, -1, levels, -1)
         if model.depth is None:
             logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from shared.errors import InvalidInput
 from workers.mogo.attention import RelativeAttention
 from workers.mogo.config import PAPER, STARTER, TINY, MOGOConfig
 from workers.mogo.model import NOT_ASKED, RQHCTransformer, Trunk, corrupt, next_targets
@@ -16,6 +17,7 @@ from .networks import columns, prompts, transformer
 
 LEVELS, CODES = TINY.tokenizer.levels, TINY.tokenizer.codes
 FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+JOINT = replace(TINY, transformer=replace(TINY.transformer, joint=True))
 
 
 def test_attention_equals_equation_9_by_hand() -> None:
@@ -76,6 +78,23 @@ def test_with_a_depth_head_level_l_reads_the_codes_below_it_and_no_other() -> No
         torch.testing.assert_close(first[:, : level + 1], second[:, : level + 1])
         for above in range(level + 1, LEVELS):
             assert not torch.allclose(first[:, above], second[:, above])
+
+
+def test_one_lane_for_all_levels_reads_whole_frames_of_the_past_and_nothing_later() -> None:
+    model, tokens = transformer(JOINT), columns(10)
+    for level in range(LEVELS):
+        other = tokens.clone()
+        other[:, 4, level] = (other[:, 4, level] + 1) % CODES
+        first, second = model(prompts(1), tokens), model(prompts(1), other)
+        torch.testing.assert_close(first[:, :, :4], second[:, :, :4])
+        torch.testing.assert_close(first[:, : level + 1, 4], second[:, : level + 1, 4])
+        for any_level in range(LEVELS):
+            assert not torch.allclose(first[:, any_level, 5:], second[:, any_level, 5:])
+
+
+def test_one_lane_for_all_levels_needs_a_depth_head() -> None:
+    with pytest.raises(InvalidInput, match="needs a depth head"):
+        replace(JOINT, depth=replace(JOINT.depth, layers=0))
 
 
 def test_an_untrained_depth_head_leaves_levels_independent() -> None:

@@ -16,6 +16,7 @@ from workers.mogo.streaming import Streams
 from .networks import columns, opened, prompts, transformer
 
 FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+JOINT = replace(TINY, transformer=replace(TINY.transformer, joint=True))
 GUIDED = replace(TINY, inference=replace(TINY.inference, guidance=2.0))
 WINDOW = TINY.inference.window
 
@@ -42,7 +43,7 @@ def logits_of(model: RQHCTransformer, states: torch.Tensor, column: torch.Tensor
     return model.score(model.refine(states, column[None, :-1]))[0]
 
 
-@pytest.mark.parametrize("config", [TINY, FLAT])
+@pytest.mark.parametrize("config", [TINY, FLAT, JOINT])
 def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(config: MOGOConfig) -> None:
     model, tokens = transformer(config), columns(WINDOW)
     whole = model(prompts(1), tokens)[0]  # (V, n + 1, K + 1)
@@ -54,12 +55,13 @@ def test_cached_logits_equal_those_of_the_whole_sequence_within_the_window(confi
         streams.accept(tokens[:, frame])
 
 
-def test_a_session_draws_the_same_tokens_beside_others() -> None:
+@pytest.mark.parametrize("config", [TINY, JOINT, replace(JOINT, inference=GUIDED.inference)])
+def test_a_session_draws_the_same_tokens_beside_others(config: MOGOConfig) -> None:
     frames = 2 * WINDOW + 5
-    streams = opened(transformer(), 5)
+    streams = opened(transformer(config), 5)
     names = {streams.start(said(seed), seed): seed for seed in range(5)}
     for session, found in run(streams, frames).items():
-        assert torch.equal(found, alone(names[session], frames))
+        assert torch.equal(found, alone(names[session], frames, transformer(config)))
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
