@@ -27,9 +27,9 @@ from shared.text.pipeline import TextPipeline
 from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.generate import Generator, Settings
-from workers.hgm3.obedience import measure
 from workers.hgm3.train import train_stage
 from workers.training.budget import Budget
+from workers.training.checks.obedience import measure
 from workers.training.checks.prompts import evaluation_prompts
 from workers.training.checks.rates import mean_quality
 from workers.training.motions import TOKENS

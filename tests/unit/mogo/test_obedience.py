@@ -1,0 +1,54 @@
+"""Judging live sessions: what counts as obeyed after a steer, and a whole report of a random bundle."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.support.bodies import bower, walker
+from workers.mogo import obedience
+from workers.mogo.bundle import random_bundle
+from workers.mogo.obedience import main, pairs_of, steered
+from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+
+FPS = 20.0
+
+
+def asked(group: str) -> EvaluationPrompt:
+    return next(p for p in evaluation_prompts() if p.group == group)
+
+
+def test_an_act_counts_as_obeyed_where_it_begins_within_two_seconds_of_the_steer() -> None:
+    walk = walker(4.5)
+    late = np.concatenate([bower(1.5), walk])
+    assert steered(walker(6.0), FPS, asked("walk")).passed
+    assert steered(late, FPS, asked("walk")).passed
+    assert not steered(bower(6.0), FPS, asked("walk")).passed
+    refused = steered(walker(6.0), FPS, asked("bow"))
+    assert not refused.passed
+    assert refused.reason
+
+
+def test_steers_go_between_different_acts_and_are_the_same_every_time() -> None:
+    pairs = pairs_of(evaluation_prompts(), 60)
+    assert pairs == pairs_of(evaluation_prompts(), 60)
+    for first, second in pairs:
+        assert first.expected[0] != second.expected[0]
+        assert not first.separate
+        assert not second.separate
+
+
+def test_a_report_holds_whole_motions_and_live_sessions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(obedience, "LONG", 120)
+    bundle = random_bundle(tmp_path / "tiny")
+    options = ["--seeds", "1", "--every", "50", "--steers", "3", "--walks", "2", "-o", str(tmp_path / "report")]
+    main([str(bundle.path), *options])
+    found = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert len(found["trials"]) == 4
+    assert [len(sessions) for sessions in found["live"].values()] == [3, 2]
+    assert "obeyed within 2 s of a steer" in capsys.readouterr().out
