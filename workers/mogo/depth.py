@@ -45,10 +45,12 @@ class DepthFrame:
     """One frame through the depth head level by level, as codes are drawn; keys and values below are kept."""
 
     def __init__(self, head: DepthHead, step: DepthStep, states: Tensor) -> None:
-        """Begin with trunk states (S, b, V, w) of S sessions, b branches each; `step` is the head's."""
-        sessions, branches, levels, _ = states.shape
-        self._step, self._states, self._level = step, states, 0
-        self._entered = head.state(states.flatten(1, 2)).view(sessions, branches, levels, -1) + head.level
+        """Begin with trunk states (S, b, V or 1, w) of S sessions, b branches each; `step` is the head's."""
+        sessions, branches, lanes, _ = states.shape
+        levels = len(head.level)
+        self._step, self._level = step, 0
+        self._states = states.expand(-1, -1, levels, -1)
+        self._entered = head.state(states.flatten(1, 2)).view(sessions, branches, lanes, -1) + head.level
         heads, width = head.layers[0].attention.heads, self._entered.shape[-1]
         self._memory = states.new_empty(len(head.layers), sessions, branches, 2, heads, levels, width // heads)
 

@@ -226,7 +226,7 @@ class Streams:
         """Columns (s, V) from trunk states (s, L, w), level by level where a level knows those below."""
         active, levels, model = len(states), self.model.levels, self.model
         noise = self._noise(active)
-        states = states.view(active, self.branches, model.lanes, -1).expand(-1, -1, levels, -1)
+        states = states.view(active, self.branches, model.lanes, -1)
         if model.depth is None:
             logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
