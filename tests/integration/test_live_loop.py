@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from uuid import UUID
 
@@ -13,6 +14,7 @@ import sqlalchemy as sa
 from shared.jobs import StreamState, get_job, list_items, stream_prompts, transaction
 from shared.jobs.states import STREAM_TRANSITIONS, ItemState
 from shared.runtime.live import keeper
+from shared.runtime.live.held import Held
 from shared.runtime.live.port import LiveFrame
 from shared.runtime.queue import redis_client
 from shared.settings import Settings as Configuration
@@ -164,6 +166,29 @@ def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio
     start()
     studio.until(lambda: studio.shown(stream) > shown + 3, "frames of the other worker")
     whole(studio, stream)
+
+
+def test_a_frame_shown_while_the_worker_stops_is_written_down(
+    studio: Studio, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Slow(LiveRoom):
+        def step(self) -> dict[int, LiveFrame]:
+            made = super().step()
+            time.sleep(0.3)  # the keeper hears that it is over meanwhile
+            return made
+
+    released = keeper._released
+
+    def late(held: Held) -> None:
+        time.sleep(0.6)  # the frame is shown under a lease that still holds
+        released(held)
+
+    monkeypatch.setattr(keeper, "_released", late)
+    stream = studio.begin()
+    first = start(room=Slow)
+    studio.until(lambda: studio.shown(stream) > 1, "frames")
+    first.stop()
+    assert studio.row(stream).frames == studio.shown(stream)
 
 
 def test_streams_wait_while_every_slot_is_taken(studio: Studio, start: Start) -> None:

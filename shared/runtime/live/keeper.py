@@ -285,7 +285,8 @@ class Keeper(threading.Thread):
         log.info("stream_ended", stream=str(row.id), reason=reason, failed=problem is not None, clip=clip is not None)
 
     def _give_back(self) -> None:
-        """This worker stops: another goes on at once."""
+        """This worker stops: another goes on at once, behind the last frame that was shown."""
+        self._loop.finished.wait(STALL_SECONDS)
         for held in list(self._held.values()):
             self._guarded(lambda held=held: self._write(held))
             self._guarded(lambda held=held: _released(held))

@@ -62,15 +62,20 @@ class LiveLoop:
         self._held: dict[int, Held] = {}
         self.room = open_room()
         self.ticked = clock()
+        self.finished = threading.Event()
+        """Set when `run` has returned: nobody will show a frame any more."""
 
     def run(self, stopping: threading.Event) -> None:
         """Make frames until `stopping`."""
         due = self._clock()
-        while not stopping.wait(max(0.0, due - self._clock())):
-            self.tick()
-            due += 1.0 / self.room.fps
-            if self._clock() - due > BEHIND_SECONDS:
-                due = self._clock()
+        try:
+            while not stopping.wait(max(0.0, due - self._clock())):
+                self.tick()
+                due += 1.0 / self.room.fps
+                if self._clock() - due > BEHIND_SECONDS:
+                    due = self._clock()
+        finally:
+            self.finished.set()
 
     def tick(self) -> None:
         """Obey what was asked, then make one frame of every stream that plays."""
