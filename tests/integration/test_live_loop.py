@@ -96,6 +96,7 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     assert studio.row(stream).state is StreamState.LIVE
     studio.send(stream, Control("steer", "a person waves"))
     studio.until(lambda: any(f.prompt == 1 for f in whole(studio, stream)), "the second prompt")
+    studio.until(lambda: studio.shown(stream) >= generator.limits.min_frames, "frames enough for a clip")
     studio.send(stream, Control("stop"))
     studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
     frames = whole(studio, stream)
