@@ -113,6 +113,13 @@ def can_pack(module: nn.Module) -> bool:
     return torch.backends.mkldnn.is_available() and all(p.device.type == "cpu" for p in module.parameters())
 
 
+def packed_gelu(linear: nn.Module, gelu: nn.Module, dtype: torch.dtype) -> tuple[nn.Module, nn.Module]:
+    """A linear layer and the GELU behind it, packed into one pass where that can be done."""
+    if isinstance(linear, nn.Linear) and can_pack(linear):
+        return PackedLinear(linear, dtype, gelu=True), nn.Identity()
+    return linear, gelu
+
+
 def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, group: int | None = None) -> None:
     """Replace every linear layer in `module` where that can be done (`can_pack`); elsewhere nothing changes.
 

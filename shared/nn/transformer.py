@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.packed import PackedLinear, can_pack, pack_linears
+from shared.nn.packed import can_pack, pack_linears, packed_gelu
 from shared.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
 
 
@@ -72,11 +72,11 @@ class Attention(nn.Module):
             bias = query.new_zeros(1, 1, 1)
             if mask is not None:
                 bias = key_bias(mask, query.dtype).expand(batch, self.heads, -1, -1).flatten(0, 1)
-            query, key, value = (part.reshape(batch * self.heads, size, -1) for part in (query, key, value))
-            mixed = _attention(query, key, value, bias, rate).view(batch, self.heads, size, -1)
+            query, key, value = (part.reshape(batch * self.heads, size, part.shape[-1]) for part in (query, key, value))
+            mixed = _attention(query, key, value, bias, rate).view(batch, self.heads, size, query.shape[-1])
         # Not before: float32 products of few rows add in another order on some processors.
         mixed = mixed[:, :, : size if rows is None else rows]
-        return self.out(mixed.transpose(1, 2).reshape(batch, -1, width))
+        return self.out(mixed.transpose(1, 2).flatten(2))
 
     def ragged(self, x: Tensor, where: Ragged, kept: Tensor | None = None) -> Tensor:
         """`forward` of rows without padding: (R, w) -> (R, w), or the rows `kept` of it; no gradient."""
@@ -119,8 +119,7 @@ class Block(nn.Module):
 
     def pack(self, dtype: torch.dtype) -> None:
         """Pack the matrices for inference on a CPU, GELU into the first of the feed-forward."""
-        if isinstance(self.wide, nn.Linear):
-            self.wide, self.gelu = PackedLinear(self.wide, dtype, gelu=True), nn.Identity()
+        self.wide, self.gelu = packed_gelu(self.wide, self.gelu, dtype)
         pack_linears(self, dtype)
 
     def feedforward(self, x: Tensor) -> Tensor:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from shared.bundles import TextSpec
 from shared.hashing import sha256_of
@@ -31,6 +32,12 @@ def swinging(frames: int, seed: int) -> np.ndarray:
     rotations[..., 0], rotations[..., 1] = np.cos(angle / 2), np.sin(angle / 2)
     root = np.stack([0 * time, 0.9 + 0 * time, time * rng.uniform(0, 1.5)], -1)
     return forward_kinematics(HUMANML3D, rotations, root)
+
+
+def farthest_move(before: Mapping[str, torch.Tensor], after: Mapping[str, torch.Tensor]) -> float:
+    """How far the weight that training moved most went, but for codes, which tiny batches reset when they are dead."""
+    names = [name for name in before if not name.startswith("quantizer.")]
+    return max(float((after[name].float() - before[name].float()).abs().max()) for name in names)
 
 
 def graph(actions: int, specifics: int) -> SemanticGraph:

@@ -22,7 +22,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.packed import PackedLinear, can_pack
+from shared.nn.packed import packed_gelu
 from shared.nn.ragged import pad_length
 from shared.nn.sampling import guide
 from shared.nn.transformer import Transformer, initialize, sinusoidal_positions
@@ -225,13 +225,6 @@ def guided(hidden: Tensor, guidance: float | None) -> Tensor:
         return hidden
     with_condition, without = hidden.chunk(2)
     return guide(with_condition, without, guidance)
-
-
-def packed_gelu(dense: nn.Module, gelu: nn.Module, dtype: torch.dtype) -> tuple[nn.Module, nn.Module]:
-    """A linear layer and the GELU behind it, packed into one where that can be done."""
-    if isinstance(dense, nn.Linear) and can_pack(dense):
-        return PackedLinear(dense, dtype, gelu=True), nn.Identity()
-    return dense, gelu
 
 
 class TokenHead(nn.Module):

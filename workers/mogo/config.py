@@ -57,6 +57,7 @@ class DepthConfig:
     heads: int = 8
     width: int = 512
     feedforward: int = 1024
+    share: float = 1.0  # of the frames that training asks at all levels; the others at level 0 alone
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,7 @@ class MOGOConfig(ModelConfig):
     min_frames: int = 16  # shortest motion; a drawn end is not listened to before
     max_frames: int = 196  # longest training sequence: no relative distance beyond it is ever learnt
     corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
+    first_level: float = 1.0  # weight of level 0 in the loss, to 1 of each other level
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
@@ -111,13 +113,14 @@ PAPER = MOGOConfig()
 
 STARTER = MOGOConfig(
     name="starter",
+    first_level=5.0,  # it decides what is done; the others how exactly
     # 220,000 training frames cannot fill 6 x 8192 codes
     tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, noise=0.3),
     transformer=TransformerConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True, joint=True
     ),
-    depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384),
+    depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384, share=0.25),
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
@@ -129,7 +132,7 @@ TINY = MOGOConfig(
     tokenizer=TokenizerConfig(width=24, depth=2, levels=3, codes=32, code_width=16),
     condition=ConditionConfig(text_width=384),
     transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
-    depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32),
+    depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32, share=0.5),
     inference=InferenceConfig(window=16),
     windows=(32,),
     train_tokenizer=StageConfig(batch=8, learning_rate=1e-3, ema=0.9),

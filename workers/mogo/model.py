@@ -160,10 +160,19 @@ class RQHCTransformer(nn.Module):
     def forward(
         self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
     ) -> Tensor:
-        """Logits (B, V, n + 1, K + 1) of the frames 1 … n + 1 of clips (training; all frames at once).
+        """Logits (B, V, n + 1, K + 1) of the frames 1 … n + 1 of clips, all at once; arguments as in `states`."""
+        states = self.states(prompts, tokens, skipped=skipped, seam=seam)
+        next_codes = F.pad(tokens, (0, 0, 0, 1), value=-1)[..., :-1]  # (B, n + 1, V - 1): of the frame predicted
+        refined = self.refine(states.flatten(0, 1), next_codes.flatten(0, 1))
+        return self.score(refined).view(*states.shape[:2], self.levels, -1).transpose(1, 2)
+
+    def states(
+        self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
+    ) -> Tensor:
+        """What the trunk knows before the frames 1 … n + 1 of clips: (B, n + 1, L, w).
 
         In training mode the prompt of some samples is dropped and frame columns of the input are corrupted; the depth
-        head reads what was not corrupted.
+        head is asked about what was not corrupted.
 
         Args:
             prompts: (B, P, W) sentence features.
@@ -171,7 +180,7 @@ class RQHCTransformer(nn.Module):
             skipped: (B,) frames that were cut off between the prompt and the first column, None = 0.
             seam: (B,) frames made when the second prompt replaced the first, at least 1; needed where P = 2.
         """
-        batch, size, levels = tokens.shape
+        batch, size, _ = tokens.shape
         training = self.training
         dropped = torch.rand(batch, device=tokens.device) < self.config.condition.drop if training else None
         inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
@@ -179,21 +188,18 @@ class RQHCTransformer(nn.Module):
         x = torch.cat([first, self.columns(inputs).to(first.dtype)], 2).flatten(0, 1)  # (B · L, P + n, w)
         states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
         states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
-        states = states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)  # (B, n + 1, L, w)
-        next_codes = F.pad(tokens, (0, 0, 0, 1), value=-1)[..., :-1]  # (B, n + 1, V - 1): of the frame predicted
-        refined = self.refine(states.flatten(0, 1), next_codes.flatten(0, 1))
-        return self.score(refined).view(batch, size + 1, levels, -1).transpose(1, 2)
+        return states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)
 
     def columns(self, tokens: Tensor) -> Tensor:
         """Inputs (B, L, n, w) of frames (B, n, V): lane l gets the sum over levels up to l, a single lane that over
         all; -1 adds nothing."""
         x = self._embed(tokens)  # (B, n, V, w)
         x = x if self.gains is None else x * self.gains
-        return x.cumsum(2)[:, :, -self.lanes :].transpose(1, 2)
+        return x.sum(2)[:, None] if self.lanes == 1 else x.cumsum(2).transpose(1, 2)
 
     def refine(self, states: Tensor, codes: Tensor) -> Tensor:
-        """States (N, V, w) of the levels from those of the lanes (N, L, w), given the codes (N, V - 1) of the frame
-        they predict."""
+        """States (N, m, w) of the first m levels, or of all, from those of the lanes (N, 1 or m, w), given the codes
+        (N, m - 1) of the frame they predict."""
         return states if self.depth is None else self.depth(states, self._embed(codes))
 
     def score(self, states: Tensor, level: int = 0) -> Tensor:

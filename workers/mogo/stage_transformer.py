@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 import torch
@@ -16,8 +18,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from workers.mogo.config import MOGOConfig
-from workers.mogo.losses import sequence_loss
-from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from workers.mogo.losses import LevelSums, level_sums
+from workers.mogo.model import RQHCTransformer, next_targets
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData
@@ -88,19 +90,10 @@ class TransformerStage:
     def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
         """One batch in pieces."""
         clips = self.pairs.draw(context.rng, self.optimisation.batch)
-        losses: list[Tensor] = []
-        levels: list[Tensor] = []
-        asked: list[Tensor] = []
-        for piece in self.sample(clips, self.cut(clips, context.rng), context.rng).pieces():
-            logits, targets = self._predict(piece)
-            loss, per_level = sequence_loss(logits, targets)
-            losses.append(loss)
-            levels.append(per_level)
-            asked.append((targets != NOT_ASKED).sum())
-        share = torch.stack(asked) / torch.stack(asked).sum()
-        total = (torch.stack(losses) * share).sum()
-        mean = (torch.stack(levels) * share[:, None]).sum(0)
-        return total, {"loss": total.detach(), "level_0": mean[0], "level_last": mean[-1]}
+        pieces = self.sample(clips, self.cut(clips, context.rng), context.rng).pieces()
+        sums = reduce(add, [self._sums(piece, self.config.depth.share) for piece in pieces])
+        loss, means = sums.loss(self.config.first_level), sums.means.detach()
+        return loss, {"loss": loss.detach(), "level_0": means[0], "level_last": means[-1]}
 
     def after_step(self, context: StepContext) -> None:
         """Nothing."""
@@ -109,23 +102,17 @@ class TransformerStage:
     def validate(self) -> Mapping[str, float]:
         """Cross-entropy and accuracy of whole validation clips, per level."""
         rng = np.random.default_rng(0)
-        levels = self.module.levels
-        sums = torch.zeros(3, levels)
-        for clips in self.pairs.validation_batches(self.optimisation.batch):
-            for piece in self.sample(clips, self.whole(clips), rng).pieces():
-                logits, targets = self._predict(piece)
-                counts = (targets != NOT_ASKED).sum((0, 2)).cpu()
-                sums[0] += sequence_loss(logits, targets)[1].cpu() * counts
-                sums[1] += ((logits.argmax(-1) == targets) & (targets != NOT_ASKED)).sum((0, 2)).cpu()
-                sums[2] += counts
-        found = {"loss": float(sums[0].sum() / sums[2].sum())}
-        found |= {f"loss/{level}": float(sums[0, level] / sums[2, level]) for level in range(levels)}
-        return found | {f"accuracy/{level}": float(sums[1, level] / sums[2, level]) for level in range(levels)}
+        batches = self.pairs.validation_batches(self.optimisation.batch)
+        pieces = (piece for clips in batches for piece in self.sample(clips, self.whole(clips), rng).pieces())
+        sums = reduce(add, [self._sums(piece, 1.0) for piece in pieces])
+        found = {"loss": float(sums.loss(self.config.first_level))}
+        found |= {f"loss/{level}": float(mean) for level, mean in enumerate(sums.means)}
+        return found | {f"accuracy/{level}": float(share) for level, share in enumerate(sums.right / sums.asked)}
 
-    def _predict(self, piece: Sample) -> tuple[Tensor, Tensor]:
-        logits = self.module(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
+    def _sums(self, piece: Sample, share: float) -> LevelSums:
+        states = self.module.states(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
         targets = next_targets(piece.tokens, piece.lengths, self.module.end, ends=piece.ends, skipped=piece.skipped)
-        return logits, targets
+        return level_sums(self.module, states, targets, share)
 
     # -- what is cut out of clips --------------------------------------------------------------------------------------
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import pytest
 import torch
+import torch.nn.functional as F
 
 from workers.mogo.config import TINY
-from workers.mogo.losses import scale_penalty, sequence_loss
+from workers.mogo.losses import LevelSums, level_sums, scale_penalty
 from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.tokenizing import tokenizer_loss
 
-from .networks import columns, opened, prompts
+from .networks import columns, opened, prompts, transformer
 
 LEVELS = TINY.tokenizer.levels
 
@@ -47,15 +47,38 @@ def test_the_tokenizer_learns_to_give_motion_back() -> None:
     assert sum(losses[-10:]) < 0.6 * sum(losses[:10])
 
 
-def test_the_loss_of_a_sequence_counts_what_was_asked() -> None:
-    targets = torch.full((2, LEVELS, 4), NOT_ASKED)
-    targets[0, 0, 0], targets[1, 2, 3] = 5, 1
-    logits = torch.zeros(2, LEVELS, 4, 33)
-    logits[1, 2, 3, 1] = 4.0
-    loss, levels = sequence_loss(logits, targets)
-    certain = math.log(32 + math.exp(4)) - 4
-    assert levels.tolist() == pytest.approx([math.log(33), 0, certain])
-    assert float(loss) == pytest.approx((math.log(33) + certain) / 2)
+def test_sums_are_those_of_the_whole_forward_and_count_what_was_asked() -> None:
+    model, tokens, lengths = transformer(), columns(12, 3), torch.tensor([12, 7, 10])
+    skipped, ends = torch.tensor([0, 5, 0]), torch.tensor([True, True, False])
+    targets = next_targets(tokens, lengths, model.end, ends=ends, skipped=skipped)
+    logits = model(prompts(3), tokens, skipped=skipped)
+    wanted = F.cross_entropy(logits.flatten(0, 2), targets.flatten(), ignore_index=NOT_ASKED, reduction="none")
+    sums = level_sums(model, model.states(prompts(3), tokens, skipped=skipped), targets)
+    torch.testing.assert_close(sums.losses, wanted.view(targets.shape).sum((0, 2)))
+    assert sums.asked.tolist() == [30, *[28] * (LEVELS - 1)]  # two ends at level 0, no first frame of the second clip
+    right = (logits.argmax(-1) == targets) & (targets != NOT_ASKED)
+    assert torch.equal(sums.right, right.sum((0, 2)))
+
+
+def test_asked_of_a_share_of_frames_level_0_is_the_same_and_the_others_have_fewer() -> None:
+    model, tokens = transformer(), columns(20, 3)
+    states = model.states(prompts(3), tokens)
+    targets = next_targets(tokens, torch.tensor([20, 20, 16]), model.end)
+    full, part, none = (level_sums(model, states, targets, share) for share in (1.0, 0.5, 0.0))
+    for sums in (part, none):
+        torch.testing.assert_close(sums.losses[0], full.losses[0])
+        assert sums.asked[0] == full.asked[0]
+    assert 0 < part.asked[1] == part.asked[-1] < full.asked[1]
+    assert none.asked[1:].tolist() == none.losses[1:].tolist() == [0] * (LEVELS - 1)
+    together = full + part
+    assert torch.equal(together.asked, full.asked + part.asked)
+
+
+def test_level_0_weighs_as_much_as_it_is_told() -> None:
+    sums = LevelSums(torch.tensor([2.0, 6.0, 0.0]), torch.tensor([0, 0, 0]), torch.tensor([2, 3, 0]))
+    assert sums.means.tolist() == [1, 2, 0]
+    assert float(sums.loss(1.0)) == pytest.approx(1.0)
+    assert float(sums.loss(4.0)) == pytest.approx((4 * 1 + 2) / 6)
 
 
 def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
@@ -72,7 +95,7 @@ def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
     targets = next_targets(tokens, lengths, model.end)
     optimizer = torch.optim.Adam(model.parameters(), lr=3e-3)
     for _ in range(150):
-        loss, _ = sequence_loss(model(prompts(2), tokens), targets)
+        loss = level_sums(model, model.states(prompts(2), tokens), targets).loss(1.0)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
