@@ -6,20 +6,17 @@ hashes, so nothing else runs, whatever reaches the page; it talks to its own ser
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import re
 from dataclasses import dataclass
 from functools import cache
 
 from shared.motion.body import dress
-from shared.motion.pages import asset, body_document, fill, script_json, style
+from shared.motion.pages import asset, body_document, code_hashes, fill, script_json, style
 from shared.motion.skeleton import HUMANML3D
 
 SKELETONS = (HUMANML3D,)
 """Those that live streams have; another one is drawn as thin bones. The first stands there while there is no stream."""
-_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
-_STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 _HOST = re.compile(r"[A-Za-z0-9.-]+(:[0-9]{1,5})?")
 
 
@@ -73,12 +70,4 @@ def live_page() -> LivePage:
     }
     page = fill(asset("live.html"), parts)
     content = page.encode()
-    hashes = (
-        " ".join(["script-src", *(_hash(script) for script in _SCRIPT.findall(page))]),
-        " ".join(["style-src", *(_hash(text) for text in _STYLE.findall(page))]),
-    )
-    return LivePage(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', hashes)
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
+    return LivePage(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', code_hashes(page))

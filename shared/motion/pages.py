@@ -6,17 +6,23 @@ or pass for a mark of the template.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
+import re
 from collections.abc import Mapping
 from importlib import resources
 
 from shared.motion.body import Body
 from shared.motion.skeleton import Skeleton
 
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 
-def asset(name: str) -> str:
-    """The text of a file in `assets`."""
-    return (resources.files("shared.motion") / "assets" / name).read_text(encoding="utf-8")
+
+def asset(name: str, package: str = "shared.motion") -> str:
+    """The text of a file in a package's `assets`."""
+    return (resources.files(package) / "assets" / name).read_text(encoding="utf-8")
 
 
 def fill(template: str, parts: Mapping[str, str]) -> str:
@@ -42,6 +48,18 @@ def script_json(value: object) -> str:
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
     return text
+
+
+def code_hashes(page: str) -> tuple[str, str]:
+    """`script-src` and `style-src` of a policy under which the page's own scripts and styles run, and nothing else."""
+    return (
+        " ".join(["script-src", *(_hash(script) for script in _SCRIPT.findall(page))]),
+        " ".join(["style-src", *(_hash(text) for text in _STYLE.findall(page))]),
+    )
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
 
 
 def body_document(skeleton: Skeleton, body: Body) -> dict[str, object]:

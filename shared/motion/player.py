@@ -61,7 +61,7 @@ def html_player(
     if theme not in THEMES:
         raise InvalidInput(f"there is no theme {theme!r}", hint=f"One of: {', '.join(THEMES)}.")
     texts = [one_line(c) for c in captions] if captions else [one_line(caption_of(c)) for c in rows]
-    page = _page(_document(rows, texts), one_line(title or texts[0]) or "Marey", theme)
+    page = _page(motion_document(rows, texts), one_line(title or texts[0]) or "Marey", theme)
     write_atomically(path, page.encode())
     return path
 
@@ -75,12 +75,14 @@ def _page(document: dict[str, object], title: str, theme: str) -> str:
         "%LICENCE%": asset("three.LICENSE.txt"),
         "%THREE%": asset("three.min.js"),
         "%SCENE%": asset("scene.js"),
+        "%CLIP%": asset("clip.js"),
         "%PLAYER%": asset("player.js"),
     }
     return fill(asset("player.html"), parts)
 
 
-def _document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:
+def motion_document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:
+    """Clips with a caption each, as clip.js reads them out of a page: `bodies`, and `clips` that refer to them."""
     bodies: dict[str, int] = {}  # clips of one skeleton share one body
     entries: list[dict[str, object]] = []
     for number, (clip, caption) in enumerate(zip(clips, captions, strict=True), start=1):

@@ -1,85 +1,18 @@
 "use strict";
 // The player: reads the motion embedded in the page and plays it on the stage of scene.js.
 (() => {
-  const T = THREE;
-  const { Figure, Stage } = MareyScene;
+  const { Stage } = MareyScene;
+  const { Player, read } = MareyClips;
   const $ = (id) => document.getElementById(id);
 
-  // ---------------------------------------------------------------- data
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-
-  function halves(text) {
-    const view = new DataView(bytes(text).buffer);
-    const out = new Float32Array(view.byteLength / 2);
-    for (let i = 0; i < out.length; i++) {
-      const h = view.getUint16(2 * i, true);
-      const exponent = (h >> 10) & 31;
-      const fraction = h & 1023;
-      const size = exponent ? 2 ** (exponent - 15) * (1 + fraction / 1024) : 2 ** -14 * (fraction / 1024);
-      out[i] = h & 0x8000 ? -size : size;
-    }
-    return out;
-  }
-
-  const document_ = JSON.parse($("motion").textContent);
-  const clips = document_.clips.map((c) => ({
-    ...c,
-    ...document_.bodies[c.body],
-    root: new Float32Array(bytes(c.root).buffer),
-    rotations: halves(c.rotations),
-    contacts: bytes(c.contacts),
-    length: (c.frames - 1) / c.fps,
-  }));
-
-  // ---------------------------------------------------------------- figures
   const stage = new Stage($("view"), $("failure"));
-
-  // A figure that plays one clip, with the trail of its root.
-  class Player extends Figure {
-    constructor(clip) {
-      super(stage, clip);
-      this.clip = clip;
-      const path = [];
-      for (let t = 0; t < clip.frames; t++) path.push(clip.root[3 * t], 0, clip.root[3 * t + 2]);
-      this.path = stage.line(T.Line, path, 0.35);
-      this.past = stage.line(T.Line, path, 1);
-    }
-
-    show(visible) {
-      super.show(visible);
-      this.path.visible = this.past.visible = visible;
-    }
-
-    paint(palette) {
-      super.paint(palette);
-      for (const line of [this.path, this.past]) line.material.color.set(palette.muted);
-    }
-
-    read(frame) {
-      const { root, rotations, parents } = this.clip;
-      const turns = 4 * parents.length;
-      return { root: root.subarray(3 * frame, 3 * frame + 3), turns: rotations.subarray(turns * frame, turns * (frame + 1)) };
-    }
-
-    // Show a time in seconds, between two frames by spherical interpolation.
-    seek(seconds, options) {
-      const { clip } = this;
-      const exact = Math.min(Math.max(seconds * clip.fps, 0), clip.frames - 1);
-      const frame = Math.min(Math.floor(exact + 1e-6), Math.max(clip.frames - 2, 0));
-      this.pose.between(this.read(frame), this.read(Math.min(frame + 1, clip.frames - 1)), exact - frame);
-      this.frame = Math.round(exact);
-      this.move(clip.contacts.subarray(this.frame * clip.feet.length, (this.frame + 1) * clip.feet.length), options.axes);
-      this.path.visible = this.past.visible = options.trail;
-      this.path.position.y = this.past.position.y = 0.006 - clip.sole;
-      this.past.geometry.setDrawRange(0, this.frame + 1);
-    }
-  }
+  const clips = read(JSON.parse($("motion").textContent));
 
   // ---------------------------------------------------------------- state
   const state = { clip: 0, seconds: 0, playing: true, speed: 1, follow: true, trail: true, axes: false, theme: "light" };
   const figures = clips.map(() => null);
   const clip = () => clips[state.clip];
-  const figure = () => (figures[state.clip] ??= new Player(clip()));
+  const figure = () => (figures[state.clip] ??= new Player(stage, clip()));
 
   function home() {
     const { root, height } = clip();

@@ -159,19 +159,26 @@ const MareyScene = (() => {
   }
 
   class Stage {
-    // Throws where there is no WebGL, after it has said so in the element `failure`.
-    constructor(canvas, failure) {
+    // What draws on a canvas. Throws where there is no WebGL, after it has said so in the element `failure`.
+    static renderer(canvas, failure) {
+      let renderer;
       try {
-        this.renderer = new T.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+        renderer = new T.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
       } catch (error) {
         failure.textContent = NO_WEBGL;
         failure.hidden = false;
         document.body.dataset.ready = "failed";
         throw error;
       }
-      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-      this.renderer.shadowMap.enabled = true;
-      this.renderer.shadowMap.type = T.PCFShadowMap;
+      renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      renderer.shadowMap.enabled = true;
+      renderer.shadowMap.type = T.PCFShadowMap;
+      return renderer;
+    }
+
+    // Several stages of one page may share a renderer; each then has a canvas of its own to turn the view on.
+    constructor(canvas, failure, renderer = Stage.renderer(canvas, failure)) {
+      this.renderer = renderer;
       this.scene = new T.Scene();
       this.camera = new T.PerspectiveCamera(32, 1, 0.05, 200);
       this.controls = new T.OrbitControls(this.camera, canvas);
@@ -250,8 +257,13 @@ const MareyScene = (() => {
         [this.width, this.height] = [innerWidth, innerHeight];
         this.renderer.setSize(innerWidth, innerHeight, false);
       }
-      this.camera.aspect = innerWidth / innerHeight;
-      this.camera.setViewOffset(innerWidth, innerHeight, -x, -y, innerWidth, innerHeight);
+      this.aim(innerWidth, innerHeight, x, y);
+    }
+
+    // Look at a picture of so many pixels, its middle `x` pixels to the right and `y` down from the view's.
+    aim(width, height, x = 0, y = 0) {
+      this.camera.aspect = width / height;
+      this.camera.setViewOffset(width, height, -x, -y, width, height);
       this.camera.updateProjectionMatrix();
     }
 

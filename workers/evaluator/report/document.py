@@ -1,0 +1,90 @@
+"""The report as JSON: the same numbers for programs, for committed results, for the next comparison.
+
+    {"schema": "marey.evaluation-report", "version": 1, "title": …, every field of `Report` by its name}
+
+Times are ISO 8601 in UTC; numbers have six significant digits (settings all of theirs); what does not apply is null.
+Clips are not inside: an exhibit has its prompt, seed, verdict and score. A field that is added with a default keeps the
+version; a field that is renamed, goes, or changes its meaning raises it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from functools import cache
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from shared.errors import InvalidFile
+from workers.evaluator.report.model import Report
+from workers.evaluator.report.parts import Exhibit
+
+SCHEMA, VERSION = "marey.evaluation-report", 1
+DIGITS = 6  # significant; intervals are a hundred times wider
+
+
+def to_json(report: Report) -> bytes:
+    """The file. Equal reports give equal bytes."""
+    # Settings keep all their digits: they are there to be typed in again.
+    document = {"schema": SCHEMA, "version": VERSION, **_plain(report), "settings": dict(report.settings)}
+    scores = [_text(score) for score in document.pop("scores")]
+    text = _text(document, indent=2).removesuffix("\n}")
+    # A line a motion: committed results stay readable, and their differences too.
+    lines = "".join(f"\n    {score}," for score in scores).removesuffix(",")
+    return f'{text},\n  "scores": [{lines}\n  ]\n}}\n'.encode()
+
+
+def from_json(data: bytes, where: str = "report") -> Report:
+    """Read a report back, without its clips.
+
+    Raises:
+        InvalidFile: no such JSON, of another version, or a field that is missing or of the wrong kind.
+        InvalidInput: the fields contradict each other.
+    """
+    try:
+        document = json.loads(data, parse_constant=_no_number)
+    except ValueError as error:
+        raise InvalidFile(f"is no JSON: {error}", where=where) from None
+    if not isinstance(document, dict) or document.pop("schema", None) != SCHEMA:
+        raise InvalidFile("is no report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
+    version = document.pop("version", None)
+    if version != VERSION:
+        raise InvalidFile(f"has version {version}; this reads version {VERSION}", where=where)
+    try:
+        return _reader().validate_json(json.dumps(document), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"])
+        raise InvalidFile(f"`{field}`: {first['msg'].lower()}", where=where) from None
+
+
+@cache
+def _reader() -> TypeAdapter[Report]:
+    return TypeAdapter(Report)
+
+
+def _no_number(text: str) -> None:
+    raise ValueError(f"{text} is no number")
+
+
+def _text(value: Any, indent: int | None = None) -> str:
+    return json.dumps(value, ensure_ascii=False, indent=indent, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses, times and numbers as JSON has them; a clip is left out."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [f.name for f in dataclasses.fields(value) if not (isinstance(value, Exhibit) and f.name == "clip")]
+        return {name: _plain(getattr(value, name)) for name in names}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, datetime):
+        return value.astimezone(UTC).isoformat().replace("+00:00", "Z")
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    return value

@@ -1,0 +1,163 @@
+"""The report as Markdown that GitHub renders: for a pull request, a page of results, a mail."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from shared.motion.paper import one_line
+from workers.evaluator.report.exhibits import score_of
+from workers.evaluator.report.model import Report
+from workers.evaluator.report.parts import Exhibit, HeatCell
+from workers.evaluator.report.sections import plain, speed_of
+from workers.evaluator.report.tables import Cell, Heat, Line, Table, heat_of, in_percent, tables_of, trended, weakest_of
+from workers.evaluator.report.words import CHANGES, LEGEND, day, headline, intervals_of, moment, number
+
+ROWS_OF_TREND = 8  # the page has the rest
+# What could begin emphasis, code, a link, a picture, HTML, a column, a formula, an issue or a person's name.
+_SPECIAL = re.compile(r"([\\`*_\[\]<>&|~$#@])|(?<=\w)(:)(?=//)|(?<=\bwww)(\.)|^([-+=]|\d+[.)](?=\s|$))", re.IGNORECASE)
+
+
+def to_markdown(report: Report) -> bytes:
+    """The file. Equal reports give equal bytes."""
+    head = headline(report)
+    blocks = [
+        f"# {_text(report.title)}",
+        _facts(report),
+        "\n".join(
+            [f"> **{head.word}.** {_text(head.sentence)}", *(f">\n> {_text(sentence)}" for sentence in head.more)]
+        ),
+        "## Numbers",
+        *(block for table in tables_of(report) for block in _table(table, report.source.name)),
+        _text(f"{LEGEND} {intervals_of(report.repeats)}"),
+        _text(CHANGES) if report.changes else "",
+        _text(report.comparability),
+        *_heat(heat_of(report)),
+        *_exhibits("Worst clips", report.worst, report.ranked_by),
+        *_exhibits("Best clips", report.best, report.ranked_by),
+        *_trend(report),
+        *_repeat(report),
+        *_notes(report.notes),
+    ]
+    return ("\n\n".join(block for block in blocks if block) + "\n").encode()
+
+
+def _text(value: str) -> str:
+    """Any text as one line that says what it says: nothing in it is Markdown or HTML."""
+    return _SPECIAL.sub(lambda found: "\\" + found[0] if not found[4] else _item(found[4]), one_line(value))
+
+
+def _item(begin: str) -> str:
+    """The beginning of a list, made none: `1\\.`, `\\-`."""
+    return f"{begin[:-1]}\\{begin[-1]}"
+
+
+def _code(value: str) -> str:
+    """Any text as code; a backtick or a table's bar cannot be escaped between backticks in every renderer."""
+    line = one_line(value)
+    if not line:
+        return ""
+    return f"<code>{_text(line)}</code>" if re.search(r"[`|\\]", line) else f"`{line}`"
+
+
+def _rows(head: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> str:
+    align = ["---"] * left + ["---:"] * (len(head) - left)
+    return "\n".join(f"| {' | '.join(row)} |" for row in [head, align, *rows])
+
+
+def _facts(report: Report) -> str:
+    failed = f", {report.failed} failed and count nowhere" if report.failed else ""
+    facts = [
+        f"Evaluation {_text(report.evaluation)}, {moment(report.created)}",
+        f"{_code(report.generator.name)} (weights {_text(report.licence)})",
+        f"{report.prompts} prompts, {report.motions} motions{failed}",
+        f"on {_text(report.source.name)}",
+    ]
+    return " · ".join(facts)
+
+
+def _table(table: Table, source: str) -> list[str]:
+    arrows = {"higher": " ↑", "lower": " ↓", "": ""}
+    units = [f" ({_text(m.unit)})" if m.unit else "" for m in table.metrics]
+    head = ["", *(f"{_text(m.name)}{u}{arrows[m.better]}" for m, u in zip(table.metrics, units, strict=True))]
+    notes = "\n".join(f"- [{mark}] {_text(text)}" for mark, text in table.footnotes)
+    return [
+        f"Measured by **{_text(table.measured_by)}** on **{_text(source)}**.",
+        _rows(head, [_line(line) for line in table.lines]),
+        notes,
+    ]
+
+
+def _line(line: Line) -> list[str]:
+    label = _text(line.label)
+    if line.of == "changes":
+        return [f"↳ {label}<br>{_text(line.note)}", *(_cell(cell, line.of) for cell in line.cells)]
+    label = f"**{label}**" if line.judged else label
+    return [f"{label}<br>{_text(line.note)}" if line.note else label, *(_cell(cell, line.of) for cell in line.cells)]
+
+
+def _cell(cell: Cell, of: str) -> str:
+    if cell.kind == "blank":
+        return "–"
+    marks = "".join(f" [{mark}]" for mark in cell.marks)
+    if of == "changes":
+        return f"{cell.text} **{cell.detail}**<br>{cell.interval}"
+    interval = f" {cell.interval}" if cell.interval else ""
+    return f"{cell.text}{interval}{marks}" + (f"<br>{_text(cell.detail)}" if cell.detail else "")
+
+
+def _heat(heat: Heat) -> list[str]:
+    if not heat.cells:
+        return []
+    rows = [
+        [_text(act), *(_place(heat.cell(act, style)) for style in heat.styles), _place(heat.total(act=act))]
+        for act in heat.acts
+    ]
+    rows.append(["**all**", *(_place(heat.total(style=style)) for style in heat.styles), _place(heat.total())])
+    head = ["passed of tried", *(_text(style) for style in heat.styles), "**all**"]
+    return ["## Prompt checks by action and style", _text(weakest_of(heat)), _rows(head, rows)]
+
+
+def _place(cell: HeatCell | None) -> str:
+    return f"{cell.passed}/{cell.trials} ({in_percent(cell)})" if cell and cell.trials else "–"
+
+
+def _exhibits(title: str, exhibits: Sequence[Exhibit], ranked_by: str) -> list[str]:
+    if not exhibits:
+        return []
+    rows = [
+        [f"“{_text(e.prompt)}”", "passed" if e.passed else "**failed**", _text(e.reason), str(e.seed), score_of(e)]
+        for e in exhibits
+    ]
+    ranked = f"Ranked by {_text(ranked_by)}." if ranked_by else ""
+    return [f"## {title}", ranked, _rows(["prompt", "check", "reason", "seed", "score"], rows, left=3)]
+
+
+def _trend(report: Report) -> list[str]:
+    runs, metrics = trended(report)
+    if not metrics:
+        return []
+    rows = [
+        [
+            f"{day(run.finished)}, {_text(run.evaluation)}",
+            _code(run.bundle),
+            *(number(run.values[m.key], m) if m.key in run.values else "–" for m in metrics),
+        ]
+        for run in reversed(runs[-ROWS_OF_TREND:])
+    ]
+    return ["## Trends", _rows(["run", "bundle", *(_text(m.name) for m in metrics)], rows, left=2)]
+
+
+def _repeat(report: Report) -> list[str]:
+    given = [("generator", report.generator), ("evaluator", report.evaluator), ("data", report.source)]
+    rows = [[label, f"{_code(each.name)} {_code(each.sha256)}"] for label, each in given if each]
+    rows += [[_text(name), _code(plain(value))] for name, value in report.settings.items()]
+    rows += [[_text(name), _code(version)] for name, version in report.software.items()]
+    if report.speed:
+        rows.insert(0, ["speed", _text(speed_of(report))])
+    command = f"    {one_line(report.command)}" if report.command else ""
+    return ["## How to repeat it", command, _rows(["what", "value"], rows, left=2)]
+
+
+def _notes(notes: Sequence[str]) -> list[str]:
+    return ["## Notes", "\n".join(f"- {_text(note)}" for note in notes)] if notes else []

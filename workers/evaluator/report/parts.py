@@ -1,0 +1,233 @@
+"""The parts of a report: numbers, rows, clips, references.
+
+A number that does not exist stays a marked place with a reason; NaN and infinity are refused where they enter, so that
+no page ever shows them. Numbers are given in the unit they are printed in: a share in percent is 94.9.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Literal
+
+from pydantic import InstanceOf
+
+from shared.errors import InvalidInput
+from shared.motion.clip import MotionClip
+from workers.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
+
+
+@dataclass(frozen=True)
+class Value:
+    """One number of the table.
+
+    Attributes:
+        mean: over the repeats; None = not available.
+        half_width: of its 95 % interval over the repeats; None = measured once.
+        n: motions (or prompts) that one repeat counts; for a distance of distributions the smaller set.
+        note: what a reader has to know; why there is no number, where there is none.
+        dimensions: of the embeddings, for a metric that needs many motions a dimension (FID).
+    """
+
+    mean: float | None
+    half_width: float | None = None
+    n: int = 0
+    note: str = ""
+    dimensions: int | None = None
+
+    def __post_init__(self) -> None:
+        finite("value", self.mean, self.half_width)
+        if self.mean is None and not self.note.strip():
+            raise InvalidInput("a value that is not available says why in its note")
+        if self.mean is None and self.half_width is not None:
+            raise InvalidInput("a value that is not available has no interval")
+        if self.half_width is not None and self.half_width < 0:
+            raise InvalidInput(f"an interval of half width {self.half_width:g}")
+        if self.n < 0 or (self.dimensions is not None and self.dimensions < 1):
+            raise InvalidInput(f"a value of {self.n} motions in {self.dimensions} dimensions")
+
+    @classmethod
+    def missing(cls, why: str) -> Value:
+        """A marked place in the table."""
+        return cls(None, note=why)
+
+    @property
+    def too_few(self) -> bool:
+        """The number stands on fewer than 5 motions a dimension: it is mostly sampling noise."""
+        return (
+            self.mean is not None and self.dimensions is not None and self.n < SAMPLES_PER_DIMENSION * self.dimensions
+        )
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One column.
+
+    Attributes:
+        key: `r_precision_1`.
+        label: `R-precision, top 1`.
+        unit: printed after the number; empty for a bare one.
+        better: which way is better; empty where neither is (diversity: as the ground truth).
+        digits: after the point.
+        explanation: one sentence for somebody who does not know the metric.
+        measured_by: the network (name and hash) or the way it was measured. Columns of different ones share no table.
+        measured_on: the data, where it is not the report's source: the compositional split has columns of its own.
+    """
+
+    key: str
+    label: str
+    unit: str = ""
+    better: Literal["higher", "lower", ""] = ""
+    digits: int = 3
+    explanation: str = ""
+    measured_by: str = "joints, without a network"
+    measured_on: str = ""
+
+    @property
+    def name(self) -> str:
+        """What a sentence calls it: with its data, where they are not the report's."""
+        return f"{self.label} on {self.measured_on}" if self.measured_on else self.label
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: ground truth, reconstruction, raw, exported, a ceiling.
+
+    Attributes:
+        key: `ground_truth`, `reconstruction`, `raw`, `exported`, ….
+        label: as printed.
+        note: what the row is, in a few words.
+        values: by metric; a metric that makes no sense for the row is left out.
+    """
+
+    key: str
+    label: str
+    note: str = ""
+    values: Mapping[str, Value] = field(default_factory=dict[str, Value])
+
+
+@dataclass(frozen=True)
+class TrendPoint:
+    """The judged row of one run, for the key metrics."""
+
+    finished: datetime
+    evaluation: str
+    bundle: str
+    values: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        aware("trend.finished", self.finished)
+        finite(f"trend of evaluation {self.evaluation}", *self.values.values())
+
+
+@dataclass(frozen=True)
+class HeatCell:
+    """Prompt checks of one action in one style."""
+
+    act: str
+    style: str
+    trials: int
+    passed: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.passed <= self.trials:
+            raise InvalidInput(f"{self.passed} of {self.trials} trials passed", where=f"{self.act}, {self.style}")
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A clip that the page shows. Read back from JSON it has no clip, and the page then shows its text alone."""
+
+    prompt: str
+    seed: int
+    passed: bool
+    reason: str
+    score: float
+    clip: InstanceOf[MotionClip] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        finite(f"score of {self.prompt!r}", self.score)
+
+
+@dataclass(frozen=True)
+class MotionScore:
+    """What later runs are paired with, motion by motion; None where it was not measured.
+
+    Attributes:
+        index: of the prompt.
+        variant: of the prompt's motions.
+        obeyed: whether the motion passed its prompt check, 0 or 1.
+        retrieved: R-precision of this motion, the share of its pools in which its prompt was found, 0 to 1.
+    """
+
+    index: int
+    variant: int
+    obeyed: float | None
+    retrieved: float | None
+
+    def __post_init__(self) -> None:
+        for score in (self.obeyed, self.retrieved):
+            if score is not None and not 0 <= score <= 1:
+                raise InvalidInput(f"a score of {score}", where=f"prompt {self.index}, variant {self.variant}")
+
+
+@dataclass(frozen=True)
+class Speed:
+    """How fast motions came; `note` says on what (workers, device, batch)."""
+
+    motions_per_second: float
+    median_seconds_per_motion: float
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        finite("speed", self.motions_per_second, self.median_seconds_per_motion)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A bundle, a split, a file: by name and by the sha256 of its content."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """What the intervals are over.
+
+    Attributes:
+        count: repeats.
+        regenerated: of those, how many generated all motions anew; the others drew pools only, and an interval over
+            them says nothing of what another generation would give.
+    """
+
+    count: int
+    regenerated: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.regenerated <= self.count or self.count < 1:
+            raise InvalidInput(f"{self.regenerated} of {self.count} repeats generated anew")
+
+
+def finite(where: str, *numbers: float | None) -> None:
+    """Refuse NaN and infinity."""
+    for number in numbers:
+        if number is not None and not math.isfinite(number):
+            raise InvalidInput(f"{number} is no number to report", where=where, hint="Say why with Value.missing.")
+
+
+def aware(where: str, moment: datetime) -> None:
+    """Refuse a time without time zone."""
+    if moment.tzinfo is None:
+        raise InvalidInput("a time without time zone", where=where)
+
+
+def distinct(where: str, keys: Iterable[object]) -> None:
+    """Refuse a key that stands there twice."""
+    seen: set[object] = set()
+    for key in keys:
+        if key in seen:
+            raise InvalidInput(f"{key!r} stands there twice", where=where)
+        seen.add(key)
