@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,20 @@ class Bundle:
         """Mean and standard deviation (D,) the features were normalised with in training."""
         tensors = self.tensors(STATISTICS)
         return tensors["mean"].astype(np.float32), tensors["std"].astype(np.float32)
+
+    def read_json(self, name: str) -> Any:
+        """What `BundleWriter.add_json` wrote.
+
+        Raises:
+            InvalidBundle: no such file, or not JSON.
+        """
+        file = self.path / name
+        if name not in self.manifest.files:
+            raise InvalidBundle(f"has no file {name!r}", where=str(self.path))
+        try:
+            return json.loads(file.read_bytes())
+        except (OSError, ValueError) as error:
+            raise _broken(file, f"is not JSON: {error}") from error
 
     def _load_shard(self, file: Path) -> Tensors:
         try:

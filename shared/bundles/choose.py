@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from shared.bundles.bundle import Bundle, find_bundle, list_bundles
 from shared.bundles.manifest import MANIFEST_NAME
-from shared.errors import NotFound
+from shared.errors import InvalidBundle, NotFound
 from shared.settings import Settings, settings
 
 
@@ -32,6 +32,29 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
         )
     chosen = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name))
     return find_bundle(chosen.manifest.name, config=config, verify=verify)
+
+
+def choose_evaluator(name: str | None, *, config: Settings | None = None) -> Bundle:
+    """The evaluator's bundle of this name or exact reference, hashes not checked; None = the one that is here.
+
+    Of several, that is the first, by name, that was trained; else the first with random weights.
+
+    Raises:
+        NotFound: there is none.
+        InvalidBundle, Refused: as `find_bundle`; or it is no evaluator.
+    """
+    config = config or settings()
+    if name is None:
+        found = list(list_bundles(config=config, kind="evaluator"))
+        if not found:
+            raise NotFound(
+                "there is no evaluator's bundle here", hint="`marey train evaluator` makes one; MAREY_MODELS names it."
+            )
+        name = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name)).manifest.name
+    bundle = find_bundle(name, config=config, verify=False)
+    if bundle.manifest.kind != "evaluator":
+        raise InvalidBundle(f"{bundle.manifest.name!r} is a {bundle.manifest.kind}, not an evaluator", where=name)
+    return bundle
 
 
 def _is_there(name: str, config: Settings) -> bool:

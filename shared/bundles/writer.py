@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -71,6 +72,12 @@ class BundleWriter:
     def add_statistics(self, mean: NDArray[np.float32], std: NDArray[np.float32]) -> None:
         """Mean and standard deviation (D,), kept in float32."""
         self.add_part(STATISTICS, {"mean": mean, "std": std}, dtype=np.float32)
+
+    def add_json(self, name: str, value: Any) -> None:
+        """Plain JSON values as a file of their own, `reference.json` for instance: hashed like the weights."""
+        if name == MANIFEST_NAME:
+            raise InvalidInput("is the manifest's name", where=name)
+        self._add_file(name, json.dumps(value, ensure_ascii=False).encode())
 
     def add_card(self, text: str) -> None:
         """The model card, `README.md`. It is no part of the weights: it may be edited later."""

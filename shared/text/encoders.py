@@ -67,6 +67,10 @@ class TextEncoder(Protocol):
         """One vector (W,) a text, which depends on that text alone, never on those beside it."""
         ...
 
+    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """Token states (T, W) a text, those of `encode`; they depend on that text alone as well."""
+        ...
+
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
     """The encoder `name`, from `path` or wherever `find_weights` finds it.

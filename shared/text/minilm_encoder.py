@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ class MiniLMEncoder:
     @one_thread()
     def encode(self, text: str) -> Encoding:
         """Encode one text; tokens past 256 are left out."""
-        ids, offsets = self._tokens(text)
+        ids, offsets = self._ids(text)
         tokens: NDArray[np.float32] = self._model.states(ids)[-1].numpy()
         mean = tokens.mean(axis=0)
         norm = float(np.linalg.norm(mean))
@@ -38,13 +38,20 @@ class MiniLMEncoder:
     @one_thread()
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """Encode texts, the tokens of many in one pass."""
-        means: list[NDArray[np.float32]] = []
-        for low in range(0, len(texts), MAX_TEXTS):
-            states = self._model.last([self._tokens(text)[0] for text in texts[low : low + MAX_TEXTS]])
-            means += [tokens.numpy().mean(axis=0) for tokens in states]
+        means = [tokens.mean(axis=0) for tokens in self._last(texts)]
         return [mean / float(np.linalg.norm(mean)) for mean in means]
 
-    def _tokens(self, text: str) -> tuple[list[int], list[tuple[int, int]]]:
+    @one_thread()
+    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """Token states of texts, many in one pass."""
+        return [tokens / float(np.linalg.norm(tokens.mean(axis=0))) for tokens in self._last(texts)]
+
+    def _last(self, texts: Sequence[str]) -> Iterator[NDArray[np.float32]]:
+        for low in range(0, len(texts), MAX_TEXTS):
+            states = self._model.last([self._ids(text)[0] for text in texts[low : low + MAX_TEXTS]])
+            yield from (tokens.numpy() for tokens in states)
+
+    def _ids(self, text: str) -> tuple[list[int], list[tuple[int, int]]]:
         encoded = self._model.tokenizer.encode(text)
         if len(encoded.ids) <= MAX_TOKENS:
             return encoded.ids, encoded.offsets

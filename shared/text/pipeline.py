@@ -46,12 +46,12 @@ class TextPipeline:
         Raises:
             InvalidBundle: the weights or the width are not those `spec` names.
         """
-        _refuse_mismatch("encoder", spec.encoder, spec.encoder_sha256, encoder.name, encoder.sha256)
+        refuse_mismatch("encoder", spec.encoder, spec.encoder_sha256, encoder.name, encoder.sha256)
         if encoder.width != spec.width:
             raise InvalidBundle(f"text width {spec.width} is wanted, but {encoder.name} gives {encoder.width}")
         labeller_sha256 = labeller.sha256 or None
         if spec.labeller != NO_LABELLER:
-            _refuse_mismatch("labeller", labeller.name, spec.labeller_sha256, labeller.name, labeller.sha256)
+            refuse_mismatch("labeller", labeller.name, spec.labeller_sha256, labeller.name, labeller.sha256)
         self.spec = spec.model_copy(update={"encoder_sha256": encoder.sha256, "labeller_sha256": labeller_sha256})
         self.rewriter = rewriter
         self.labeller = labeller
@@ -189,7 +189,8 @@ def _strip(text: str) -> str:
     return text.strip(EDGE_PUNCTUATION + " ") or text
 
 
-def _refuse_mismatch(what: str, name: str, sha256: str | None, found_name: str, found_sha256: str) -> None:
+def refuse_mismatch(what: str, name: str, sha256: str | None, found_name: str, found_sha256: str) -> None:
+    """Raises InvalidBundle where an encoder or labeller is another than a bundle names; no hash fits any."""
     if name != found_name:
         raise InvalidBundle(f"the text {what} {name!r} is wanted, but {found_name!r} was loaded")
     if sha256 is not None and sha256 != found_sha256:

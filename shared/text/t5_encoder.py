@@ -56,3 +56,7 @@ class T5Encoder:
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """One by one: a product of other rows may round differently."""
         return [self.encode(text).pooled for text in texts]
+
+    def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
+        """One by one, as `pooled`."""
+        return [self.encode(text).tokens for text in texts]

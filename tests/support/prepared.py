@@ -57,10 +57,14 @@ def text_features(seed: int, actions: int = 2, specifics: int = 3, width: int = 
     return TextFeatures("a person moves", "a person moves", graph(actions, specifics), vectors.astype(np.float16))
 
 
-def write_prepared(folder: Path, clips: int = 18) -> Path:
-    """Write a prepared folder with texts."""
+def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> Path:
+    """Write a prepared folder with texts.
+
+    With `acts`, clip i does one of them, i modulo their number: it swings in that act's way, and its captions name it.
+    """
     folder.mkdir(parents=True)
-    features = [HUMANML3D_263.encode(swinging(36 + 9 * (i % 8), i)) for i in range(clips)]
+    seeds = [i % len(acts) if acts else i for i in range(clips)]
+    features = [HUMANML3D_263.encode(swinging(36 + 9 * (i % 8), seed)) for i, seed in enumerate(seeds)]
     starts = np.concatenate([[0], np.cumsum([len(f) for f in features])])
     lines = [
         Clip(
@@ -74,11 +78,11 @@ def write_prepared(folder: Path, clips: int = 18) -> Path:
             style="normal",
             mirrored=False,
             spliced=(),
-            acts=("walk", "bow") if joined(i) else ("walk",),
+            acts=(acts[i % len(acts)],) if acts else ("walk", "bow") if joined(i) else ("walk",),
             measured=Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side=""),
-            captions=("one", "two"),
-            seams=(20,) if joined(i) else (),
-            act_captions=("three", "four") if joined(i) else (),
+            captions=(f"a person does {acts[i % len(acts)]}", acts[i % len(acts)]) if acts else ("one", "two"),
+            seams=(20,) if joined(i) and not acts else (),
+            act_captions=("three", "four") if joined(i) and not acts else (),
         )
         for i, f in enumerate(features)
     ]
@@ -99,7 +103,7 @@ def write_prepared(folder: Path, clips: int = 18) -> Path:
         compositional_pairs=(), files=files,
     )  # fmt: skip
     (folder / names.MANIFEST).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
-    made_up_texts([4 if joined(i) else 2 for i in range(clips)]).save(folder)
+    made_up_texts([4 if joined(i) and not acts else 2 for i in range(clips)]).save(folder)
     return folder
 
 

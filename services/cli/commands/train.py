@@ -15,6 +15,10 @@ hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_i
 app.add_typer(hgm3, name="hgm3")
 mogo = typer.Typer(help="MOGO: tokenizer, transformer, then `bundle`.", no_args_is_help=True)
 app.add_typer(mogo, name="mogo")
+evaluator = typer.Typer(help="What judges generated motions: the stage `tmr`, then `bundle`.", no_args_is_help=True)
+app.add_typer(evaluator, name="evaluator")
+
+Model = Literal["hgm3", "mogo", "evaluator"]
 
 
 class Mask(StrEnum):
@@ -39,7 +43,7 @@ Rate = Annotated[float | None, typer.Option("--learning-rate", help="None given 
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
 
 
-def _run(model: Literal["hgm3", "mogo"], stage: str, as_json: bool, **chosen: Any) -> None:
+def _run(model: Model, stage: str, as_json: bool, **chosen: Any) -> None:
     from services.cli import roles
 
     metrics = roles.train_stage(model, stage, **chosen)
@@ -78,8 +82,8 @@ def _hgm3_stage(name: str, what: str) -> None:
     hgm3.command(name, help=what)(command)
 
 
-def _mogo_stage(name: str, what: str) -> None:
-    """Add the command of one stage."""
+def _stage(model: Literal["mogo", "evaluator"], name: str, what: str) -> None:
+    """Add the command of one stage that has no options of its own."""
 
     def command(
         data: Data,
@@ -97,11 +101,11 @@ def _mogo_stage(name: str, what: str) -> None:
         as_json: console.Json = False,
     ) -> None:
         _run(
-            "mogo", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
+            model, name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
             resume=resume, warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16,
         )  # fmt: skip
 
-    mogo.command(name, help=what)(command)
+    {"mogo": mogo, "evaluator": evaluator}[model].command(name, help=what)(command)
 
 
 _hgm3_stage("tokenizer", "Train the residual VQ-VAE.")
@@ -109,9 +113,10 @@ _hgm3_stage("masked", "Train the masked transformer, with hard token mining.")
 _hgm3_stage("residual", "Train the residual transformer.")
 _hgm3_stage("length", "Train the length estimator.")
 _hgm3_stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on.")
-_mogo_stage("tokenizer", "Train the MoSA-VQ.")
-_mogo_stage("transformer", "Train the RQHC-Transformer.")
-_mogo_stage("all", "Both stages one after another, --max-minutes for them together; called again, it goes on.")
+_stage("mogo", "tokenizer", "Train the MoSA-VQ.")
+_stage("mogo", "transformer", "Train the RQHC-Transformer.")
+_stage("mogo", "all", "Both stages one after another, --max-minutes for them together; called again, it goes on.")
+_stage("evaluator", "tmr", "Train the motion and the text encoder of the evaluator.")
 
 
 Output = Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")]
@@ -145,6 +150,16 @@ def mogo_bundle(
     from services.cli import roles
 
     console.result(roles.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
+
+
+@evaluator.command("bundle")
+def evaluator_bundle(
+    data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
+) -> None:
+    """Write the bundle from the part of a run, with captions and embeddings of the real test clips."""
+    from services.cli import roles
+
+    console.result(roles.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite))
 
 
 Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]

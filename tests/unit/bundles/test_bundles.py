@@ -114,3 +114,29 @@ def test_bundles_are_listed_by_kind(config: Settings) -> None:
     write(config.home / "models" / "two")
     assert [b.manifest.name for b in list_bundles(config=config, kind="generator")] == ["one", "two"]
     assert list(list_bundles(config=config, kind="labeller")) == []
+
+
+def test_json_beside_the_weights_is_read_back_hashed_and_part_of_the_reference(tmp_path: Path) -> None:
+    references = []
+    for name, word in (("one", "wave"), ("two", "bow")):
+        with BundleWriter(tmp_path / name) as writer:
+            writer.add_part("motion", {"w": np.zeros(2, np.float32)})
+            writer.add_json("words.json", [word, "é"])
+            writer.finish(
+                name="b", version="1", kind="evaluator", model="t2m", config="tiny", parameters={}, licence="MIT"
+            )
+        bundle = Bundle.open(tmp_path / name)
+        assert bundle.read_json("words.json") == [word, "é"]
+        references.append(bundle.reference)
+    assert references[0] != references[1]
+    (tmp_path / "one" / "words.json").write_text("[]", encoding="utf-8")
+    with pytest.raises(InvalidBundle, match=r"words\.json: has 2 bytes"):
+        Bundle.open(tmp_path / "one")
+
+
+def test_json_that_is_not_there_or_would_be_the_manifest_is_refused(tmp_path: Path) -> None:
+    bundle = write(tmp_path / "b")
+    with pytest.raises(InvalidBundle, match=r"has no file 'reference\.json'"):
+        bundle.read_json("reference.json")
+    with pytest.raises(InvalidInput, match="manifest"), BundleWriter(tmp_path / "c") as writer:
+        writer.add_json("manifest.json", {})

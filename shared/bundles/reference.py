@@ -1,0 +1,56 @@
+"""The prompts that an evaluator's bundle carries: captions of the real clips that it knows. Its embeddings of their
+motions, which stand beside them, are for whoever loads the network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+from shared.bundles.bundle import Bundle
+from shared.errors import InvalidBundle, InvalidInput, MareyError
+from shared.evaluation_prompts import EvaluationPrompt, read_prompts
+from shared.expected import read_expected
+
+FILE = "reference.json"
+
+
+def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...]:
+    """One prompt a clip of a split, in the order of the file, as long as the clip.
+
+    A clip has several captions; clip n gives its n-th, counted round, so that all ways of saying things come about.
+
+    Raises:
+        InvalidBundle: it carries no such prompts, broken ones, or too few or too many for an evaluation.
+    """
+    document = bundle.read_json(FILE)
+    fps = bundle.manifest.fps
+    if not isinstance(document, dict) or split not in document or not fps:
+        raise InvalidBundle(f"carries no captions of the split {split!r}", where=str(bundle.path))
+    clips = cast("list[Mapping[str, Any]]", document[split])
+    try:
+        rows = [(number + 1, _row(clip, number, fps)) for number, clip in enumerate(clips)]
+    except (LookupError, TypeError, ValueError, ZeroDivisionError) as error:
+        raise InvalidBundle(f"its captions cannot be read ({error!r})", where=str(bundle.path / FILE)) from error
+    try:
+        return read_prompts(rows, where=str(bundle.path / FILE))
+    except MareyError as error:
+        raise InvalidBundle(str(error), where=str(bundle.path / FILE)) from error
+
+
+def _row(clip: Mapping[str, Any], number: int, fps: float) -> dict[str, Any]:
+    captions = clip["captions"]
+    return {
+        "prompt": captions[number % len(captions)],
+        "seconds": int(clip["frames"]) / fps,
+        "expected": _expected(clip["acts"], clip["sides"]),
+    }
+
+
+def _expected(acts: list[str], sides: list[str]) -> str | None:
+    """What the clip shows, where it is among the acts that can be expected of a motion; a dance step is not."""
+    text = " then ".join(" ".join(filter(None, pair)) for pair in zip(acts, sides, strict=True))
+    try:
+        read_expected(text)
+    except InvalidInput:
+        return None
+    return text

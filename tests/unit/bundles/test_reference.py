@@ -1,0 +1,66 @@
+"""The captions that an evaluator's bundle carries, and which evaluator is meant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shared.bundles import Bundle, choose_evaluator
+from shared.bundles.reference import reference_prompts
+from shared.errors import InvalidBundle, NotFound
+from shared.evaluation_prompts import EvaluationPrompt
+from shared.settings import Settings
+from tests.support.evaluations import CLIPS, JUDGE, write_evaluator, write_generator
+
+
+def test_each_clip_gives_a_caption_its_length_and_what_it_shows(tmp_path: Path) -> None:
+    write_evaluator(tmp_path)
+    assert reference_prompts(Bundle.open(tmp_path / JUDGE), "test") == (
+        EvaluationPrompt("walk", 3.0, "walk"),
+        EvaluationPrompt("walk and wave", 9.8, "walk then wave left"),
+        EvaluationPrompt("walk as a guide", 0.6, None),  # a guide's gesture is no act that is judged
+    )
+
+
+@pytest.mark.parametrize(
+    "clips",
+    [
+        [],
+        CLIPS[:1],
+        [{**CLIPS[0], "captions": []}, CLIPS[1]],
+        [{**CLIPS[0], "captions": [""]}, CLIPS[1]],
+        [{**CLIPS[0], "frames": "many"}, CLIPS[1]],
+        [{"captions": ["a person walks"]}, CLIPS[1]],
+    ],
+)
+def test_captions_that_cannot_be_used_are_a_broken_bundle(tmp_path: Path, clips: list[dict[str, Any]]) -> None:
+    write_evaluator(tmp_path, clips=clips)
+    with pytest.raises(InvalidBundle):
+        reference_prompts(Bundle.open(tmp_path / JUDGE), "test")
+
+
+def test_a_bundle_without_captions_says_so(tmp_path: Path) -> None:
+    write_evaluator(tmp_path)
+    with pytest.raises(InvalidBundle, match="no captions of the split 'blind'"):
+        reference_prompts(Bundle.open(tmp_path / JUDGE), "blind")
+    write_generator(tmp_path)
+    with pytest.raises(InvalidBundle, match=r"reference\.json"):
+        reference_prompts(Bundle.open(tmp_path / "toy-starter"), "test")
+
+
+def test_the_evaluator_that_is_here_is_meant_unless_one_is_named(tmp_path: Path) -> None:
+    config = Settings(home=tmp_path, models=tmp_path / "models")
+    with pytest.raises(NotFound, match="no evaluator's bundle"):
+        choose_evaluator(None, config=config)
+    write_generator(tmp_path / "models")
+    write_evaluator(tmp_path / "models", "judge-b", weight=1.0)
+    write_evaluator(tmp_path / "models", "judge-a")
+    assert choose_evaluator(None, config=config).manifest.name == "judge-a"
+    exact = choose_evaluator("judge-b", config=config).reference
+    assert choose_evaluator(exact, config=config).reference == exact
+    with pytest.raises(InvalidBundle, match="is a generator"):
+        choose_evaluator("toy-starter", config=config)
+    with pytest.raises(InvalidBundle, match=r"the weights of .* not 000000000000"):
+        choose_evaluator("judge-b@000000000000", config=config)

@@ -1,0 +1,322 @@
+"""The public T2M evaluator: read from the public files, which stand in here with random numbers under their names."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+
+from shared.bundles import Bundle
+from shared.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
+from workers.evaluator.loading import load_evaluator
+from workers.evaluator.t2m import T2MEvaluator
+from workers.evaluator.t2m_import import import_t2m, main
+from workers.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
+from workers.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
+
+SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
+VOCABULARY = ["a", "person", "walk", "left", "unk", "sos", "eos", "wave"]
+CAPTIONS = {
+    "a person walks left": "a/DET person/NOUN walk/VERB left/ADV",
+    "a person waves zealously": "a/DET person/NOUN wave/VERB zealously/ADV",
+    "walk": "walk/NOUN",
+}
+
+# `state_dict` of each network in the public `finest.tar` (momask-codes, models/t2m_eval_modules.py and its wrapper)
+PUBLIC = {
+    "movement_encoder": {
+        "main.0.weight": (512, 259, 4), "main.0.bias": (512,), "main.3.weight": (512, 512, 4), "main.3.bias": (512,),
+        "out_net.weight": (512, 512), "out_net.bias": (512,),
+    },
+    "text_encoder": {
+        "hidden": (2, 1, 512), "pos_emb.weight": (300, 15), "pos_emb.bias": (300,),
+        "input_emb.weight": (512, 300), "input_emb.bias": (512,),
+        "gru.weight_ih_l0": (1536, 512), "gru.weight_hh_l0": (1536, 512), "gru.bias_ih_l0": (1536,),
+        "gru.bias_hh_l0": (1536,), "gru.weight_ih_l0_reverse": (1536, 512), "gru.weight_hh_l0_reverse": (1536, 512),
+        "gru.bias_ih_l0_reverse": (1536,), "gru.bias_hh_l0_reverse": (1536,),
+        "output_net.0.weight": (512, 1024), "output_net.0.bias": (512,), "output_net.1.weight": (512,),
+        "output_net.1.bias": (512,), "output_net.3.weight": (512, 512), "output_net.3.bias": (512,),
+    },
+    "motion_encoder": {
+        "hidden": (2, 1, 1024), "input_emb.weight": (1024, 512), "input_emb.bias": (1024,),
+        "gru.weight_ih_l0": (3072, 1024), "gru.weight_hh_l0": (3072, 1024), "gru.bias_ih_l0": (3072,),
+        "gru.bias_hh_l0": (3072,), "gru.weight_ih_l0_reverse": (3072, 1024), "gru.weight_hh_l0_reverse": (3072, 1024),
+        "gru.bias_ih_l0_reverse": (3072,), "gru.bias_hh_l0_reverse": (3072,),
+        "output_net.0.weight": (1024, 2048), "output_net.0.bias": (1024,), "output_net.1.weight": (1024,),
+        "output_net.1.bias": (1024,), "output_net.3.weight": (512, 1024), "output_net.3.bias": (512,),
+    },
+}  # fmt: skip
+
+State = Mapping[str, torch.Tensor]
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The public folders in small, with random numbers."""
+    root = tmp_path_factory.mktemp("t2m")
+    torch.manual_seed(0)
+    motion, text = MotionEncoder(SMALL), TextEncoder(SMALL)
+    weights = {
+        "movement_encoder": motion.movement.state_dict(),
+        "motion_encoder": motion.motion.state_dict(),
+        "text_encoder": text.state_dict(),
+        "opt_motion_encoder": torch.optim.Adam(motion.parameters()).state_dict(),
+        "epoch": 55,
+        "iter": 1000,
+    }
+    for folder in ("text_mot_match/model", "Comp_v6_KLD005/meta", "glove", "texts"):
+        (root / folder).mkdir(parents=True)
+    torch.save(weights, root / "text_mot_match" / "model" / "finest.tar")
+    rng = np.random.default_rng(0)
+    np.save(root / "Comp_v6_KLD005" / "meta" / "mean.npy", rng.normal(size=263))
+    np.save(root / "Comp_v6_KLD005" / "meta" / "std.npy", rng.uniform(0.5, 2, 263))
+    np.save(root / "glove" / "our_vab_data.npy", rng.normal(size=(len(VOCABULARY) + 3, 5)))
+    (root / "glove" / "our_vab_words.pkl").write_bytes(pickle.dumps(VOCABULARY))
+    index = {word: len(VOCABULARY) + 2 - row for row, word in enumerate(VOCABULARY)}
+    (root / "glove" / "our_vab_idx.pkl").write_bytes(pickle.dumps(index))
+    lines = [f"{caption}#{words}#0.0#0.0" for caption, words in CAPTIONS.items()]
+    (root / "texts" / "000000.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return root
+
+
+@pytest.fixture(scope="module")
+def bundle(files: Path) -> Bundle:
+    import_t2m(files, files / "glove", files / "t2m-small", SMALL)
+    return Bundle.open(files / "t2m-small")
+
+
+@pytest.fixture(scope="module")
+def evaluator(bundle: Bundle, files: Path) -> T2MEvaluator:
+    return T2MEvaluator.load(bundle, device="cpu", tagger=TaggedCaptions.read(files / "texts"))
+
+
+@pytest.fixture(scope="module")
+def checkpoint(files: Path) -> dict[str, State]:
+    return torch.load(files / "text_mot_match" / "model" / "finest.tar", weights_only=True)
+
+
+def motion(frames: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(frames, 263)).astype(np.float32)
+
+
+# -- the networks written out step by step -----------------------------------------------------------------------------
+
+
+def linear(state: State, name: str, x: torch.Tensor) -> torch.Tensor:
+    return x @ state[f"{name}.weight"].T + state[f"{name}.bias"]
+
+
+def gru_end(state: State, x: torch.Tensor, suffix: str, hidden: torch.Tensor) -> torch.Tensor:
+    """The last state (H,) of one direction over (S, inputs), gate by gate: reset, update, new."""
+    for row in x:
+        given = state[f"gru.weight_ih_l0{suffix}"] @ row + state[f"gru.bias_ih_l0{suffix}"]
+        kept = state[f"gru.weight_hh_l0{suffix}"] @ hidden + state[f"gru.bias_hh_l0{suffix}"]
+        (r_in, z_in, n_in), (r_kept, z_kept, n_kept) = given.chunk(3), kept.chunk(3)
+        reset, update = (r_in + r_kept).sigmoid(), (z_in + z_kept).sigmoid()
+        hidden = (1 - update) * (n_in + reset * n_kept).tanh() + update * hidden
+    return hidden
+
+
+def recurrent(state: State, x: torch.Tensor) -> torch.Tensor:
+    x = linear(state, "input_emb", x)
+    ends = (("", x, 0), ("_reverse", x.flip(0), 1))
+    both = torch.cat([gru_end(state, order, suffix, state["hidden"][k, 0]) for suffix, order, k in ends])
+    x = linear(state, "output_net.0", both)
+    x = F.layer_norm(x, x.shape, state["output_net.1.weight"], state["output_net.1.bias"])
+    return linear(state, "output_net.3", F.leaky_relu(x, 0.2))
+
+
+def embedded_by_hand(files: Path, checkpoint: dict[str, State], features: np.ndarray) -> torch.Tensor:
+    mean, std = (np.load(files / "Comp_v6_KLD005" / "meta" / f"{n}.npy").astype(np.float32) for n in ("mean", "std"))
+    frames = len(features) // 4 * 4
+    padded = torch.zeros(196, 263)
+    padded[:frames] = torch.from_numpy((features[:frames] - mean) / std)
+    state = checkpoint["movement_encoder"]
+    x = padded[:, :259].T[None]
+    for name in ("main.0", "main.3"):
+        x = F.leaky_relu(F.conv1d(x, state[f"{name}.weight"], state[f"{name}.bias"], stride=2, padding=1), 0.2)
+    steps = linear(state, "out_net", x[0].T)[: frames // 4]
+    return recurrent(checkpoint["motion_encoder"], steps)
+
+
+@pytest.mark.parametrize("frames", [4, 7, 40, 75, 196])
+def test_a_motion_is_embedded_as_the_public_networks_do_written_out_step_by_step(
+    evaluator: T2MEvaluator, files: Path, checkpoint: dict[str, State], frames: int
+) -> None:
+    features = motion(frames, frames)
+    expected = embedded_by_hand(files, checkpoint, features)
+    np.testing.assert_allclose(evaluator.embed_motion([features])[0], expected.numpy(), atol=1e-5)
+
+
+def test_a_sentence_is_embedded_as_the_public_networks_do_written_out_step_by_step(
+    evaluator: T2MEvaluator, files: Path, checkpoint: dict[str, State]
+) -> None:
+    table = np.load(files / "glove" / "our_vab_data.npy").astype(np.float32)
+    index = pickle.loads((files / "glove" / "our_vab_idx.pkl").read_bytes())
+    # `left` has a tag of its own; an unknown word loses its tag with its vector
+    read = {
+        "a person walks left": [
+            ("sos", "OTHER"), ("a", "DET"), ("person", "NOUN"), ("walk", "Act_VIP"), ("left", "Loc_VIP"),
+            ("eos", "OTHER"),
+        ],
+        "a person waves zealously": [
+            ("sos", "OTHER"), ("a", "DET"), ("person", "NOUN"), ("wave", "VERB"), ("unk", "OTHER"), ("eos", "OTHER"),
+        ],
+    }  # fmt: skip
+    state = checkpoint["text_encoder"]
+    for sentence, words in read.items():
+        vectors = torch.from_numpy(np.stack([table[index[word]] for word, _ in words]))
+        tags = F.one_hot(torch.tensor([TAGS.index(tag) for _, tag in words]), 15).float()
+        expected = recurrent(state, vectors + linear(state, "pos_emb", tags))
+        np.testing.assert_allclose(evaluator.embed_text([sentence])[0], expected.numpy(), atol=1e-5)
+
+
+# -- the port ----------------------------------------------------------------------------------------------------------
+
+
+def test_names_and_shapes_are_those_of_the_public_checkpoint() -> None:
+    with torch.device("meta"):
+        encoder, text = MotionEncoder(T2MConfig()), TextEncoder(T2MConfig())
+    ours = {"movement_encoder": encoder.movement, "text_encoder": text, "motion_encoder": encoder.motion}
+    for name, network in ours.items():
+        assert {key: tuple(value.shape) for key, value in network.state_dict().items()} == PUBLIC[name], name
+
+
+def test_embeddings_come_in_the_order_given_and_not_by_length(evaluator: T2MEvaluator) -> None:
+    motions = [motion(frames, frames) for frames in (24, 196, 60, 8, 130)]
+    together = evaluator.embed_motion(motions)
+    alone = np.concatenate([evaluator.embed_motion([each]) for each in motions])
+    np.testing.assert_allclose(together, alone, atol=1e-5)
+    said = list(CAPTIONS)
+    sentences = evaluator.embed_text(said)
+    np.testing.assert_allclose(sentences[::-1], evaluator.embed_text(said[::-1]), atol=1e-5)
+    assert np.abs(together[0] - together[1]).max() > 1e-3
+    assert np.abs(sentences[0] - sentences[1]).max() > 1e-3
+
+
+def test_frames_of_an_incomplete_step_and_contacts_are_not_read_and_all_others_are(evaluator: T2MEvaluator) -> None:
+    features = motion(43)
+    before = evaluator.embed_motion([features])
+    for frame, number, read in ((42, 5, False), (40, 5, False), (39, 5, True), (0, 258, True), (0, 259, False)):
+        changed = features.copy()
+        changed[frame, number] += 10
+        assert (np.abs(evaluator.embed_motion([changed]) - before).max() > 1e-5) == read, (frame, number)
+
+
+def test_the_evaluator_says_what_it_reads_and_how_it_compares(bundle: Bundle, files: Path) -> None:
+    evaluator = load_evaluator(bundle, device="cpu", captions=files / "texts")
+    assert (evaluator.layout, evaluator.fps, evaluator.distance) == ("humanml3d-263", 20, "euclidean")
+    assert evaluator.embed_text(["walk"]).shape == (1, evaluator.width)
+    assert evaluator.name == bundle.reference
+
+
+def test_broken_short_and_long_motions_are_refused(evaluator: T2MEvaluator) -> None:
+    broken = motion(40)
+    broken[3, 1] = np.nan
+    with pytest.raises(InvalidInput, match="motion 0: 1 of 40 frames hold NaN"):
+        evaluator.embed_motion([broken])
+    with pytest.raises(InvalidInput, match="has 3 frames; this evaluator knows 4 to 196"):
+        evaluator.embed_motion([motion(3)])
+    with pytest.raises(InvalidInput, match="has 200 frames"):
+        evaluator.embed_motion([motion(200)])
+
+
+def test_a_sentence_without_tags_is_refused(evaluator: T2MEvaluator, bundle: Bundle) -> None:
+    with pytest.raises(InvalidInput, match="a person jumps: is not one of the captions whose words are tagged"):
+        evaluator.embed_text(["walk", "a person jumps"])
+    with pytest.raises(InvalidInput, match="loaded without a tagger"):
+        load_evaluator(bundle, device="cpu").embed_text(["walk"])
+
+
+# -- words -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_sentence_is_cut_after_twenty_words_between_its_start_and_end() -> None:
+    words = WordVectors({word: row for row, word in enumerate(VOCABULARY)}, np.eye(8, dtype=np.float32))
+    vectors, tags = words.read([("walk", "VERB")] * 19 + [("person", "NOUN"), ("wave", "VERB")])
+    assert vectors.shape == (22, 8)
+    assert [VOCABULARY[int(row.argmax())] for row in vectors] == ["sos", *["walk"] * 19, "person", "eos"]
+    assert tags.sum() == 22
+    assert TAGS[int(words.read([("person", "no such tag")])[1][1].argmax())] == "OTHER"
+
+
+def test_a_caption_line_is_read_with_slashes_in_its_words() -> None:
+    caption, words = read_line("he walks/runs.#he/PRON walk/run/VERB#0.0#3.5\n", where="a.txt:1")
+    assert caption == "he walks/runs."
+    assert words == (("he", "PRON"), ("walk/run", "VERB"))
+
+
+@pytest.mark.parametrize("line", ["he walks", "he walks##0.0#0.0", "he walks#he walks#0.0#0.0", "he#he/PRON#0.0"])
+def test_a_line_that_is_no_caption_is_refused(line: str) -> None:
+    with pytest.raises(InvalidFile, match=r"a\.txt:1: is no line"):
+        read_line(line, where="a.txt:1")
+
+
+def test_a_folder_without_captions_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidFile, match="holds no captions"):
+        TaggedCaptions.read(tmp_path)
+
+
+# -- importing ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_bundle_holds_weights_words_and_statistics_in_full_precision(
+    bundle: Bundle, checkpoint: dict[str, State]
+) -> None:
+    assert set(bundle.manifest.parts) == {"motion", "text", "words", "statistics"}
+    assert not bundle.manifest.commercial
+    stored = bundle.tensors("motion", dtype=None)
+    for name, value in checkpoint["motion_encoder"].items():
+        np.testing.assert_array_equal(stored[f"motion.{name}"], value.numpy())
+
+
+def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(files: Path, tmp_path: Path) -> None:
+    class Evil:
+        def __reduce__(self):
+            return (Path.touch, (tmp_path / "touched",))
+
+    for name in ("our_vab_data.npy", "our_vab_idx.pkl"):
+        (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
+    (tmp_path / "our_vab_words.pkl").write_bytes(pickle.dumps([Evil()]))
+    with pytest.raises(InvalidFile, match="is no plain list or dictionary: asks for"):
+        import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
+    assert not (tmp_path / "touched").exists()
+    assert not (tmp_path / "bundle").exists()
+
+
+def test_a_checkpoint_that_is_none_or_of_other_sizes_is_refused(files: Path, tmp_path: Path) -> None:
+    with pytest.raises(InvalidFile, match="movement_encoder does not fit the public evaluator"):
+        import_t2m(files, files / "glove", tmp_path / "bundle")
+    with pytest.raises(InvalidFile, match=r"finest\.tar: cannot be read safely"):
+        import_t2m(tmp_path, files / "glove", tmp_path / "bundle", SMALL)
+    file = tmp_path / "text_mot_match" / "model" / "finest.tar"
+    file.parent.mkdir(parents=True)
+    torch.save([1, 2], file)
+    with pytest.raises(InvalidFile, match="is no checkpoint"):
+        import_t2m(tmp_path, files / "glove", tmp_path / "bundle", SMALL)
+    with pytest.raises(Conflict):
+        import_t2m(files, files / "glove", files / "t2m-small", SMALL)
+
+
+def test_words_without_a_vector_are_refused(files: Path, tmp_path: Path) -> None:
+    for name in ("our_vab_words.pkl", "our_vab_idx.pkl"):
+        (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
+    np.save(tmp_path / "our_vab_data.npy", np.zeros((4, 5)))
+    with pytest.raises(InvalidFile, match=r"vectors of shape \(4, 5\) do not fit"):
+        import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
+
+
+def test_the_command_line_tells_what_was_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path), "--glove", str(tmp_path), "-o", str(tmp_path / "out")]) == 2
+    assert "cannot be read safely" in capsys.readouterr().err
+
+
+def test_a_bundle_of_another_evaluator_or_layout_is_refused(bundle: Bundle) -> None:
+    for changes, message in (({"model": "tmr"}, "not the T2M one"), ({"layout": "kit-251"}, "not kit-251")):
+        with pytest.raises(InvalidBundle, match=message):
+            T2MEvaluator.load(Bundle(bundle.path, bundle.manifest.model_copy(update=changes)), device="cpu")

@@ -1,0 +1,95 @@
+"""The TMR-style evaluator's networks as a bundle: the two encoders, never the decoder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from shared.bundles import Bundle, BundleWriter, TextSpec
+from shared.errors import InvalidBundle
+from shared.motion.features import layout
+from shared.nn.bundling import NOT_STORED, fill
+from workers.evaluator.config import EvaluatorConfig
+from workers.evaluator.model import MotionEncoder, SentenceEncoder
+from workers.evaluator.reference import Reference
+
+MODEL = "tmr"
+KIND = "evaluator"
+Statistics = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+def load_networks(bundle: Bundle) -> tuple[EvaluatorConfig, MotionEncoder, SentenceEncoder]:
+    """Build and fill the encoders of a bundle, float32, in evaluation mode.
+
+    Raises:
+        InvalidBundle: of another kind, model or layout, or its tensors do not fit its configuration.
+    """
+    manifest = bundle.manifest
+    if (manifest.kind, manifest.model) != (KIND, MODEL):
+        raise InvalidBundle(
+            f"is a {manifest.kind} of {manifest.model}, not an {KIND} of {MODEL}", where=str(bundle.path)
+        )
+    config = EvaluatorConfig.from_dict(manifest.parameters)
+    if (manifest.layout, manifest.fps) != (config.layout, config.fps):
+        raise InvalidBundle(f"its networks read {config.layout}, not {manifest.layout}", where=str(bundle.path))
+    motion, text = MotionEncoder(config), SentenceEncoder(config)
+    fill(motion, bundle, "motion")
+    fill(text, bundle, "text")
+    mean, std = (torch.from_numpy(values) for values in bundle.statistics())
+    if mean.shape != motion.mean.shape or std.shape != motion.std.shape:
+        raise InvalidBundle(f"statistics have shape {tuple(mean.shape)}", where=str(bundle.path))
+    motion.mean.copy_(mean)
+    motion.std.copy_(std)
+    return config, motion, text
+
+
+def write_bundle(
+    path: Path,
+    config: EvaluatorConfig,
+    parts: Mapping[str, Mapping[str, Tensor]],
+    statistics: Statistics,
+    reference: Reference,
+    *,
+    text: TextSpec,
+    card: str,
+    overwrite: bool = False,
+    **manifest: Any,
+) -> Bundle:
+    """Write a bundle.
+
+    Args:
+        path: the bundle's folder; its last name is the bundle's.
+        config: what the networks are built from.
+        parts: state dicts of `motion` and `text`.
+        statistics: mean and std (D,) that motions are normalised with.
+        reference: captions and embeddings of real clips.
+        text: the encoder, with its hash.
+        card: the model card.
+        overwrite: replace an existing bundle.
+        manifest: licence, data, metrics, training.
+    """
+    with BundleWriter(path, overwrite=overwrite) as writer:
+        for name, state in parts.items():
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in NOT_STORED})
+        writer.add_statistics(*statistics)
+        reference.add_to(writer)
+        writer.add_card(card)
+        return writer.finish(
+            name=path.name,
+            version="1",
+            kind=KIND,
+            model=MODEL,
+            config=config.name,
+            parameters=config.to_dict(),
+            skeleton=layout(config.layout).skeleton.name,
+            layout=config.layout,
+            fps=config.fps,
+            text=text,
+            **manifest,
+        )

@@ -1,0 +1,39 @@
+"""The evaluator of a bundle, whichever network it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shared.bundles import Bundle, find_bundle
+from shared.errors import InvalidBundle
+from workers.evaluator.port import Evaluator
+
+
+def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path | None = None) -> Evaluator:
+    """Load a bundle of kind `evaluator`.
+
+    Args:
+        bundle: a verified bundle, or its name or path.
+        device: `auto`, `cpu`, `cuda`, `cuda:N`.
+        captions: HumanML3D's folder of caption files; only the public T2M evaluator, which reads words with
+            part-of-speech tags, needs it, and only for text.
+
+    Raises:
+        NotFound, InvalidBundle, Refused: see `find_bundle` and the evaluators' `load`.
+        InvalidInput: no such device.
+    """
+    verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
+    manifest = verified.manifest
+    if manifest.kind == "evaluator" and manifest.model == "tmr":
+        from workers.evaluator.tmr import TMREvaluator
+
+        return TMREvaluator.load(verified, device=device)
+    if manifest.kind == "evaluator" and manifest.model == "t2m":
+        from workers.evaluator.t2m import T2MEvaluator
+        from workers.evaluator.t2m_words import TaggedCaptions
+
+        tagger = None if captions is None else TaggedCaptions.read(captions)
+        return T2MEvaluator.load(verified, device=device, tagger=tagger)
+    raise InvalidBundle(
+        f"is a {manifest.kind} of {manifest.model}, not an evaluator this version reads", where=str(verified.path)
+    )

@@ -1,0 +1,180 @@
+"""TMR's networks (Petrovich et al. 2023) as SnapMoGen's appendix B.2 sizes them, read top to bottom.
+
+    motion ── MotionEncoder   ── Gaussian over latents ──┐
+    text   ── SentenceEncoder ── Gaussian over latents ──┴── MotionDecoder ── the motion, from either (training alone)
+
+Both encoders are ACTOR's (Petrovich et al. 2021): a transformer over two learned tokens and the sequence, whose first
+two outputs are mean and log-variance. The appendix appends the two tokens, TMR puts them in front; attention does not
+care. Mean vectors are the embeddings. Weights start as torch's layers do, as TMR's: at the 0.02 of the generators the
+learned tokens hear so little of the sequence that all embeddings begin alike.
+
+Shapes: B batch, T frames, n motion tokens, S text tokens, D features, I those that are read, W text width, E latent
+width.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from shared.nn.convolution import frame_mask
+from shared.nn.packed import pack_linears
+from shared.nn.transformer import Transformer, sinusoidal_positions
+from workers.evaluator.config import EvaluatorConfig, NetworkConfig
+
+DISTRIBUTION = 2
+"""Learned tokens in front of a sequence: mean and log-variance."""
+MAX_TEXT_TOKENS = 512
+"""T5's limit, the longest of the text encoders'."""
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Diagonal Gaussians over latents; both (B, E)."""
+
+    mean: Tensor
+    log_variance: Tensor
+
+    def sample(self) -> Tensor:
+        """One latent (B, E) each, differentiable."""
+        return self.mean + torch.randn_like(self.mean) * (0.5 * self.log_variance).exp()
+
+
+class DistributionEncoder(nn.Module):
+    """A sequence of vectors to one Gaussian."""
+
+    positions: Tensor
+
+    def __init__(self, inputs: int, longest: int, config: NetworkConfig) -> None:
+        super().__init__()
+        self.project = nn.Linear(inputs, config.width)
+        self.distribution = nn.Parameter(torch.randn(DISTRIBUTION, config.width))
+        self.transformer = Transformer(config.layers, config.width, config.heads, config.feedforward, config.dropout)
+        positions = sinusoidal_positions(DISTRIBUTION + longest, config.width)
+        self.register_buffer("positions", positions, persistent=False)
+
+    def forward(self, x: Tensor, valid: Tensor) -> Gaussian:
+        """(B, S, inputs) and (B, S) bool, the true ones first and at least one, to Gaussians."""
+        mean, log_variance = self._outputs(x, valid, DISTRIBUTION).unbind(1)
+        return Gaussian(mean, log_variance)
+
+    def mean(self, x: Tensor, valid: Tensor) -> Tensor:
+        """The means (B, E) alone."""
+        return self._outputs(x, valid, 1)[:, 0]
+
+    def pack(self) -> None:
+        """Pack the matrices for inference on a CPU: what stands beside a row then changes none of its bits."""
+        self.transformer.lower(torch.float32)
+        pack_linears(self)
+
+    def _outputs(self, x: Tensor, valid: Tensor, rows: int) -> Tensor:
+        tokens = self.distribution.expand(len(x), -1, -1)
+        sequence = torch.cat([tokens, self.project(x).to(tokens.dtype)], 1)  # (B, 2 + S, E)
+        valid = torch.cat([valid.new_ones(len(x), DISTRIBUTION), valid], 1)
+        return self.transformer(sequence + self.positions[: sequence.shape[1]], valid, rows)
+
+
+class MotionEncoder(nn.Module):
+    """Raw features to a Gaussian; it carries the statistics that it normalises with."""
+
+    mean: Tensor  # (D,) of the evaluator's own training data, never a generator's
+    std: Tensor  # (D,)
+
+    def __init__(self, config: EvaluatorConfig) -> None:
+        super().__init__()
+        self.inputs, self.frames = config.inputs, config.frames_per_token
+        self.width = config.network.width
+        self.register_buffer("mean", torch.zeros(config.features))
+        self.register_buffer("std", torch.ones(config.features))
+        longest = -(-config.max_frames // self.frames)
+        self.encoder = DistributionEncoder(self.inputs * self.frames, longest, config.network)
+
+    def forward(self, features: Tensor, lengths: Tensor) -> Gaussian:
+        """(B, T, D or at least I) raw features and (B,) frames; what lies beyond a motion's own frames is not read."""
+        return self.encoder(*self._tokens(features, lengths))
+
+    def embed(self, features: Tensor, lengths: Tensor) -> Tensor:
+        """Mean vectors (B, E) of `forward`'s input."""
+        return self.encoder.mean(*self._tokens(features, lengths))
+
+    def normalize(self, features: Tensor) -> Tensor:
+        """(…, D or at least I) raw features to (…, I): zero mean, unit deviation of each group."""
+        kept = slice(self.inputs)
+        return (features[..., kept] - self.mean[kept]) / self.std[kept]
+
+    def _tokens(self, features: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, n, frames · I) and (B, n) bool; in a motion's last token, missing frames are the mean pose."""
+        batch, size = features.shape[:2]
+        tokens = -(-size // self.frames)
+        x = features.new_zeros(batch, tokens * self.frames, self.inputs)
+        x[:, :size] = self.normalize(features).masked_fill(~frame_mask(lengths, size)[..., None], 0.0)
+        return x.view(batch, tokens, -1), frame_mask(-(-lengths // self.frames), tokens)
+
+
+class SentenceEncoder(nn.Module):
+    """Token states of a text encoder to a Gaussian."""
+
+    text_mean: Tensor  # (W,) of the training captions; standardising them is ours, as in the generators
+    text_std: Tensor  # (W,)
+
+    def __init__(self, config: EvaluatorConfig) -> None:
+        super().__init__()
+        self.register_buffer("text_mean", torch.zeros(config.text_width))
+        self.register_buffer("text_std", torch.ones(config.text_width))
+        self.encoder = DistributionEncoder(config.text_width, MAX_TEXT_TOKENS, config.network)
+
+    def forward(self, states: Tensor, lengths: Tensor) -> Gaussian:
+        """(B, S, W) token states and (B,) how many of them exist."""
+        return self.encoder(*self._tokens(states, lengths))
+
+    def embed(self, states: Tensor, lengths: Tensor) -> Tensor:
+        """Mean vectors (B, E) of `forward`'s input."""
+        return self.encoder.mean(*self._tokens(states, lengths))
+
+    def _tokens(self, states: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        valid = frame_mask(lengths, states.shape[1])
+        x = (states - self.text_mean) / self.text_std
+        return x.masked_fill(~valid[..., None], 0.0), valid
+
+
+class MotionDecoder(nn.Module):
+    """A latent to the motion it stands for, all frames at once (ACTOR, TMR).
+
+    TMR's decoder attends from positions to the latent. Attention to a single vector is the same linear map of it at
+    every position, so that is added once, and self-attention follows (ours).
+    """
+
+    positions: Tensor
+
+    def __init__(self, config: EvaluatorConfig) -> None:
+        super().__init__()
+        network = config.network
+        self.inputs, self.frames = config.inputs, config.frames_per_token
+        self.spread = nn.Linear(network.width, network.width)
+        self.transformer = Transformer(
+            network.layers, network.width, network.heads, network.feedforward, network.dropout
+        )
+        self.out = nn.Linear(network.width, self.inputs * self.frames)
+        longest = -(-config.max_frames // self.frames)
+        self.register_buffer("positions", sinusoidal_positions(longest, network.width), persistent=False)
+
+    def forward(self, latents: Tensor, lengths: Tensor) -> Tensor:
+        """(B, E) and (B,) frames to normalised features (B, n · frames, I); meaningless beyond a motion's own
+        frames."""
+        tokens = -(-lengths // self.frames)
+        size = int(tokens.max())
+        x = self.spread(latents)[:, None] + self.positions[:size]
+        x = self.transformer(x, frame_mask(tokens, size))
+        return self.out(x).unflatten(-1, (self.frames, self.inputs)).flatten(1, 2)
+
+
+class TMR(nn.Module):
+    """Everything that is trained; a bundle ships the two encoders."""
+
+    def __init__(self, config: EvaluatorConfig) -> None:
+        super().__init__()
+        self.motion = MotionEncoder(config)
+        self.text = SentenceEncoder(config)
+        self.decoder = MotionDecoder(config)

@@ -1,0 +1,118 @@
+"""What every evaluator does: motions and sentences into one space, where near means alike.
+
+Two adapters stand behind it: `workers.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `workers.evaluator.t2m` (the
+public network of Guo et al. 2022). Both take what people have, strings and raw features: which text encoder or word
+vectors read the strings, and which mean and deviation normalise the features, is part of the evaluator. The statistics
+of the model that generated the motion are never the right ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from workers.evaluator.metrics.retrieval import Distance
+
+Motion = NDArray[np.float32]
+Embeddings = NDArray[np.float32]
+
+
+class Evaluator(Protocol):
+    """A loaded evaluator. Numbers of different ones are different quantities: a number names its evaluator."""
+
+    @property
+    def name(self) -> str:
+        """The exact bundle: `name@first 12 of the weights' hash`."""
+        ...
+
+    @property
+    def layout(self) -> str:
+        """Name of the feature layout it reads."""
+        ...
+
+    @property
+    def fps(self) -> float:
+        """Frames a second of the motions it reads."""
+        ...
+
+    @property
+    def width(self) -> int:
+        """E, numbers of an embedding."""
+        ...
+
+    @property
+    def distance(self) -> Distance:
+        """What "near" means in its space; retrieval by the other one is not this evaluator's."""
+        ...
+
+    def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
+        """Embeddings of motions, row by row in the order given, none depending on the motions beside it.
+
+        Args:
+            motions: each (T, D), raw features of `layout` in its own units (metres), as generated or captured, NOT
+                normalised.
+
+        Returns:
+            (N, E).
+
+        Raises:
+            InvalidInput: another width, too short or too long, or numbers that are not finite; names the motion.
+        """
+        ...
+
+    def embed_text(self, sentences: Sequence[str]) -> Embeddings:
+        """Embeddings of sentences, row by row in the order given, none depending on the sentences beside it.
+
+        Args:
+            sentences: as a person types them.
+
+        Returns:
+            (N, E).
+
+        Raises:
+            InvalidInput: a sentence it cannot read.
+        """
+        ...
+
+
+def check_reads(evaluator: Evaluator, layout: str, fps: float) -> None:
+    """Refuse to judge motions of another layout or frame rate.
+
+    Raises:
+        InvalidInput: they differ.
+    """
+    if (evaluator.layout, evaluator.fps) != (layout, fps):
+        raise InvalidInput(
+            f"reads {evaluator.layout} at {evaluator.fps:g} fps, the motions are {layout} at {fps:g} fps",
+            where=evaluator.name,
+            hint="Take an evaluator of the motions' layout; features of another one have no meaning to it.",
+        )
+
+
+def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest: int) -> None:
+    """Refuse motions that an embedding would say nothing about.
+
+    Raises:
+        InvalidInput: not (T, `width`), T outside `shortest` to `longest`, or numbers that are not finite.
+    """
+    for number, motion in enumerate(motions):
+        where = f"motion {number}"
+        if motion.ndim != 2 or motion.shape[1] != width:
+            raise InvalidInput(f"features have shape {motion.shape}, not (T, {width})", where=where)
+        if not shortest <= len(motion) <= longest:
+            raise InvalidInput(
+                f"has {len(motion)} frames; this evaluator knows {shortest} to {longest}",
+                where=where,
+                hint="Judge a longer motion by windows of itself.",
+            )
+        broken = np.flatnonzero(~np.isfinite(motion).all(1))
+        if broken.size:
+            raise InvalidInput(
+                f"{broken.size} of {len(motion)} frames hold NaN or infinite numbers, the first is {broken[0]}",
+                where=where,
+                hint="Look at the model that made it: a broken motion has no embedding.",
+            )

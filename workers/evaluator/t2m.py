@@ -1,0 +1,142 @@
+"""The public T2M evaluator (Guo et al. 2022) behind the port: Euclidean distance between embeddings of 512 numbers.
+
+Never run with the public weights: none are on the machines this was written on. It is tested with random weights under
+the public names and shapes, against the networks written out step by step. What to compare first, once there are
+weights: the ground-truth row of HumanML3D's test split, R@1 .511, R@2 .703, R@3 .797, matching score 2.974, diversity
+9.503.
+
+Where the public code returns embeddings sorted by motion length, these come in the order of what was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from shared.bundles import Bundle
+from shared.errors import InvalidBundle, InvalidInput
+from shared.nn.bundling import fill
+from shared.nn.devices import choose_device
+from workers.evaluator.metrics.retrieval import Distance
+from workers.evaluator.port import Embeddings, Motion, check_motions
+from workers.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
+from workers.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
+
+MODEL = "t2m"
+WORDS_FILE, WORDS_PART = "words.json", "words"
+BATCH = 32
+
+
+class T2MEvaluator:
+    """A loaded bundle, as `workers.evaluator.t2m_import` writes it. Not thread-safe."""
+
+    distance: Distance = "euclidean"
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        config: T2MConfig,
+        motion: MotionEncoder,
+        text: TextEncoder,
+        words: WordVectors,
+        device: torch.device,
+        tagger: Tagger | None,
+    ) -> None:
+        """Put an evaluator together; most callers want `load`."""
+        self.bundle, self.config, self.device = bundle, config, device
+        self.motion, self.text = motion.to(device), text.to(device)
+        self.words, self.tagger = words, tagger
+
+    @classmethod
+    def load(cls, bundle: Bundle, *, device: str = "auto", tagger: Tagger | None = None) -> T2MEvaluator:
+        """Load a bundle.
+
+        Args:
+            bundle: a verified bundle.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            tagger: where parts of speech come from; motions can be embedded without.
+
+        Raises:
+            InvalidBundle: not this evaluator, or damaged.
+            InvalidInput: no such device.
+        """
+        manifest = bundle.manifest
+        if (manifest.kind, manifest.model) != ("evaluator", MODEL):
+            raise InvalidBundle(f"is a {manifest.kind} of {manifest.model}, not the T2M one", where=str(bundle.path))
+        config = T2MConfig.from_dict(manifest.parameters)
+        if (manifest.layout, manifest.fps) != (config.layout, config.fps):
+            raise InvalidBundle(f"its networks read {config.layout}, not {manifest.layout}", where=str(bundle.path))
+        motion, text = MotionEncoder(config), TextEncoder(config)
+        fill(motion, bundle, "motion")
+        fill(text, bundle, "text")
+        mean, std = (torch.from_numpy(values) for values in bundle.statistics())
+        if mean.shape != motion.mean.shape or std.shape != motion.std.shape:
+            raise InvalidBundle(f"statistics have shape {tuple(mean.shape)}", where=str(bundle.path))
+        motion.mean.copy_(mean)
+        motion.std.copy_(std)
+        return cls(bundle, config, motion, text, _words(bundle, config), choose_device(device), tagger)
+
+    @property
+    def name(self) -> str:
+        """See `Evaluator`."""
+        return self.bundle.reference
+
+    @property
+    def layout(self) -> str:
+        """See `Evaluator`."""
+        return self.config.layout
+
+    @property
+    def fps(self) -> float:
+        """See `Evaluator`."""
+        return self.config.fps
+
+    @property
+    def width(self) -> int:
+        """See `Evaluator`."""
+        return self.config.width
+
+    @torch.inference_mode()
+    def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
+        """See `Evaluator`; motions of 4 to 196 frames, of which the last one to three are not read where they make no
+        whole step of four."""
+        check_motions(motions, self.config.features, self.config.min_frames, FRAMES)
+        found = np.zeros((len(motions), self.width), np.float32)
+        for low in range(0, len(motions), BATCH):
+            part = [torch.from_numpy(np.ascontiguousarray(m, np.float32)) for m in motions[low : low + BATCH]]
+            lengths = torch.tensor([len(each) for each in part], device=self.device)
+            features = torch.nn.utils.rnn.pad_sequence(part, batch_first=True).to(self.device)
+            found[low : low + len(part)] = self.motion(features, lengths).cpu().numpy()
+        return found
+
+    @torch.inference_mode()
+    def embed_text(self, sentences: Sequence[str]) -> Embeddings:
+        """See `Evaluator`; sentences whose parts of speech the tagger knows, the first 20 words of each."""
+        tagger = self.tagger
+        if tagger is None:
+            raise InvalidInput(
+                "reads words with parts of speech, and was loaded without a tagger",
+                where=self.name,
+                hint="Load it with the folder of HumanML3D's caption files.",
+            )
+        found = np.zeros((len(sentences), self.width), np.float32)
+        for low in range(0, len(sentences), BATCH):
+            read = [self.words.read(tagger.tag(sentence)) for sentence in sentences[low : low + BATCH]]
+            lengths = torch.tensor([len(vectors) for vectors, _ in read])
+            words, tags = (
+                torch.nn.utils.rnn.pad_sequence([torch.from_numpy(each[k]) for each in read], batch_first=True)
+                for k in range(2)
+            )
+            embedded = self.text.embed(words.to(self.device), tags.to(self.device), lengths)
+            found[low : low + len(read)] = embedded.cpu().numpy()
+        return found
+
+
+def _words(bundle: Bundle, config: T2MConfig) -> WordVectors:
+    words, vectors = bundle.read_json(WORDS_FILE), bundle.tensors(WORDS_PART)["vectors"].astype(np.float32)
+    fits = isinstance(words, list) and vectors.shape == (len(words), config.word_width) and len(TAGS) == config.tags
+    if not fits or not {START, END, UNKNOWN} <= set(words):
+        raise InvalidBundle("its words do not fit their vectors", where=str(bundle.path))
+    return WordVectors({word: row for row, word in enumerate(words)}, vectors)

@@ -1,0 +1,123 @@
+"""Words as the public T2M evaluator reads them: GloVe vectors and parts of speech.
+
+The tags come with HumanML3D's captions (spaCy's, made by its authors: `caption#word/TAG word/TAG …#start#end`); some
+words have tags of their own, which outrank those. Vectors and lists: `EricGuo5513/momask-codes` (MIT),
+utils/word_vectorizer.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidFile, InvalidInput
+
+TAGS = (
+    "VERB", "NOUN", "DET", "ADP", "NUM", "AUX", "PRON", "ADJ", "ADV",
+    "Loc_VIP", "Body_VIP", "Obj_VIP", "Act_VIP", "Desc_VIP", "OTHER",
+)  # fmt: skip
+OTHER = TAGS.index("OTHER")
+_OWN = {
+    "Loc_VIP": "left right clockwise counterclockwise anticlockwise forward back backward up down straight curve",
+    "Body_VIP": "arm chin foot feet face hand mouth leg waist eye knee shoulder thigh",
+    "Obj_VIP": "stair dumbbell chair window floor car ball handrail baseball basketball",
+    "Act_VIP": """walk run swing pick bring kick put squat throw hop dance jump turn stumble stop sit lift lower raise
+    wash stand kneel stroll rub bend balance flap jog shuffle lean rotate spin spread climb""",
+    "Desc_VIP": "slowly carefully fast careful slow quickly happy angry sad happily angrily sadly",
+}
+OWN_TAGS = {word: TAGS.index(tag) for tag, words in _OWN.items() for word in words.split()}
+MAX_WORDS = 20
+START, END, UNKNOWN = "sos", "eos", "unk"
+
+Tagged = Sequence[tuple[str, str]]
+"""Words (base forms) with their tags."""
+
+
+class Tagger(Protocol):
+    """Where words and tags of a sentence come from."""
+
+    def tag(self, sentence: str) -> Tagged:
+        """Words and tags, in order.
+
+        Raises:
+            InvalidInput: they are not known.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class TaggedCaptions:
+    """Tags of known captions: the only ones with which numbers are comparable to published ones.
+
+    There is no tagger for other sentences here: published numbers used spaCy's tags, and another tagger's would give
+    other embeddings without anybody noticing.
+    """
+
+    found: Mapping[str, Tagged]
+
+    @classmethod
+    def read(cls, folder: Path) -> TaggedCaptions:
+        """All captions of a folder of HumanML3D's (or KIT-ML's) `texts/*.txt`.
+
+        Raises:
+            InvalidFile: a line is not `caption#words#start#end`, or there are none.
+        """
+        found: dict[str, Tagged] = {}
+        for file in sorted(folder.glob("*.txt")):
+            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
+                if line.strip():
+                    caption, words = read_line(line, where=f"{file}:{number}")
+                    found.setdefault(caption, words)
+        if not found:
+            raise InvalidFile("holds no captions", where=str(folder), hint="Give HumanML3D's folder `texts`.")
+        return cls(found)
+
+    def tag(self, sentence: str) -> Tagged:
+        """See `Tagger`."""
+        words = self.found.get(sentence.strip())
+        if words is None:
+            raise InvalidInput(
+                "is not one of the captions whose words are tagged",
+                where=sentence[:60],
+                hint="The T2M evaluator reads the data set's own captions; take another evaluator for other prompts.",
+            )
+        return words
+
+
+def read_line(line: str, *, where: str) -> tuple[str, Tagged]:
+    """A caption and its tagged words from a line `caption#word/TAG word/TAG …#start#end`.
+
+    Raises:
+        InvalidFile: it is none.
+    """
+    fields = line.strip().split("#")
+    words = [token.rpartition("/") for token in fields[1].split()] if len(fields) == 4 else []
+    if not words or not all(word and tag for word, _, tag in words):
+        raise InvalidFile("is no line `caption#word/TAG …#start#end`", where=where)
+    return fields[0].strip(), tuple((word, tag) for word, _, tag in words)
+
+
+@dataclass(frozen=True, eq=False)
+class WordVectors:
+    """GloVe vectors of a vocabulary."""
+
+    words: Mapping[str, int]
+    vectors: NDArray[np.float32]  # (V, 300)
+
+    def read(self, tagged: Tagged) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Vectors (S, 300) and one-hot tags (S, 15) of a sentence between its start and its end, at most 20 + 2.
+
+        An unknown word loses its tag too; a word of `OWN_TAGS` has that one, an unknown tag is OTHER.
+        """
+        sentence = [(START, "OTHER"), *tagged[:MAX_WORDS], (END, "OTHER")]
+        vectors = np.stack([self.vectors[self.words.get(word, self.words[UNKNOWN])] for word, _ in sentence])
+        tags = np.zeros((len(sentence), len(TAGS)), np.float32)
+        for place, (word, tag) in enumerate(sentence):
+            named = OWN_TAGS.get(word, TAGS.index(tag) if tag in TAGS else OTHER)
+            tags[place, named if word in self.words else OTHER] = 1
+        return vectors, tags

@@ -1,0 +1,128 @@
+"""The TMR-style evaluator behind the port: strings and raw features in, mean vectors out, compared by cosine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from shared.bundles import Bundle
+from shared.errors import InvalidBundle
+from shared.nn.devices import choose_device
+from shared.text.encoders import TextEncoder
+from shared.text.prompts import check_prompt
+from workers.evaluator.bundle import load_networks
+from workers.evaluator.config import EvaluatorConfig
+from workers.evaluator.metrics.retrieval import Distance
+from workers.evaluator.model import MotionEncoder, SentenceEncoder
+from workers.evaluator.port import Embeddings, Motion, check_motions
+from workers.evaluator.sentences import check_encoder, open_encoder, padded, token_states
+
+BATCH = 64
+
+
+class TMREvaluator:
+    """A loaded bundle. Not thread-safe.
+
+    On a CPU matrices are packed, and an embedding has the same bits whatever stands beside it in a batch.
+    """
+
+    distance: Distance = "cosine"
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        config: EvaluatorConfig,
+        motion: MotionEncoder,
+        text: SentenceEncoder,
+        encoder: TextEncoder,
+        device: torch.device,
+    ) -> None:
+        """Put an evaluator together; most callers want `load`."""
+        self.bundle, self.config, self.device = bundle, config, device
+        self.encoder = encoder
+        self.motion, self.text = motion.to(device), text.to(device)
+        self.motion.encoder.pack()
+        self.text.encoder.pack()
+
+    @classmethod
+    def load(cls, bundle: Bundle, *, device: str = "auto", encoder: TextEncoder | None = None) -> TMREvaluator:
+        """Load a bundle.
+
+        Args:
+            bundle: a verified bundle.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            encoder: one that is loaded already; None = from wherever its weights are on this machine.
+
+        Raises:
+            InvalidBundle: not this kind of evaluator, damaged, or trained with another text encoder.
+            NotFound: the text encoder's weights are not here.
+            InvalidInput: no such device.
+        """
+        config, motion, text = load_networks(bundle)
+        spec = bundle.manifest.text
+        if spec is None or spec.width != config.text_width:
+            raise InvalidBundle("does not say which text encoder it was trained with", where=str(bundle.path))
+        encoder = open_encoder(spec) if encoder is None else check_encoder(spec, encoder)
+        return cls(bundle, config, motion, text, encoder, choose_device(device))
+
+    @property
+    def name(self) -> str:
+        """See `Evaluator`."""
+        return self.bundle.reference
+
+    @property
+    def layout(self) -> str:
+        """See `Evaluator`."""
+        return self.config.layout
+
+    @property
+    def fps(self) -> float:
+        """See `Evaluator`."""
+        return self.config.fps
+
+    @property
+    def width(self) -> int:
+        """See `Evaluator`."""
+        return self.config.network.width
+
+    def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
+        """See `Evaluator`; motions of 16 to 196 frames at 20 fps, or what the configuration says."""
+        config = self.config
+        check_motions(motions, config.features, config.min_frames, config.max_frames)
+        return embed_motions(self.motion, motions)
+
+    @torch.inference_mode()
+    def embed_text(self, sentences: Sequence[str]) -> Embeddings:
+        """See `Evaluator`; any English prompt (`check_prompt`), read as far as the text encoder reads."""
+        checked = [check_prompt(sentence, where=f"sentence {n}") for n, sentence in enumerate(sentences)]
+        found = np.zeros((len(checked), self.width), np.float32)
+        states = token_states(self.encoder, checked)
+        for rows in _alike([len(each) for each in states]):
+            found[rows] = _array(self.text.embed(*padded([states[row] for row in rows], self.device)))
+        return found
+
+
+@torch.inference_mode()
+def embed_motions(encoder: MotionEncoder, motions: Sequence[Motion]) -> Embeddings:
+    """Mean vectors (N, E) of raw features (T, D) that `check_motions` has let through, in the order given."""
+    device = encoder.mean.device
+    found = np.zeros((len(motions), encoder.width), np.float32)
+    for rows in _alike([len(motion) for motion in motions]):
+        lengths = torch.tensor([len(motions[row]) for row in rows], device=device)
+        features = [torch.from_numpy(np.ascontiguousarray(motions[row], np.float32)) for row in rows]
+        batch = torch.nn.utils.rnn.pad_sequence(features, batch_first=True).to(device)
+        found[rows] = _array(encoder.embed(batch, lengths))
+    return found
+
+
+def _alike(lengths: Sequence[int]) -> list[list[int]]:
+    """Rows in batches of alike length."""
+    order = sorted(range(len(lengths)), key=lambda row: lengths[row])
+    return [order[at : at + BATCH] for at in range(0, len(order), BATCH)]
+
+
+def _array(embeddings: Tensor) -> Embeddings:
+    return embeddings.float().cpu().numpy()

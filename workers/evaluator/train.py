@@ -1,0 +1,36 @@
+"""Training the evaluator: one stage."""
+
+from __future__ import annotations
+
+import torch
+
+from shared.nn.devices import choose_device
+from workers.evaluator.assembly import RECIPE
+from workers.evaluator.config import EvaluatorConfig
+from workers.evaluator.sentences import open_encoder
+from workers.evaluator.stage_tmr import TMRStage
+from workers.training.loop import start_process_group
+from workers.training.motions import MotionData
+from workers.training.staging import TrainOptions, finish, use_threads
+from workers.training.texts import CaptionTexts
+
+
+def train_stage(name: str, options: TrainOptions[EvaluatorConfig]) -> dict[str, float]:
+    """Train the stage, `tmr`, and write its part; returns its metrics, those of the test split among them.
+
+    Raises:
+        NotFound: captions have no text features, or their encoder's weights are not on this machine.
+        InvalidInput: no such stage, or data of another layout.
+        InvalidFile: texts of another width than the configuration's.
+    """
+    RECIPE.check_name(name)
+    start_process_group()
+    use_threads(options.threads)
+    data = MotionData.load(options.prepared, choose_device(options.device))
+    encoder = open_encoder(CaptionTexts.load(data.prepared).spec)
+    torch.manual_seed(options.seed)
+    stage, sha256 = TMRStage(options.config, data, encoder), data.sha256
+    del data  # the stage has kept what it reads, a quarter of the features
+    metrics = RECIPE.train(stage, options) | stage.test()
+    finish(stage.module, options, stage.name, metrics, sha256)
+    return metrics
