@@ -125,3 +125,10 @@ class TimedOut(MareyError):
     exit_code = 7
     status = 504
     problem_type = "timed-out"
+
+
+class Regressed(MareyError):
+    """An evaluation is done, and worse than what it was compared with."""
+
+    exit_code = 8
+    problem_type = "regressed"

@@ -11,10 +11,12 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 from shared.errors import InvalidInput, TooLarge
 from shared.text.prompts import check_prompt
+
+T = TypeVar("T")
 
 MAX_ITEMS = 100_000
 """Items (prompts times variants) of one job."""
@@ -134,18 +136,35 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
         raw: what a JSON line or an element of `items` holds, or `Unreadable`.
         line: where it stood, for the problems.
     """
+    values, problems = read_fields(raw, CHECKS, line)
+    seed, variants = values.get("seed"), values.get("variants", 1)
+    if seed is not None and seed + variants - 1 > MAX_SEED:
+        problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
+    return (None, problems) if problems else (Item(**values), [])
+
+
+def read_fields(
+    raw: object, checks: Mapping[str, Callable[[object], object]], line: int | None = None
+) -> tuple[dict[str, Any], list[Problem]]:
+    """The checked values of a JSON object that has a prompt, and all that is wrong with it.
+
+    Args:
+        raw: see `read_item`.
+        checks: of the known fields; each gives the value, or raises `InvalidInput`.
+        line: where it stood, for the problems.
+    """
     if isinstance(raw, Unreadable):
-        return None, [Problem(line, None, raw.message)]
+        return {}, [Problem(line, None, raw.message)]
     if not isinstance(raw, Mapping):
-        return None, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
+        return {}, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
     given = cast("Mapping[object, object]", raw)
     problems = [
-        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {', '.join(FIELDS)}")
+        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {', '.join(checks)}")
         for name in given
-        if name not in FIELDS
+        if name not in checks
     ]
     values: dict[str, Any] = {}
-    for name, check in _CHECKS.items():
+    for name, check in checks.items():
         if given.get(name) is None:
             continue
         try:
@@ -154,10 +173,7 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
             problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
     if given.get("prompt") is None:
         problems.append(Problem(line, "prompt", "is missing: say what the person does"))
-    seed, variants = values.get("seed"), values.get("variants", 1)
-    if seed is not None and seed + variants - 1 > MAX_SEED:
-        problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
-    return (None, problems) if problems else (Item(**values), [])
+    return values, problems
 
 
 def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None = None) -> list[Item]:
@@ -167,21 +183,37 @@ def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None =
         InvalidItems: at least one is wrong.
         TooLarge: more than `MAX_ITEMS` with their variants.
     """
-    items: list[Item] = []
+    items = collect(raws, read_item, where=where)
+    check_count(items, where=where)
+    return items
+
+
+def collect(
+    raws: Iterable[tuple[int | None, object]],
+    read: Callable[[object, int | None], tuple[T | None, list[Problem]]],
+    *,
+    where: str | None = None,
+) -> list[T]:
+    """What `read` makes of each, or one error with all problems.
+
+    Raises:
+        InvalidItems: at least one is wrong.
+        InvalidInput: there are none.
+    """
+    made: list[T] = []
     problems: list[Problem] = []
     total = 0
     for line, raw in raws:
-        item, found = read_item(raw, line)
+        value, found = read(raw, line)
         total += len(found)
         problems.extend(found[: MAX_PROBLEMS - len(problems)])
-        if item is not None:
-            items.append(item)
+        if value is not None:
+            made.append(value)
     if problems:
         raise InvalidItems(problems, where=where, total=total)
-    if not items:
+    if not made:
         raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
-    check_count(items, where=where)
-    return items
+    return made
 
 
 def check_count(items: Iterable[Item], *, where: str | None = None) -> int:
@@ -308,7 +340,7 @@ def _prompt(value: object) -> str:
     return check_prompt(_text(value))
 
 
-_CHECKS: dict[str, Callable[[object], object]] = {
+CHECKS: dict[str, Callable[[object], object]] = {
     "prompt": _prompt,
     "name": _name,
     "seconds": _seconds,
@@ -318,3 +350,4 @@ _CHECKS: dict[str, Callable[[object], object]] = {
     "tags": _tags,
     "settings": _settings,
 }
+"""How the value of each field is checked."""

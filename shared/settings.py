@@ -66,6 +66,8 @@ class Settings(BaseSettings):
     """A decode loop without progress for this long loses its lease (first load and compile excepted)."""
     sweep_seconds: float = 2.0
     relay_seconds: float = 0.5
+    evaluation_seconds: float = 2.0
+    """The scheduler looks this often whether a schedule is due or an evaluation can go on."""
     max_attempts: int = 3
     drain_seconds: float = 300.0
     """A drain task claims nothing after this long and returns."""

@@ -17,14 +17,18 @@ from fastapi.routing import APIRoute
 from services.api import problems
 from services.api.catalogue import Catalogue
 from services.api.context import Context
+from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
+from services.api.evaluations.routes import router as evaluations_router
 from services.api.guards import BodyGuard, HostGuard
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
-from services.api.jobs.routes import SCHEMAS
+from services.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
 from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
+from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
 from services.api.streams.routes import router as streams_router
 from services.api.streams.wire import StreamProtocol
@@ -46,7 +50,11 @@ SOCKETS: dict[str, Any] = {
     "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
 }
 """What uvicorn must know of WebSockets."""
-ROUTERS = (health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router)
+ROUTERS = (
+    *(health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router),
+    *(evaluations_router, schedules_router),
+)
+SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)
 TEXT_ROUTERS = (health_router, texts_router)
 """For `marey text serve`: parsing alone, which can be given machines of its own."""
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."

@@ -15,8 +15,9 @@ from shared.errors import InvalidInput, MareyError, Refused, TooLarge
 from shared.items import MAX_BODY_BYTES
 
 MAX_OTHER_BODY = 2**20
-"""Bytes of any body but that of a submit."""
-SUBMIT_PATH = "/v1/jobs"
+"""Bytes of any body but those that hold many prompts."""
+PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
+"""Where such bodies go; their routes read them."""
 
 
 class HostGuard:
@@ -52,14 +53,15 @@ class HostGuard:
 
 
 class BodyGuard:
-    """Reads bodies up to their limit before a route sees them; larger ones are refused. A submit reads its own."""
+    """Reads bodies up to their limit before a route sees them; larger ones are refused. Routes that take many
+    prompts read their own."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the whole body, or refuse."""
-        if scope["type"] != "http" or _is_submit(scope):
+        if scope["type"] != "http" or _holds_prompts(scope):
             await self.app(scope, receive, send)
             return
         try:
@@ -102,12 +104,14 @@ async def read_body(request: Request, limit: int) -> bytes:
 
 
 def limit_of_submit() -> int:
-    """Bytes of a submit's body."""
+    """Bytes of a body that holds many prompts."""
     return MAX_BODY_BYTES
 
 
-def _is_submit(scope: Scope) -> bool:
-    return scope["method"] == "POST" and scope["path"] == SUBMIT_PATH
+def _holds_prompts(scope: Scope) -> bool:
+    if scope["method"] == "PATCH":
+        return scope["path"].startswith("/v1/schedules/")
+    return scope["method"] == "POST" and scope["path"] in PROMPTS_PATHS
 
 
 def _without_port(host: str) -> str:

@@ -13,6 +13,7 @@ from services.cli.commands import (
     admin,
     convert,
     data,
+    evaluate,
     fetch,
     generate,
     jobs,
@@ -30,7 +31,7 @@ INTERRUPTED = 130
 HELP = """Text in, 3D human motion out.
 
 Exit codes: 0 all succeeded; 1 internal error; 2 usage or invalid input; 3 not found; 4 unreachable; 5 refused;
-6 ended with failed, dead or cancelled items; 7 --timeout passed; 130 interrupted."""
+6 ended with failed, dead or cancelled items; 7 --timeout passed; 8 evaluation regressed; 130 interrupted."""
 
 
 class Commands(TyperGroup):
@@ -89,6 +90,7 @@ app.add_typer(text.app, name="text")
 app.add_typer(models.app, name="models")
 app.add_typer(data.app, name="data")
 app.add_typer(train.app, name="train")
+app.add_typer(evaluate.app, name="eval")
 app.command("convert")(convert.convert)
 app.command("render")(convert.render)
 app.command("doctor")(admin.doctor)

@@ -26,6 +26,7 @@ HANDLERS = {
     "hgm3": "workers.hgm3.handler:create_handler",
     "mogo": "workers.mogo.handler:create_handler",
     "text": "services.text.handler:create_handler",
+    "evaluator": "workers.evaluator.handler:create_handler",
 }
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
 SHOWS = {"mogo": "workers.mogo.live:create_show"}
@@ -35,11 +36,13 @@ GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
 
 
 def default_roles(config: Settings) -> str:
-    """One child for every model that has a bundle here, and for prompts: two would fight for the cores."""
+    """One child for every model that has a bundle here, for prompts, and for evaluations where there is an evaluator:
+    two would fight for the cores."""
     from shared.bundles import list_bundles
 
     here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
-    return "+".join([*([model for model in GENERATORS if model in here] or ["hgm3"]), "text"])
+    judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
+    return "+".join([*([model for model in GENERATORS if model in here] or ["hgm3"]), "text", *judges])
 
 
 def parse_roles(text: str) -> list[tuple[str, ...]]:
@@ -259,7 +262,7 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
 
 
 def train_stage(
-    model: Literal["hgm3", "mogo"],
+    model: Literal["hgm3", "mogo", "evaluator"],
     name: str,
     data: Path,
     run: Path,
@@ -273,6 +276,8 @@ def train_stage(
 ) -> dict[str, float]:
     """Train one stage of a model; its metrics. See `workers.training.staging.TrainOptions` for the options."""
     try:
+        from workers.evaluator import config as evaluator_config
+        from workers.evaluator import train as evaluator
         from workers.hgm3 import config as hgm3_config
         from workers.hgm3 import train as hgm3
         from workers.mogo import config as mogo_config
@@ -286,12 +291,15 @@ def train_stage(
     if model == "hgm3":
         chosen = with_learning_rate(hgm3_config.named_config(config, mask=mask), name, rate)
         return hgm3.train_stage(name, TrainOptions(data, run, chosen, budget, **options))
+    if model == "evaluator":
+        judge = with_learning_rate(evaluator_config.named_config(config), name, rate)
+        return evaluator.train_stage(name, TrainOptions(data, run, judge, budget, **options))
     mogos = with_learning_rate(mogo_config.named_config(config), name, rate)
     return mogo.train_stage(name, TrainOptions(data, run, mogos, budget, **options))
 
 
 def assemble_bundle(
-    model: Literal["hgm3", "mogo"],
+    model: Literal["hgm3", "mogo", "evaluator"],
     data: Path,
     run: Path,
     output: Path,
@@ -303,6 +311,8 @@ def assemble_bundle(
 ) -> str:
     """Write the bundle of a run; its exact reference."""
     try:
+        from workers.evaluator import assembly as evaluator
+        from workers.evaluator import config as evaluator_config
         from workers.hgm3 import assembly as hgm3
         from workers.hgm3 import config as hgm3_config
         from workers.mogo import assembly as mogo
@@ -313,6 +323,9 @@ def assemble_bundle(
     if model == "hgm3":
         chosen = hgm3_config.named_config(config, mask=mask)
         return hgm3.assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
+    if model == "evaluator":
+        judge = evaluator_config.named_config(config)
+        return evaluator.assemble(data, run, output, judge, card=text, overwrite=overwrite).reference
     return mogo.assemble(data, run, output, mogo_config.named_config(config), card=text, overwrite=overwrite).reference
 
 

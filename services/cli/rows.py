@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Literal
 
 from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from shared.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
+from shared.evaluation_prompts import EvaluationPrompt, read_prompts
 from shared.items import COLUMNS, MAX_BODY_BYTES, InvalidItems, Item, Problem, Unreadable, read_items, read_json
 
 Format = Literal["csv", "jsonl", "txt"]
@@ -38,11 +40,29 @@ def items_from_file(path: str, file_format: Format | None = None) -> list[Item]:
         InvalidFile: not UTF-8, or not of that format at all.
         NotFound, InvalidInput: no such file, or no way to tell its format.
     """
-    where = "stdin" if path == "-" else path
-    content = _read(path)
-    text = _decode(content, where)
+    return read_items(rows_of_file(path, file_format), where=_where(path))
+
+
+def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
+    """Prompts of an evaluation; columns `prompt`, `seconds` and `expected`. Raises as `items_from_file`."""
+    return read_prompts(rows_of_file(path, columns=EVALUATION_COLUMNS), where=_where(path))
+
+
+def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence[str] = COLUMNS) -> Rows:
+    """The lines of a file with their numbers, not checked further than that a table has known columns.
+
+    Raises:
+        InvalidItems, InvalidFile, NotFound, InvalidInput: as `items_from_file`.
+    """
+    text = _decode(_read(path), _where(path))
     chosen = file_format or (_guess(text) if path == "-" else _by_ending(path))
-    return read_items({"csv": _csv, "jsonl": _jsonl, "txt": _txt}[chosen](text, where), where=where)
+    if chosen == "csv":
+        return _csv(text, _where(path), columns)
+    return _jsonl(text) if chosen == "jsonl" else _txt(text)
+
+
+def _where(path: str) -> str:
+    return "stdin" if path == "-" else path
 
 
 def with_defaults(
@@ -111,7 +131,7 @@ def _guess(text: str) -> Format:
     return "csv" if "prompt" in next(csv.reader([first]), []) else "txt"
 
 
-def _csv(text: str, where: str) -> Rows:
+def _csv(text: str, where: str, columns: Sequence[str]) -> Rows:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     header: list[str] | None = None
     line = 1
@@ -125,16 +145,16 @@ def _csv(text: str, where: str) -> Rows:
             return
         if any(cell.strip() for cell in cells):
             if header is None:
-                header = _header([cell.strip() for cell in cells], line, where)
+                header = _header([cell.strip() for cell in cells], line, where, columns)
             else:
                 yield line, _csv_row(header, cells)
         line = reader.line_num + 1
 
 
-def _header(names: list[str], line: int, where: str) -> list[str]:
-    known = f"known columns are {', '.join(COLUMNS)}"
+def _header(names: list[str], line: int, where: str, columns: Sequence[str]) -> list[str]:
+    known = f"known columns are {', '.join(columns)}"
     problems = [
-        Problem(line, None, f"{name!r} is not a known column; {known}") for name in names if name not in COLUMNS
+        Problem(line, None, f"{name!r} is not a known column; {known}") for name in names if name not in columns
     ]
     problems += [Problem(line, name, "stands twice") for name in sorted({n for n in names if names.count(n) > 1})]
     if "prompt" not in names:
@@ -170,13 +190,13 @@ def _csv_value(name: str, cell: str) -> object:
     return cell if name == "prompt" else cell.strip()
 
 
-def _jsonl(text: str, where: str) -> Rows:
+def _jsonl(text: str) -> Rows:
     for line, content in enumerate(text.split("\n"), 1):
         if content.strip():
             yield line, read_json(content)
 
 
-def _txt(text: str, where: str) -> Rows:
+def _txt(text: str) -> Rows:
     for line, content in enumerate(text.split("\n"), 1):
         if content.strip():
             yield line, {"prompt": content.rstrip("\r")}

@@ -1,4 +1,5 @@
-"""`marey scheduler`: relay and sweeper in one process. A second one beside it is harmless, and so is its death."""
+"""`marey scheduler`: relay, sweeper, evaluations and schedules in one process. A second one beside it is harmless, and
+so is its death."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ import threading
 
 import sqlalchemy as sa
 
+from services.scheduler.evaluations import Evaluations
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from shared.errors import InvalidInput
@@ -77,6 +79,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
 
 def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:
     store = open_store(chosen)
+    evaluations = Evaluations(engine, chosen)
 
     def probe() -> None:
         with transaction(engine):
@@ -112,4 +115,5 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
         Periodic(
             "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY
         ),
+        Periodic("evaluations", evaluations.round, seconds=chosen.evaluation_seconds, stopping=stopping),
     ]

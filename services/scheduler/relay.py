@@ -18,13 +18,13 @@ import sqlalchemy as sa
 from celery import Celery
 
 from shared.errors import Unreachable
-from shared.jobs import QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
+from shared.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
 from shared.runtime.app import DRAIN, PUBLISH_RETRY
 from shared.runtime.logs import logger
 
 log = logger(__name__)
 
-BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64}
+BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1}
 DEFAULT_BATCH_SIZE = 32
 """Items of one claim, for counting the batches that wait; a wrong guess costs a hint, never an item."""
 

@@ -70,6 +70,7 @@ def _unreferenced() -> sa.ColumnElement[bool]:
     asset = schema.asset.c.id
     return ~(
         sa.exists().where(schema.motion_file.c.asset_id == asset)
+        | sa.exists().where(schema.evaluation_report.c.asset_id == asset)
         | sa.exists().where(schema.asset_writer.c.asset_id == asset)
     )
 

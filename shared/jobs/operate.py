@@ -129,8 +129,9 @@ def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
 
     Raises:
         NotFound: the tenant has no such job.
-        Conflict: the job has open items; cancel it first.
+        Conflict: the job has open items, or works for an evaluation that is not over; cancel it first.
     """
+    _refuse_needed(conn, tenant, job)
     locked = lock_job_of(conn, tenant, job)
     if locked.state not in ENDED:
         raise Conflict(
@@ -160,6 +161,20 @@ def cancel_open_items(
     moved = {(ItemState.READY, ItemState.CANCELLED): job.ready, (ItemState.LEASED, ItemState.CANCELLED): job.leased}
     event = NewEvent("cancelled", reason, data={"items": job.ready + job.leased, "cause": cause})
     record(conn, job, [event], moved=moved, control=control)
+
+
+def _refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
+    """An evaluation's row is locked before its jobs: deleting one changes both."""
+    table = schema.evaluation.c
+    ours = (table.tenant_id == tenant) & ((table.generate_job_id == job) | (table.score_job_id == job))
+    rows = conn.execute(sa.select(table.id, table.finished_at).where(ours).order_by(table.id).with_for_update())
+    needed = next((row.id for row in rows if row.finished_at is None), None)
+    if needed is not None:
+        raise Conflict(
+            f"evaluation {needed} needs this job",
+            where=f"job {job}",
+            hint=f"Wait for it, or cancel it: `marey eval cancel {needed}`.",
+        )
 
 
 def _refuse_ended(job: LockedJob, verb: str) -> None:

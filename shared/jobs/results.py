@@ -116,7 +116,7 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 
     The files must lie in the asset store and have been announced by `begin_assets`.
     """
-    held = _hold(conn, lease_token, [motion.item for motion in motions])
+    held = hold(conn, lease_token, [motion.item for motion in motions])
     if held is None:
         return Committed((), tuple(motion.item for motion in motions))
     done = [motion for motion in motions if motion.item in held.items]
@@ -133,7 +133,7 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
 
     Ready items of the same job with the same key go with them.
     """
-    held = _hold(conn, lease_token, [text.item for text in texts])
+    held = hold(conn, lease_token, [text.item for text in texts])
     if held is None:
         return Committed((), tuple(text.item for text in texts))
     done = [text for text in texts if text.item in held.items]
@@ -155,7 +155,7 @@ def fail_items(
     """Record errors: permanent ones end the item `failed`; retryable ones cost an attempt and come back after a delay,
     or end it `dead` when the attempts are used up."""
     rules = rules or policy()
-    held = _hold(conn, lease_token, [failure.item for failure in failures])
+    held = hold(conn, lease_token, [failure.item for failure in failures])
     if held is None:
         return Committed((), tuple(failure.item for failure in failures))
     ends: dict[tuple[ItemState, ItemState], int] = {}
@@ -175,7 +175,7 @@ def fail_items(
 
 def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence[UUID] | None = None) -> Committed:
     """Give items back (all of the lease, by default), at no cost of an attempt: SIGTERM, a store or database outage."""
-    held = _hold(conn, lease_token, items)
+    held = hold(conn, lease_token, items)
     if held is None:
         return Committed((), tuple(items or ()))
     if held.items:
@@ -235,8 +235,8 @@ def give_back(
 def end_dead(conn: sa.Connection, item: HeldItem, problem: Problem) -> NewEvent:
     """A leased item has used up its attempts."""
     attempts = item.attempts + 1
-    _end(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=_document(problem), attempts=attempts)
-    return NewEvent("item_dead", problem.message, item.id, {"attempts": attempts, "problem": _document(problem)})
+    end_items(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=document(problem), attempts=attempts)
+    return NewEvent("item_dead", problem.message, item.id, {"attempts": attempts, "problem": document(problem)})
 
 
 def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
@@ -244,36 +244,44 @@ def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
     conn.execute(DROP_EMPTY_LEASE, {"token": lease_token})
 
 
-# --- helpers ---
+# --- what every write under a lease does ---
 
 
 @dataclass(frozen=True)
-class _Held:
+class Held:
+    """What a lease still holds: its job and these items, all locked."""
+
     job: LockedJob
     items: Mapping[UUID, HeldItem]
 
     def committed(self, asked: Iterable[UUID]) -> Committed:
+        """Which of these were written, and which were not ours any more."""
         asked = tuple(dict.fromkeys(asked))
         ours = tuple(item for item in asked if item in self.items)
         return Committed(ours, tuple(item for item in asked if item not in self.items))
 
 
-def _hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> _Held | None:
+def hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> Held | None:
     """Lock the job, then those of the items that this lease still holds. The fence of every write."""
     job_id = conn.execute(LEASED_JOB, {"token": lease_token}).scalar_one_or_none()
     job = None if job_id is None else lock_job(conn, job_id)
     if job is None:
         return None
-    return _Held(job, {item.id: item for item in held_items(conn, lease_token, items)})
+    return Held(job, {item.id: item for item in held_items(conn, lease_token, items)})
 
 
-def _end(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
+def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
+    """Leased items come to a last state. Counters are the caller's."""
     values = {"state": state, "lease_token": None, "reason": str(cause), "finished_at": CLOCK} | more
     conn.execute(sa.update(schema.item).where(among(schema.item.c.id, items)).values(values))
 
 
-def _document(problem: Problem) -> dict[str, object]:
+def document(problem: Problem) -> dict[str, object]:
+    """A problem as it stands in a row."""
     return asdict(problem)
+
+
+# --- helpers ---
 
 
 def _finish(conn: sa.Connection, job: LockedJob, motions: Sequence[NewMotion]) -> None:
@@ -346,11 +354,11 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
 
 
 def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:
-    document = _document(failure.problem)
+    told = document(failure.problem)
     message = failure.problem.message
     if not failure.retryable:
-        _end(conn, [item.id], ItemState.FAILED, Cause.ERROR, problem=document)
-        return ItemState.FAILED, NewEvent("item_failed", message, item.id, {"problem": document})
+        end_items(conn, [item.id], ItemState.FAILED, Cause.ERROR, problem=told)
+        return ItemState.FAILED, NewEvent("item_failed", message, item.id, {"problem": told})
     attempts = item.attempts + 1
     if attempts >= rules.max_attempts:
         return ItemState.DEAD, end_dead(conn, item, failure.problem)
@@ -364,10 +372,10 @@ def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Poli
             attempts=attempts,
             run_after=CLOCK + interval(delay),
             reason=f"{Cause.ERROR}: {message}",
-            problem=document,
+            problem=told,
         )
     )
-    data = {"attempts": attempts, "delay": delay, "problem": document}
+    data = {"attempts": attempts, "delay": delay, "problem": told}
     return ItemState.READY, NewEvent("item_retried", f"again in {delay:g} s: {message}", item.id, data)
 
 

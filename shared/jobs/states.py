@@ -118,6 +118,33 @@ OPEN_STREAMS = frozenset({StreamState.WAITING, StreamState.LIVE, StreamState.PAU
 """States of streams that are not over."""
 
 
+class EvaluationState(StrEnum):
+    """Where an evaluation stands. `DONE`, `FAILED` and `CANCELLED` are final; to try again is a new evaluation."""
+
+    PLANNED = "planned"
+    GENERATING = "generating"
+    """Its motions are made by a job like any other, in the background."""
+    SCORING = "scoring"
+    """They are measured, by a job of one item."""
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+EVALUATION_TRANSITIONS: dict[EvaluationState, frozenset[EvaluationState]] = {
+    EvaluationState.PLANNED: frozenset({EvaluationState.GENERATING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.GENERATING: frozenset({EvaluationState.SCORING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.SCORING: frozenset({EvaluationState.DONE, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.DONE: frozenset(),
+    EvaluationState.FAILED: frozenset(),
+    EvaluationState.CANCELLED: frozenset(),
+}
+"""Allowed transitions of evaluations; the trigger `evaluation_transition` is the same table."""
+
+OPEN_EVALUATIONS = frozenset({EvaluationState.PLANNED, EvaluationState.GENERATING, EvaluationState.SCORING})
+"""States of evaluations that are not over."""
+
+
 class Counters(Protocol):
     """How many items of a job are in each state; the states add up to `total`."""
 

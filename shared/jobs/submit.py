@@ -21,7 +21,7 @@ from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, Lane, LaneChange, NewEvent, among, change_lanes, interval, lock_job, record
 from shared.jobs.policy import policy
 from shared.jobs.states import JobState, Stage
-from shared.jobs.types import PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, NewItem, NewJob, SubmittedJob
+from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, NewItem, NewJob, SubmittedJob
 
 CHUNK = 2000  # items held in memory at a time, and keys of one look-up
 
@@ -119,7 +119,7 @@ def _write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem]) -> Co
     connection = cast("psycopg.Connection", conn.connection.driver_connection)
     positions = itertools.count()
     for chunk in _chunks(items):
-        known = _known_texts(conn, {item.text_key for item in chunk})
+        known = _known_texts(conn, {item.text_key for item in chunk}) | {NO_TEXT}
         with connection.cursor() as cursor, cursor.copy(COPY) as copy:
             for item, position in zip(chunk, positions, strict=False):
                 _check_item(item)

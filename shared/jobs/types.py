@@ -13,6 +13,8 @@ from shared.jobs.states import ItemState, JobControl, JobState, Stage, StreamSta
 
 DEFAULT_TENANT = "default"
 TEXT_QUEUE = "text"
+NO_TEXT = ""
+"""The `text_key` of an item whose prompt nobody reads: it begins at `generate`."""
 SEED_LIMIT = 2**31
 """Seeds are 0 … 2³¹ − 1."""
 PRIORITY_LIMIT = 1000
@@ -50,7 +52,7 @@ class NewItem:
         model: the handler's queue, as "hgm3".
         bundle: the exact bundle, name and weights hash.
         batch_key: hash of the bundle and the settings that are uniform in a batch.
-        text_key: key of the text features (`TextPipeline.key`).
+        text_key: key of the text features (`TextPipeline.key`); `NO_TEXT` = it needs none.
         text_batch_key: hash of the text specification; prompts of one claim of the text stage share it.
         seed: 0 … 2³¹ − 1.
         seconds: length wanted; None = the model's estimate.

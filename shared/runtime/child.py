@@ -70,7 +70,8 @@ class Child:
         self._heartbeat = Heartbeat(
             self._renew, interval=chosen.heartbeat_seconds, stopping=self._stopping, present=self._present
         )
-        self._committer = Committer(self._engine, open_store(chosen), self._heartbeat, self._stopping)
+        store = open_store(chosen)
+        self._committer = Committer(self._engine, store, self._heartbeat, self._stopping)
         handlers = {queue: import_handler(reference) for queue, reference in role.handlers.items()}
         self._drain = Drain(
             self._engine,
@@ -78,6 +79,7 @@ class Child:
             handlers,
             heartbeat=self._heartbeat,
             committer=self._committer,
+            store=store,
             stopping=self._stopping,
             ticked=self._tick,
         )

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -18,18 +19,20 @@ from shared.jobs import (
     Committed,
     ItemFailure,
     NewMotion,
+    NewScore,
     NewText,
     Problem,
     asset_key,
     begin_assets,
     commit_motions,
+    commit_score,
     commit_texts,
     fail_items,
     release,
     transaction,
 )
 from shared.runtime.faults import as_problem, patiently
-from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, TextDone
+from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
 from shared.runtime.lease import Heartbeat, HeldLease
 from shared.runtime.logs import logger
 from shared.storage import AssetStore, NewObject
@@ -49,12 +52,18 @@ class _Finish:
     reason: str
 
 
+_Files: TypeAlias = tuple[tuple[ExportedFile, AssetDigest], ...]
+
+
 @dataclass(frozen=True)
 class _Exported:
     item: UUID
     export: Export
     elapsed: float
-    files: tuple[tuple[ExportedFile, AssetDigest], ...]
+    files: _Files
+
+
+_Result: TypeAlias = _Exported | TextDone | Scored | Failed
 
 
 class Committer(threading.Thread):
@@ -130,7 +139,7 @@ class Committer(threading.Thread):
         message, self._held_back = self._held_back, None
         return message if message is not None else self._inbox.get()
 
-    def _group(self, lease: HeldLease, first: Outcome) -> list[_Exported | TextDone | Failed]:
+    def _group(self, lease: HeldLease, first: Outcome) -> list[_Result]:
         """`first` and what follows of the same lease, exported: as much as is there, within bounds."""
         until = time.monotonic() + GROUP_SECONDS
         group = [self._export(lease, first)]
@@ -147,7 +156,7 @@ class Committer(threading.Thread):
             group.append(self._export(lease, message[1]))
         return [outcome for outcome in group if outcome is not None]
 
-    def _export(self, lease: HeldLease, outcome: Outcome) -> _Exported | TextDone | Failed | None:
+    def _export(self, lease: HeldLease, outcome: Outcome) -> _Result | None:
         """Make the files of a `Done`; None when nobody wants it any more."""
         if outcome.item in lease.lost:
             return None
@@ -162,10 +171,9 @@ class Committer(threading.Thread):
             return Failed(outcome.item, as_problem(error), retryable=True)
         finally:
             lease.progress(0, 0)
-        files = tuple((file, _digest(file)) for file in export.files)
-        return _Exported(outcome.item, export, outcome.elapsed, files)
+        return _Exported(outcome.item, export, outcome.elapsed, _digested(export.files))
 
-    def _write_or_fail(self, lease: HeldLease, group: Sequence[_Exported | TextDone | Failed]) -> None:
+    def _write_or_fail(self, lease: HeldLease, group: Sequence[_Result]) -> None:
         """Write; a bug in there costs the items an attempt, so that it cannot go round for ever."""
         try:
             self._write(lease, group)
@@ -178,10 +186,12 @@ class Committer(threading.Thread):
             lease.settle(outcome.item for outcome in group)
             self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
 
-    def _write(self, lease: HeldLease, group: Sequence[_Exported | TextDone | Failed]) -> None:
+    def _write(self, lease: HeldLease, group: Sequence[_Result]) -> None:
         motions = [outcome for outcome in group if isinstance(outcome, _Exported)]
         if motions:
             self._write_motions(lease, motions)
+        for score in (outcome for outcome in group if isinstance(outcome, Scored)):
+            self._write_score(lease, score)
         texts = [NewText(o.item, o.key, o.blob) for o in group if isinstance(o, TextDone)]
         if texts:
             self._commit(lease, "texts", lambda conn, token: commit_texts(conn, token, texts))
@@ -190,22 +200,7 @@ class Committer(threading.Thread):
             self._commit(lease, "failures", lambda conn, token: fail_items(conn, token, failures))
 
     def _write_motions(self, lease: HeldLease, motions: Sequence[_Exported]) -> None:
-        digests = list({digest.sha256: digest for motion in motions for _, digest in motion.files}.values())
-        token = lease.claim.lease_token
-
-        def announce() -> bool:
-            with transaction(self._engine) as conn:
-                return begin_assets(conn, token, digests)
-
-        if not patiently(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
-            lease.settle(motion.item for motion in motions)
-            log.info("results_thrown_away", job=str(lease.claim.job), items=len(motions))
-            return
-        try:
-            self._put_files(lease, motions)
-        except Unreachable as error:
-            log.error("store_away", job=str(lease.claim.job), error=error.message)
-            self._give_back(lease, [motion.item for motion in motions], "the asset store does not answer")
+        if not self._store_files(lease, [m.item for m in motions], [file for m in motions for file in m.files]):
             return
         rows = [
             NewMotion(
@@ -221,10 +216,30 @@ class Committer(threading.Thread):
         ]
         self._commit(lease, "motions", lambda conn, token: commit_motions(conn, token, rows))
 
-    def _put_files(self, lease: HeldLease, motions: Sequence[_Exported]) -> None:
-        left = {
-            asset_key(lease.claim.tenant, digest.sha256): file for motion in motions for file, digest in motion.files
-        }
+    def _write_score(self, lease: HeldLease, score: Scored) -> None:
+        files = _digested(score.files)
+        if not self._store_files(lease, [score.item], files):
+            return
+        reports = {file.format: digest for file, digest in files}
+        row = NewScore(score.item, reports, score.summary, score.regressed, score.reason)
+        self._commit(lease, "score", lambda conn, token: commit_score(conn, token, row))
+
+    def _store_files(
+        self, lease: HeldLease, items: Sequence[UUID], files: Sequence[tuple[ExportedFile, AssetDigest]]
+    ) -> bool:
+        """Announce and PUT what these items left; False when they are not ours any more, or were given back."""
+        digests = list({digest.sha256: digest for _, digest in files}.values())
+        token = lease.claim.lease_token
+
+        def announce() -> bool:
+            with transaction(self._engine) as conn:
+                return begin_assets(conn, token, digests)
+
+        if not patiently(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
+            lease.settle(items)
+            log.info("results_thrown_away", job=str(lease.claim.job), items=len(items))
+            return False
+        left = {asset_key(lease.claim.tenant, digest.sha256): file for file, digest in files}
 
         def put() -> None:
             objects = [NewObject(key, file.content, file.media_type) for key, file in left.items()]
@@ -232,7 +247,13 @@ class Committer(threading.Thread):
                 del left[key]
                 lease.progress(0, 0)
 
-        patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
+        try:
+            patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
+        except Unreachable as error:
+            log.error("store_away", job=str(lease.claim.job), error=error.message)
+            self._give_back(lease, items, "the asset store does not answer")
+            return False
+        return True
 
     def _commit(self, lease: HeldLease, what: str, write: Callable[[sa.Connection, UUID], Committed]) -> None:
         def attempt() -> Committed:
@@ -256,5 +277,8 @@ class Committer(threading.Thread):
             self._commit(lease, "release", lambda conn, token: release(conn, token, reason, open_items))
 
 
-def _digest(file: ExportedFile) -> AssetDigest:
-    return AssetDigest(hashlib.sha256(file.content).hexdigest(), len(file.content), file.media_type)
+def _digested(files: Sequence[ExportedFile]) -> _Files:
+    return tuple(
+        (file, AssetDigest(hashlib.sha256(file.content).hexdigest(), len(file.content), file.media_type))
+        for file in files
+    )

@@ -5,6 +5,7 @@ keeps the lease alive, stores files, commits, releases and retries. The rules a 
 
 - `run` is called on one thread, one batch at a time; every item of a batch has the same bundle and settings.
 - `run` yields one outcome per item, in any order, as soon as it is known; items in `control.dropped()` need none.
+- The items of an evaluator's queue come one by one, and their batch has `scoring`: the motions to measure.
 - `Done.export` is called once, later, on the store thread, while the next batch runs: decoding, clean-up and file
   formats belong there, not into `run`.
 - An exception out of `run` concerns every item of the batch that has no outcome yet: a `MareyError` fails them with
@@ -21,6 +22,7 @@ from uuid import UUID
 
 from shared.errors import MareyError
 from shared.jobs.types import Claim, ClaimedItem
+from shared.runtime.scoring import ScoreInput
 
 
 @dataclass(frozen=True)
@@ -32,14 +34,17 @@ class Batch:
     """The items of the claim, or of one bucket of it."""
     features: Mapping[str, bytes]
     """Text features (`TextFeatures.to_blob`) by the items' `text_key`; empty in the text stage."""
+    scoring: ScoreInput | None = None
+    """What an evaluation made; for items that read no prompt."""
 
 
 @dataclass(frozen=True)
 class ExportedFile:
-    """One file of a motion, in memory: it goes to the asset store under its sha256."""
+    """One file of a motion or report, in memory: it goes to the asset store under its sha256."""
 
     format: str
-    """`npz`, `bvh`, …: the name under which `motions/{id}/files/{format}` serves it."""
+    """`npz`, `bvh`, …: the name under which `motions/{id}/files/{format}` serves it, or `html`, `json`, `md`, under
+    which `evaluations/{id}/report/{format}` does."""
     content: bytes
     media_type: str = "application/octet-stream"
 
@@ -81,6 +86,21 @@ class TextDone:
 
 
 @dataclass(frozen=True)
+class Scored:
+    """A measured evaluation: `files` (`html`, `json`, `md`) are its report, `summary` its numbers for lists and trends.
+
+    `regressed`: it is worse than what it was compared with; None = there was nothing to compare with. `reason` is one
+    sentence for people.
+    """
+
+    item: UUID
+    files: tuple[ExportedFile, ...]
+    summary: Mapping[str, float | None]
+    regressed: bool | None
+    reason: str
+
+
+@dataclass(frozen=True)
 class Failed:
     """An item that has no result. `retryable`: it runs again after a pause; else it ends `failed`, now."""
 
@@ -89,7 +109,7 @@ class Failed:
     retryable: bool = False
 
 
-Outcome: TypeAlias = Done | TextDone | Failed
+Outcome: TypeAlias = Done | TextDone | Scored | Failed
 
 
 class BatchControl(Protocol):

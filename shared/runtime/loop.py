@@ -8,18 +8,21 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NoReturn
 from uuid import UUID
 
 import sqlalchemy as sa
 
 from shared.errors import MareyError, Unreachable
-from shared.jobs import Claim, ClaimedItem, Stage, claim, load_texts, transaction
+from shared.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts, transaction
 from shared.runtime.committer import Committer
 from shared.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
 from shared.runtime.handler import Batch, Failed, Handler
 from shared.runtime.lease import Heartbeat, HeldLease
 from shared.runtime.logs import logger
+from shared.runtime.scoring import score_input
+from shared.storage import AssetStore
 
 log = logger(__name__)
 
@@ -53,6 +56,7 @@ class Drain:
         engine: the database.
         worker: name under which it claims from a queue.
         handlers: by queue; served in turns, so that texts stay ahead of motions and hold none of them up.
+        store: where score items read motions from.
         ticked: called at each claim and step of progress: liveness is the age of the last.
     """
 
@@ -64,10 +68,12 @@ class Drain:
         *,
         heartbeat: Heartbeat,
         committer: Committer,
+        store: AssetStore,
         stopping: threading.Event,
         ticked: Callable[[], None],
     ) -> None:
         self._engine = engine
+        self._store = store
         self._worker = worker
         self._handlers = handlers
         self._heartbeat = heartbeat
@@ -177,10 +183,13 @@ class Drain:
         return error.message
 
     def _batch(self, lease: HeldLease) -> Batch:
-        """The claim with its text features; items without any fail, retryably."""
+        """The claim with its text features, or what it scores; items that lack features fail, retryably."""
         taken = lease.claim
         if taken.stage is Stage.TEXT:
             return Batch(taken, taken.items, {})
+        if taken.items[0].text_key == NO_TEXT:
+            score = partial(score_input, self._engine, self._store, taken.job)
+            return Batch(taken, taken.items, {}, patiently(score, seconds=CLAIM_PATIENCE, stopping=self._stopping))
         keys = sorted({item.text_key for item in taken.items})
 
         def read() -> dict[str, bytes]:

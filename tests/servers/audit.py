@@ -38,7 +38,8 @@ CHECKS = {
     """,
     "a succeeded item has not one motion": """
         SELECT item.id, item.state, count(motion.id) FROM item LEFT JOIN motion ON motion.item_id = item.id
-        GROUP BY item.id HAVING count(motion.id) <> CASE WHEN item.state = 'succeeded' THEN 1 ELSE 0 END
+        WHERE item.queue <> 'evaluator' GROUP BY
+          item.id HAVING count(motion.id) <> CASE WHEN item.state = 'succeeded' THEN 1 ELSE 0 END
     """,
     "a motion's file is not stored": """
         SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
@@ -46,7 +47,23 @@ CHECKS = {
     """,
     "a generated item has no text features": """
         SELECT item.id FROM item
-        WHERE stage = 'generate' AND NOT EXISTS (SELECT FROM text_features WHERE text_features.key = item.text_key)
+        WHERE stage = 'generate' AND text_key <> ''
+          AND NOT EXISTS (SELECT FROM text_features WHERE text_features.key = item.text_key)
+    """,
+    "an evaluation is done without a stored report, or has one and is not": """
+        SELECT evaluation.id, evaluation.state, count(asset.id) FROM evaluation
+        LEFT JOIN evaluation_report ON evaluation_report.evaluation_id = evaluation.id
+        LEFT JOIN asset ON asset.id = evaluation_report.asset_id AND asset.state = 'stored'
+        GROUP BY evaluation.id HAVING (evaluation.state = 'done') <> (count(asset.id) > 0)
+    """,
+    "a score succeeded and its evaluation is not done, or the other way round": """
+        SELECT evaluation.id, evaluation.state, job.state FROM evaluation JOIN job ON job.id = evaluation.score_job_id
+        WHERE (evaluation.state = 'done') <> (job.state = 'succeeded')
+    """,
+    "an evaluation is in a state that no event of its tells": """
+        SELECT evaluation.id, evaluation.state FROM evaluation WHERE NOT EXISTS
+          (SELECT FROM evaluation_event AS event WHERE event.evaluation_id = evaluation.id
+           AND (event.state, event.reason) = (evaluation.state, evaluation.reason))
     """,
     "events have gaps": """
         SELECT job.id, job.event_seq, count(job_event.seq), max(job_event.seq)

@@ -40,6 +40,7 @@ class Loop:
             {handler.queue: handler for handler in handlers},
             heartbeat=self.heartbeat,
             committer=self.committer,
+            store=store,
             stopping=self.stopping,
             ticked=self._tick,
         )

@@ -9,8 +9,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import NewItem, NewJob, asset_key, get_job, submit, transaction
-from shared.jobs.schema import asset, item, job_event, lease, motion, motion_file, text_features
+from shared.jobs import EVALUATOR_QUEUE, NewItem, NewJob, asset_key, get_job, submit, transaction
+from shared.jobs.schema import asset, evaluation_report, item, job_event, lease, motion, motion_file, text_features
 from shared.jobs.states import ENDED
 from shared.jobs.types import DEFAULT_TENANT, JobRow
 from shared.storage import AssetStore
@@ -75,17 +75,18 @@ def audit(engine: sa.Engine, store: AssetStore) -> list[str]:
         leases = conn.execute(sa.select(lease.c.token)).scalars().all()
         assets = conn.execute(sa.select(asset)).all()
         used = set(conn.execute(sa.select(motion_file.c.asset_id)).scalars())
+        used |= set(conn.execute(sa.select(evaluation_report.c.asset_id)).scalars())
         events = conn.execute(sa.select(job_event.c.job_id, job_event.c.seq)).all()
     wrong += [f"item {row.position} is {row.state}" for row in items if row.state in ("ready", "leased")]
     wrong += [f"item {row.position} holds a lease" for row in items if row.lease_token is not None]
     wrong += [
         f"item {row.position} is {row.state} and has {motions[row.id]} motions"
         for row in items
-        if motions[row.id] != (row.state == "succeeded")
+        if motions[row.id] != (row.state == "succeeded" and row.queue != EVALUATOR_QUEUE)
     ]
     wrong += [f"lease {token} is held" for token in leases]
     wrong += [f"asset {row.sha256[:8]} is {row.state}" for row in assets if row.state != "stored"]
-    wrong += [f"asset {row.sha256[:8]} belongs to no motion" for row in assets if row.id not in used]
+    wrong += [f"asset {row.sha256[:8]} belongs to no motion or report" for row in assets if row.id not in used]
     rows = {asset_key(row.tenant_id, row.sha256) for row in assets}
     objects = set(store.keys())
     wrong += [f"object {key} has no row" for key in sorted(objects - rows)]

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-import secrets
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
-from services.api.catalogue import Catalogue, Offer
+from services.api.catalogue import Catalogue
 from services.api.jobs.schemas import JobFields
 from shared.errors import InvalidInput, MareyError, TooLarge
-from shared.items import MAX_ITEMS, MAX_SEED, InvalidItems, Item, Problem, read_items, read_json
+from shared.items import MAX_ITEMS, InvalidItems, Item, Problem, read_items, read_json
 from shared.jobs import NewItem
-from shared.text.keys import feature_key
+from shared.offers import Offer, new_items
+
+Fields = TypeVar("Fields", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -39,29 +40,8 @@ class Submission:
         return sorted({offer.bundle.reference for offer in self.offers})
 
     def new_items(self) -> Iterator[NewItem]:
-        """One row a motion: prompt times variant, with the seed drawn where none was given."""
-        batch_keys: dict[tuple[str, str], str] = {}
-        for index, (item, offer) in enumerate(zip(self.items, self.offers, strict=True)):
-            reference = offer.bundle.reference
-            settings = json.dumps(dict(item.settings), sort_keys=True)
-            batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
-            seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
-            for variant in range(item.variants):
-                yield NewItem(
-                    index=index,
-                    prompt=item.prompt,
-                    model=offer.bundle.manifest.model,
-                    bundle=reference,
-                    batch_key=batch_key,
-                    text_key=feature_key(item.prompt, offer.text),
-                    text_batch_key=_sha256(offer.text.model_dump_json()),
-                    seed=seed + variant,
-                    variant=variant,
-                    name=item.name,
-                    seconds=item.seconds,
-                    settings=dict(item.settings),
-                    tags=item.tags,
-                )
+        """One row a motion."""
+        return new_items(zip(self.items, self.offers, strict=True))
 
 
 def read_ndjson(body: bytes, fields: JobFields, catalogue: Catalogue) -> Submission:
@@ -85,17 +65,27 @@ def read_document(body: bytes, catalogue: Catalogue) -> Submission:
         InvalidInput: the object itself is wrong.
         TooLarge: more than 100,000 items.
     """
-    try:
-        document = json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
-    if not isinstance(document, dict):
-        raise InvalidInput("the body is not a JSON object", where="body", hint='Write {"items": [{"prompt": "…"}]}.')
+    document = read_object(body, hint='Write {"items": [{"prompt": "…"}]}.')
     raws = document.pop("items", None)
     if not isinstance(raws, list) or not raws:
         raise InvalidInput("is missing, empty or not a list", where="items", hint='Write {"items": [{"prompt": "…"}]}.')
     _check_length(len(raws))
     return _checked(job_fields(document), enumerate(raws, 1), catalogue)
+
+
+def read_object(body: bytes, *, hint: str | None = None) -> dict[str, Any]:
+    """A body that is a JSON object.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    try:
+        document = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
+    if not isinstance(document, dict):
+        raise InvalidInput("the body is not a JSON object", where="body", hint=hint)
+    return document
 
 
 def _check_length(lines: int) -> None:
@@ -148,8 +138,17 @@ def job_fields(values: Mapping[str, Any]) -> JobFields:
     Raises:
         InvalidItems: with the problems of each field.
     """
+    return read_fields(JobFields, values)
+
+
+def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
+    """Fields of a body that is read by hand.
+
+    Raises:
+        InvalidItems: with the problems of each field.
+    """
     try:
-        return JobFields.model_validate(dict(values))
+        return model.model_validate(dict(values))
     except ValidationError as error:
         problems = [Problem(None, ".".join(map(str, e["loc"])) or "body", e["msg"]) for e in error.errors()]
         raise InvalidItems(problems) from error
@@ -158,7 +157,3 @@ def job_fields(values: Mapping[str, Any]) -> JobFields:
 def request_sha256(query: str, body: bytes) -> str:
     """What makes two submits the same request."""
     return hashlib.sha256(query.encode() + b"\n" + body).hexdigest()
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -7,10 +7,10 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from services.api.auth import Reader
-from services.api.catalogue import offers
 from services.api.context import Shared
 from services.api.models.schemas import ModelsView, ModelView
 from services.api.problems import RESPONSES
+from shared.offers import offers
 
 router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from services.api.catalogue import Offer
 from services.api.schemas import View
+from shared.offers import Offer
 
 
 class DataView(View):

@@ -6,17 +6,9 @@ from datetime import datetime
 from typing import Any
 from uuid import UUID
 
+from services.api.files import FileView
 from services.api.schemas import View
 from shared.jobs import MotionRow
-
-
-class FileView(View):
-    """One file of a motion; `GET /v1/motions/{id}/files/{format}` gives it."""
-
-    format: str
-    sha256: str
-    size: int
-    media_type: str
 
 
 class MotionView(View):

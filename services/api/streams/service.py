@@ -9,7 +9,7 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
-from services.api.catalogue import Catalogue, Offer
+from services.api.catalogue import Catalogue
 from services.api.context import Context
 from services.api.streams.hub import Hub
 from services.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
@@ -26,6 +26,7 @@ from shared.jobs import (
     transaction,
 )
 from shared.jobs.states import OPEN_STREAMS
+from shared.offers import Offer
 from shared.streams.bell import Bell
 from shared.streams.control import Control, ControlQueue
 

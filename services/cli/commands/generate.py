@@ -97,8 +97,8 @@ def _check(items: Iterable[Item], bundle: Bundle) -> None:
         InvalidBundle: not a bundle of a model that runs here.
         InvalidItems: a length it cannot make, a setting it has not.
     """
-    from services.api.catalogue import check_seconds, check_settings
     from services.cli.roles import GENERATORS
+    from shared.bundles.limits import check_seconds, check_settings
 
     if bundle.manifest.model not in GENERATORS:
         raise InvalidBundle(

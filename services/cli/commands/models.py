@@ -65,8 +65,8 @@ def _local_models() -> list[dict[str, Any]]:
     from services.cli.roles import needs_extra
 
     try:
-        from services.api.catalogue import offers
         from services.api.models.schemas import ModelView
+        from shared.offers import offers
         from shared.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error

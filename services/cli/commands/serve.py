@@ -17,7 +17,7 @@ def serve(
         typer.Option(
             "--with",
             help="Workers: + joins queues in one child, a comma separates children. "
-            "None given = one child for prompts and every model that has a bundle here.",
+            "None given = one child for prompts, every model that has a bundle here, and evaluations.",
         ),
     ] = None,
     port: Annotated[int | None, typer.Option("--port", help="Port of the API; 0 = any that is free.")] = None,
@@ -48,7 +48,7 @@ class Part(StrEnum):
 
 
 def worker(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues to serve: hgm3, mogo, text, or hgm3+text.")],
+    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues: hgm3, mogo, text, evaluator; or hgm3+text.")],
     only: Annotated[
         Part | None,
         typer.Option(
@@ -84,7 +84,7 @@ def worker(
 
 
 def scheduler() -> None:
-    """Run relay and sweeper; a second one beside it is harmless."""
+    """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
     from services.cli.roles import needs_extra
 
     try:

@@ -8,7 +8,7 @@ from uuid import uuid4
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.api.motions.ranges import parse_range
+from services.api.ranges import parse_range
 from services.api.tailer import last_progress_only
 from shared.jobs import EventRow
 

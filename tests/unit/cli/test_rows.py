@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.rows import items_from_file, with_defaults
+from services.cli.rows import evaluation_prompts_from_file, items_from_file, with_defaults
 from shared.errors import InvalidFile, InvalidInput, NotFound
+from shared.evaluation_prompts import EvaluationPrompt
 from shared.items import InvalidItems, Item
 
 
@@ -128,3 +129,34 @@ def test_no_file_breaks_the_reader(tmp_path_factory: pytest.TempPathFactory, con
     except InvalidInput:
         return
     assert items
+
+
+def test_a_file_of_an_evaluation_has_columns_of_its_own(tmp_path: Path) -> None:
+    text = 'prompt,seconds,expected\n"walks, then waves",2.5,walk then wave left\na person runs,,\n'
+    assert evaluation_prompts_from_file(write(tmp_path, "p.csv", text)) == (
+        EvaluationPrompt("walks, then waves", 2.5, "walk then wave left"),
+        EvaluationPrompt("a person runs"),
+    )
+    lines = '{"prompt": "a person walks", "expected": "Walk  straight"}\n\n{"prompt": "a person runs"}\n'
+    assert evaluation_prompts_from_file(write(tmp_path, "p.jsonl", lines)) == (
+        EvaluationPrompt("a person walks", expected="walk straight"),
+        EvaluationPrompt("a person runs"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("", "no prompt"),
+        ("prompt,seconds\n", "no prompt"),
+        ("prompt\na person walks\n", "single prompt"),
+        ("prompt,tags\na person walks,x\n", "known columns are prompt, seconds, expected"),
+        ("prompt,seconds\na person walks,soon\na person runs,-1\n", "line 2: seconds"),
+        ("prompt,seconds\na person walks,soon\na person runs,-1\n", "line 3: seconds"),
+        ("prompt,expected\na person walks,fly\na person runs,\n", "line 2: expected: 'fly' is not an act"),
+    ],
+)
+def test_a_file_of_an_evaluation_that_cannot_be_used_says_why(tmp_path: Path, content: str, said: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        evaluation_prompts_from_file(write(tmp_path, "p.csv", content))
+    assert said in str(caught.value)

@@ -151,6 +151,16 @@ def test_kid_tells_distributions_apart_by_more_than_its_spread():
     assert found.mean > 3 * found.std > 0
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_subsets_of_kid_are_drawn_from_the_whole_of_both_sets(turned):
+    rng = np.random.default_rng(3)
+    alike, odd = rng.normal(size=(200, 4)), rng.normal(size=(200, 4))
+    odd[50:] += 3.0  # the first rows would tell nothing
+    found = kid(*((odd, alike) if turned else (alike, odd)), subsets=4, subset_size=50, rng=rng)
+    assert found.mean > 10
+    assert found.std > 0
+
+
 def test_kid_follows_the_generator():
     one, two = cloud(1), cloud(2)
     found = [kid(one, two, subsets=3, subset_size=50, rng=np.random.default_rng(seed)) for seed in (1, 1, 2)]

@@ -9,10 +9,13 @@ import pytest
 
 from shared.jobs.states import (
     ENDED,
+    EVALUATION_TRANSITIONS,
     OPEN,
+    OPEN_EVALUATIONS,
     RETRYABLE,
     TRANSITIONS,
     Cause,
+    EvaluationState,
     ItemState,
     JobControl,
     JobState,
@@ -28,6 +31,14 @@ CONTRACT = {
     "failed": {"ready"},
     "dead": {"ready"},
     "cancelled": {"ready"},
+}
+EVALUATION_CONTRACT = {
+    "planned": {"generating", "failed", "cancelled"},
+    "generating": {"scoring", "failed", "cancelled"},
+    "scoring": {"done", "failed", "cancelled"},
+    "done": set(),
+    "failed": set(),
+    "cancelled": set(),
 }
 
 
@@ -48,6 +59,15 @@ class Items:
 @pytest.mark.parametrize(("before", "after"), list(product(ItemState, ItemState)))
 def test_an_item_moves_as_the_contract_says(before: ItemState, after: ItemState) -> None:
     assert allowed(before, after) == (str(after) in CONTRACT[str(before)])
+
+
+def test_an_evaluation_moves_as_the_contract_says() -> None:
+    found = {str(before): set(map(str, after)) for before, after in EVALUATION_TRANSITIONS.items()}
+    assert found == EVALUATION_CONTRACT
+
+
+def test_an_evaluation_is_open_exactly_while_it_can_move() -> None:
+    assert {state for state in EvaluationState if EVALUATION_TRANSITIONS[state]} == OPEN_EVALUATIONS
 
 
 def test_succeeded_is_final() -> None:

@@ -196,3 +196,13 @@ def test_a_vector_does_not_depend_on_the_texts_beside_it(minilm: MiniLMEncoder) 
         np.testing.assert_allclose(vector, minilm.encode(text).pooled, atol=2e-6)
         np.testing.assert_allclose(vector, minilm.pooled([text])[0], atol=2e-6)
     assert minilm.pooled([]) == []
+
+
+def test_token_states_of_many_texts_are_those_of_each_alone(minilm: MiniLMEncoder) -> None:
+    texts = [TEXT, "left", "a person bows", " ".join(["walk"] * 400)] * 12
+    together = minilm.tokens(texts)
+    assert len(together) == len(texts)
+    for text, states in zip(texts[:4], together, strict=False):
+        np.testing.assert_allclose(states, minilm.encode(text).tokens, atol=2e-6)
+        np.testing.assert_allclose(states, minilm.tokens([text])[0], atol=2e-6)
+    assert minilm.tokens([]) == []

@@ -1,0 +1,1 @@
+"""Evaluations: runs that measure a model, and their reports."""

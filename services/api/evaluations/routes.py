@@ -1,0 +1,86 @@
+"""`/v1/evaluations`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+from uuid import UUID
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from services.api.auth import Operator, Reader, Submitter
+from services.api.context import Connection, Shared
+from services.api.evaluations import service
+from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
+from services.api.files import FILE_RESPONSES, AskedPart, file_response
+from services.api.guards import limit_of_submit, read_body
+from services.api.problems import RESPONSES
+from services.api.schemas import Cursor, Limit, PageView
+from shared import jobs
+from shared.errors import NotFound
+
+router = APIRouter(prefix="/v1/evaluations", tags=["evaluations"], responses=RESPONSES)
+
+
+def body_of(name: str) -> dict[str, Any]:
+    """For the document: a body that is read by hand."""
+    schema = {"$ref": f"#/components/schemas/{name}"}
+    return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
+
+
+@router.post("", status_code=202, openapi_extra=body_of("NewEvaluationBody"))
+async def begin_evaluation(
+    request: Request, response: Response, shared: Shared, key: Submitter
+) -> EvaluationDetailView:
+    """Plan an evaluation: its motions are made in the background, then measured. All bad prompts are told at once."""
+    body = await read_body(request, limit_of_submit())
+    view = await run_in_threadpool(service.create, shared, key, body)
+    response.headers["Location"] = f"/v1/evaluations/{view.id}"
+    return view
+
+
+@router.get("")
+def list_evaluations(
+    conn: Connection,
+    key: Reader,
+    state: Annotated[list[jobs.EvaluationState] | None, Query(description="Only those in these states.")] = None,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> PageView[EvaluationView]:
+    """Evaluations, newest first."""
+    page = jobs.list_evaluations(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
+    return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{evaluation}")
+def get_evaluation(evaluation: UUID, conn: Connection, key: Reader) -> EvaluationDetailView:
+    """One evaluation, with its history."""
+    return service.detail(conn, jobs.get_evaluation(conn, key.tenant, evaluation))
+
+
+@router.delete("/{evaluation}", status_code=202)
+def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> EvaluationDetailView:
+    """Cancel an evaluation and the job that runs for it. One that is over stays as it is."""
+    return service.detail(conn, jobs.cancel_evaluation(conn, key.tenant, evaluation))
+
+
+@router.get("/{evaluation}/report/{format}", response_class=Response, responses=FILE_RESPONSES)
+def get_report(
+    evaluation: UUID,
+    format: Literal["html", "json", "md"],
+    shared: Shared,
+    conn: Connection,
+    key: Reader,
+    part: AskedPart,
+) -> Response:
+    """The report of an evaluation that is done; its ETag is its sha256."""
+    row = jobs.get_evaluation(conn, key.tenant, evaluation)
+    file = next((f for f in EvaluationView.of(row).reports if f.format == format), None)
+    if file is None:
+        message = f"there is no such report: the evaluation is {row.state}"
+        raise NotFound(message, where=str(evaluation), hint=row.reason)
+    return file_response(shared, key.tenant, row.id, file, part)
+
+
+SCHEMAS = (NewEvaluationBody,)
+"""Bodies that are read by hand, for the OpenAPI document."""

@@ -1,0 +1,168 @@
+"""What the routes of evaluations take and give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any, Literal
+from uuid import UUID
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.files import FileView
+from services.api.jobs.schemas import MAX_COMMENT, MAX_NAME
+from services.api.schemas import View
+from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
+from shared.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
+from shared.jobs import TEST_SPLIT, EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
+from shared.jobs.states import JobState
+
+PLAIN = r"^[^\x00-\x1f]*$"
+BUNDLE = rf"^{MODEL.pattern}$"
+
+
+class EvaluationPromptBody(BaseModel):
+    """One prompt. For the documentation: `shared.evaluation_prompts` is what checks it, and says more."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    prompt: str = Field(min_length=1, description="What the person does, in English, at most 200 words.")
+    seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
+    expected: str | None = Field(None, description='What the motion must show: "walk", "walk straight then wave left".')
+
+
+class EvaluationFields(BaseModel):
+    """What is measured, and how."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    bundle: str = Field(pattern=BUNDLE, max_length=200, description="Model, bundle or exact bundle that generates.")
+    evaluator: str | None = Field(
+        None, pattern=BUNDLE, max_length=200, description="Bundle that measures; none given = the one that is here."
+    )
+    split: Literal["test"] | None = Field(
+        None, description="`test`: the captions that the evaluator's bundle carries. Else give `prompts`."
+    )
+    source: str | None = Field(
+        None, min_length=1, max_length=MAX_NAME, pattern=PLAIN, description="What the prompts are called in reports."
+    )
+    settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
+    repeats: int = Field(1, ge=1, le=MAX_VARIANTS, description="Motions of each prompt.")
+    seed: int = Field(
+        0, ge=0, le=MAX_SEED, description="Of the first motion; motion k uses seed + k: equal runs are comparable."
+    )
+    baseline: UUID | None = Field(None, description="An evaluation of the same prompts to compare with.")
+
+
+class AskedFields(EvaluationFields):
+    """What is measured, with the prompts."""
+
+    prompts: list[EvaluationPromptBody] | None = Field(None, min_length=MIN_PROMPTS, max_length=MAX_PROMPTS)
+
+
+class NewEvaluationBody(AskedFields):
+    """An evaluation as JSON."""
+
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+
+
+class EvaluationJobView(View):
+    """A job of an evaluation."""
+
+    id: UUID
+    state: JobState
+    total: int
+    succeeded: int
+    ended: int = Field(description="Items that succeeded, failed, died or were cancelled.")
+    started: datetime | None
+    finished: datetime | None
+
+    @classmethod
+    def of(cls, job: EvaluationJob) -> EvaluationJobView:
+        """From a row."""
+        return cls(**{name: getattr(job, name) for name in cls.model_fields})
+
+
+class RequestView(View):
+    """What is measured."""
+
+    bundle: str = Field(description="Exact since its motions were asked for; in a schedule, the name that was given.")
+    model: str | None
+    evaluator: str | None
+    source: str = Field(description=f"`{TEST_SPLIT}`, or what its prompts are called.")
+    settings: dict[str, float]
+    repeats: int
+    seed: int
+    baseline: UUID | None
+
+    @classmethod
+    def of(cls, request: EvaluationRequest) -> RequestView:
+        """From a row."""
+        values = {name: getattr(request, name) for name in cls.model_fields}
+        return cls(**{**values, "settings": dict(request.settings)})
+
+
+class EvaluationView(View):
+    """An evaluation."""
+
+    id: UUID
+    schedule: UUID | None
+    due: datetime | None = Field(description="The time of its schedule that it stands for; null = it was asked for.")
+    name: str | None
+    comment: str | None
+    state: EvaluationState
+    reason: str = Field(description="Why it came to this state.")
+    request: RequestView
+    prompts: int | None = Field(description="How many; null while they were not looked up.")
+    prompts_sha256: str | None
+    generation: EvaluationJobView | None
+    scoring: EvaluationJobView | None
+    summary: dict[str, float | None] | None
+    regressed: bool | None = Field(description="Worse than what it was compared with; null = nothing to compare with.")
+    reports: list[FileView] = Field(description="`GET /v1/evaluations/{id}/report/{format}` gives each.")
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+
+    @classmethod
+    def of(cls, row: EvaluationRow) -> EvaluationView:
+        """From a row."""
+        return cls(**_fields(row))
+
+
+class EvaluationEventView(View):
+    """A change of state."""
+
+    state: EvaluationState
+    reason: str
+    at: datetime
+
+
+class EvaluationDetailView(EvaluationView):
+    """An evaluation with its history."""
+
+    events: list[EvaluationEventView]
+
+    @classmethod
+    def detail(cls, row: EvaluationRow, events: Sequence[EvaluationEvent]) -> EvaluationDetailView:
+        """From a row and its events."""
+        told = [EvaluationEventView(state=event.state, reason=event.reason, at=event.at) for event in events]
+        return cls(events=told, **_fields(row))
+
+
+def _fields(row: EvaluationRow) -> dict[str, Any]:
+    apart = {"request", "prompts", "prompts_sha256", "generation", "scoring", "reports", "summary"}
+    own = {name: getattr(row, name) for name in EvaluationView.model_fields if name not in apart}
+    return {
+        **own,
+        "request": RequestView.of(row.request),
+        "prompts": row.prompt_count,
+        "prompts_sha256": row.prompts,
+        "generation": None if row.generation is None else EvaluationJobView.of(row.generation),
+        "scoring": None if row.scoring is None else EvaluationJobView.of(row.scoring),
+        "reports": [
+            FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.reports
+        ],
+        "summary": None if row.summary is None else dict(row.summary),
+    }

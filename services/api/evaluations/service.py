@@ -1,0 +1,123 @@
+"""What a request for an evaluation means, checked before anything is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+
+from services.api.context import Context
+from services.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
+from services.api.jobs.service import Fields, read_fields, read_object
+from shared import jobs
+from shared.errors import InvalidInput, NotFound
+from shared.evaluating import Plan, plan_evaluation
+from shared.evaluation_prompts import EvaluationPrompt, read_prompts
+from shared.items import CHECKS, InvalidItems, Problem
+from shared.settings import Settings
+
+OWN_PROMPTS = "prompts"
+"""What prompts are called that came without a name."""
+HINT = 'Write {"bundle": "hgm3", "split": "test"}, or "prompts": [{"prompt": "…"}] in place of the split.'
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be measured, as it was asked for."""
+
+    request: jobs.EvaluationRequest
+    prompts: tuple[EvaluationPrompt, ...] | None
+    """None = those of the evaluator's bundle."""
+
+    def planned(self, config: Settings) -> Plan:
+        """What would run now.
+
+        Raises:
+            InvalidItems, InvalidInput, InvalidBundle, Refused: it cannot.
+        """
+        try:
+            return plan_evaluation(self.request, self.prompts, config)
+        except NotFound as error:  # what is not found is not at this path
+            raise InvalidInput(error.message, where=error.where or "bundle", hint=error.hint) from error
+
+
+def read_asked(model: type[Fields], document: Mapping[str, Any]) -> tuple[Fields, Asked]:
+    """The fields of a body, which are those of an evaluation and more, and what they ask for.
+
+    Raises:
+        InvalidItems: with the problems of all fields, or of all prompts.
+        InvalidInput: neither a split nor prompts, or both.
+    """
+    values = dict(document)
+    raws = values.pop("prompts", None)
+    fields = read_fields(model, values)
+    assert isinstance(fields, EvaluationFields)
+    return fields, _asked(fields, raws)
+
+
+def create(shared: Context, key: jobs.ApiKey, body: bytes) -> EvaluationDetailView:
+    """Plan an evaluation.
+
+    Raises:
+        InvalidItems, InvalidInput, InvalidBundle, Refused: see `read_asked` and `Asked.planned`.
+    """
+    fields, asked = read_asked(NewEvaluationBody, read_object(body, hint=HINT))
+    plan = asked.planned(shared.config)
+    with jobs.transaction(shared.engine) as conn:
+        sha256 = stored(conn, key.tenant, plan)
+        new = jobs.NewEvaluation(key.tenant, plan.request, sha256, name=fields.name, comment=fields.comment)
+        made = jobs.create_evaluation(conn, new)
+        assert made is not None  # only one of a schedule can be there already
+        return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
+
+
+def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
+    """Keep the prompts of a plan; their digest. The baseline is looked at, too.
+
+    Raises:
+        InvalidInput: it cannot be compared with that baseline.
+    """
+    sha256 = jobs.store_prompts(conn, tenant, plan.prompts)
+    jobs.check_baseline(conn, tenant, plan.request, sha256)
+    return sha256
+
+
+def detail(conn: sa.Connection, row: jobs.EvaluationRow) -> EvaluationDetailView:
+    """An evaluation with its history."""
+    return EvaluationDetailView.detail(row, jobs.evaluation_events(conn, row.id))
+
+
+def _asked(fields: EvaluationFields, raws: object) -> Asked:
+    if (raws is None) == (fields.split is None):
+        what = "both are given" if raws is not None else "neither is given"
+        raise InvalidInput(f"an evaluation has a split or prompts, and {what}", where="split, prompts", hint=HINT)
+    prompts = None
+    if raws is not None:
+        if not isinstance(raws, list):
+            raise InvalidInput("is not a list", where="prompts", hint=HINT)
+        prompts = read_prompts(enumerate(raws, 1), where="prompts")
+    source = jobs.TEST_SPLIT if prompts is None else fields.source or OWN_PROMPTS
+    if prompts is not None and source == jobs.TEST_SPLIT:
+        raise InvalidInput(f"{source!r} is what the evaluator's own prompts are called", where="source")
+    request = jobs.EvaluationRequest(
+        bundle=fields.bundle,
+        evaluator=fields.evaluator,
+        source=source,
+        settings=_settings(fields.settings),
+        repeats=fields.repeats,
+        seed=fields.seed,
+        baseline=fields.baseline,
+    )
+    return Asked(request, prompts)
+
+
+def _settings(given: Mapping[str, Any] | None) -> Any:
+    """Settings, checked as those of an item."""
+    if given is None:
+        return {}
+    try:
+        return CHECKS["settings"](given)
+    except InvalidInput as error:
+        raise InvalidItems([Problem(None, "settings", error.message)]) from error

@@ -1,0 +1,88 @@
+"""Stored files over HTTP: sent from a folder, with ranges, or where a signed URL leads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any
+from uuid import UUID
+
+from fastapi import Depends, Header, Response
+from fastapi.responses import RedirectResponse, StreamingResponse
+
+from services.api.context import Context
+from services.api.ranges import ByteRange, parse_range
+from services.api.schemas import View
+from shared.jobs import asset_key
+from shared.storage import AssetStore, Opened
+
+FILE_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
+    206: {"description": "The range asked for"},
+    304: {"description": "The client has it"},
+    307: {"description": "At a URL signed for 15 minutes"},
+    416: {"description": "The range begins past the end"},
+}
+
+
+class FileView(View):
+    """One stored file."""
+
+    format: str
+    sha256: str
+    size: int
+    media_type: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """How much of a file a request wants."""
+
+    byte_range: Annotated[str | None, Header(alias="Range")] = None
+    if_range: Annotated[str | None, Header(alias="If-Range")] = None
+    if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None
+
+
+AskedPart = Annotated[Part, Depends()]
+
+
+def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, part: Part) -> Response:
+    """The answer to a request for a file of `owner`; its ETag is its sha256."""
+    etag = f'"{file.sha256}"'
+    if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
+        return Response(status_code=304, headers={"ETag": etag})
+    object_key = asset_key(tenant, file.sha256)
+    filename = f"{owner}.{file.format}"
+    url = shared.store.presign(object_key, filename=filename, media_type=file.media_type)
+    if url is not None:
+        return RedirectResponse(url, status_code=307)
+    wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)
+    headers = {
+        "ETag": etag,
+        "Accept-Ranges": "bytes",
+        "Cache-Control": "private, immutable, max-age=86400",
+        "Content-Disposition": f'attachment; filename="{filename}"',
+    }
+    return _content(shared.store, object_key, file, wanted, headers)
+
+
+def _content(
+    store: AssetStore, key: str, file: FileView, wanted: ByteRange | None, headers: dict[str, str]
+) -> Response:
+    if wanted is None:
+        opened: Opened = store.open(key)
+        headers["Content-Length"] = str(opened.size)
+        return StreamingResponse(_read(opened), headers=headers, media_type=file.media_type)
+    if wanted.start >= file.size:
+        return Response(status_code=416, headers={"Content-Range": f"bytes */{file.size}"})
+    opened = store.open(key, wanted.start, wanted.length)
+    headers["Content-Length"] = str(wanted.length)
+    headers["Content-Range"] = f"bytes {wanted.start}-{wanted.start + wanted.length - 1}/{file.size}"
+    return StreamingResponse(_read(opened), status_code=206, headers=headers, media_type=file.media_type)
+
+
+def _read(opened: Opened) -> Iterator[bytes]:
+    try:
+        yield from opened.chunks
+    finally:
+        opened.close()

@@ -1,0 +1,1 @@
+"""Schedules: evaluations that come again."""

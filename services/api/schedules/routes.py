@@ -1,0 +1,79 @@
+"""`/v1/schedules`."""
+
+from __future__ import annotations
+
+from uuid import UUID
+
+from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from services.api.auth import Operator, Reader, Submitter
+from services.api.context import Connection, Shared
+from services.api.evaluations.routes import body_of
+from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView
+from services.api.evaluations.service import detail
+from services.api.guards import limit_of_submit, read_body
+from services.api.problems import RESPONSES
+from services.api.schedules import service
+from services.api.schedules.schemas import NewScheduleBody, SchedulePatch, ScheduleView
+from services.api.schemas import Cursor, Limit, PageView
+from shared import jobs
+
+router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONSES)
+
+
+@router.post("", status_code=201, openapi_extra=body_of("NewScheduleBody"))
+async def create_schedule(request: Request, response: Response, shared: Shared, key: Submitter) -> ScheduleView:
+    """Plan evaluations that come again. Each run looks up the bundles by the names given here, exact or not."""
+    body = await read_body(request, limit_of_submit())
+    view = await run_in_threadpool(service.create, shared, key, body)
+    response.headers["Location"] = f"/v1/schedules/{view.id}"
+    return view
+
+
+@router.get("")
+def list_schedules(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[ScheduleView]:
+    """Schedules, newest first."""
+    page = jobs.list_schedules(conn, key.tenant, cursor=cursor, limit=limit)
+    return PageView[ScheduleView](items=[ScheduleView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{schedule}")
+def get_schedule(schedule: UUID, conn: Connection, key: Reader) -> ScheduleView:
+    """One schedule."""
+    return ScheduleView.of(jobs.get_schedule(conn, key.tenant, schedule))
+
+
+@router.patch("/{schedule}", openapi_extra=body_of("SchedulePatch"))
+async def change_schedule(schedule: UUID, request: Request, shared: Shared, key: Operator) -> ScheduleView:
+    """Change what is given. After a pause, and with new times, it is next due at its next time from now."""
+    body = await read_body(request, limit_of_submit())
+    return await run_in_threadpool(service.change, shared, key, schedule, body)
+
+
+@router.delete("/{schedule}", status_code=204)
+def delete_schedule(schedule: UUID, conn: Connection, key: Operator) -> None:
+    """Remove a schedule. Its evaluations stay, and one that runs goes on."""
+    jobs.delete_schedule(conn, key.tenant, schedule)
+
+
+@router.post("/{schedule}/run", status_code=202)
+def run_schedule(schedule: UUID, response: Response, conn: Connection, key: Submitter) -> EvaluationDetailView:
+    """Plan an evaluation now, beside its times; also while it is paused."""
+    made = jobs.run_schedule(conn, key.tenant, schedule)
+    response.headers["Location"] = f"/v1/evaluations/{made}"
+    return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
+
+
+@router.get("/{schedule}/evaluations")
+def list_runs(
+    schedule: UUID, conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50
+) -> PageView[EvaluationView]:
+    """The evaluations of a schedule, newest first."""
+    jobs.get_schedule(conn, key.tenant, schedule)
+    page = jobs.list_evaluations(conn, key.tenant, schedule=schedule, cursor=cursor, limit=limit)
+    return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
+
+
+SCHEMAS = (NewScheduleBody, SchedulePatch)
+"""Bodies that are read by hand, for the OpenAPI document."""

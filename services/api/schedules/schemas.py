@@ -1,0 +1,67 @@
+"""What the routes of schedules take and give."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from uuid import UUID
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.evaluations.schemas import PLAIN, AskedFields, RequestView
+from services.api.jobs.schemas import MAX_NAME
+from services.api.schemas import View
+from shared.jobs import EvaluationState, ScheduleRow
+
+CRON = "Minute, hour, day of the month, month, day of the week: `0 3 * * 1` is every Monday at 03:00."
+ZONE = "Of the tz database, such as `Europe/Berlin`."
+MAX_CRON, MAX_ZONE = 200, 100
+
+
+class NewScheduleBody(AskedFields):
+    """A schedule as JSON: what is measured, and when."""
+
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    cron: str = Field(min_length=1, max_length=MAX_CRON, description=CRON)
+    time_zone: str = Field("UTC", min_length=1, max_length=MAX_ZONE, description=ZONE)
+
+
+class ScheduleFields(BaseModel):
+    """Changes to the times of a schedule; what is not given stays."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    cron: str | None = Field(None, min_length=1, max_length=MAX_CRON, description=CRON)
+    time_zone: str | None = Field(None, min_length=1, max_length=MAX_ZONE, description=ZONE)
+    paused: bool | None = Field(None, description="What it misses while it is paused is not made up for.")
+
+
+class SchedulePatch(ScheduleFields):
+    """Changes to a schedule; what is not given stays."""
+
+    request: AskedFields | None = Field(None, description="What is measured, all of it.")
+
+
+class ScheduleView(View):
+    """A schedule."""
+
+    id: UUID
+    name: str | None
+    cron: str
+    time_zone: str
+    paused: bool
+    next: datetime | None = Field(description="When it is due; null while it is paused.")
+    request: RequestView
+    prompts: int | None = Field(description="How many; null = those that the evaluator's bundle then carries.")
+    prompts_sha256: str | None
+    last: UUID | None = Field(description="Its newest evaluation.")
+    last_state: EvaluationState | None
+    last_regressed: bool | None
+    created: datetime
+
+    @classmethod
+    def of(cls, row: ScheduleRow) -> ScheduleView:
+        """From a row."""
+        apart = {"request", "prompts", "prompts_sha256"}
+        own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
+        return cls(request=RequestView.of(row.request), prompts=row.prompt_count, prompts_sha256=row.prompts, **own)

@@ -1,0 +1,59 @@
+"""What a request for a schedule means. Its bundles are looked up to see that it can run; it keeps the names."""
+
+from __future__ import annotations
+
+from uuid import UUID
+
+from services.api.context import Context
+from services.api.evaluations.schemas import AskedFields
+from services.api.evaluations.service import read_asked, stored
+from services.api.jobs.service import read_fields, read_object
+from services.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
+from shared import jobs
+from shared.errors import InvalidInput
+
+HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
+
+
+def create(shared: Context, key: jobs.ApiKey, body: bytes) -> ScheduleView:
+    """A new schedule.
+
+    Raises:
+        InvalidItems, InvalidInput, InvalidBundle, Refused: of its times, or as for an evaluation that could not run.
+    """
+    fields, asked = read_asked(NewScheduleBody, read_object(body, hint=HINT))
+    plan = asked.planned(shared.config)
+    with jobs.transaction(shared.engine) as conn:
+        sha256 = stored(conn, key.tenant, plan)
+        new = jobs.NewSchedule(
+            tenant=key.tenant,
+            cron=fields.cron,
+            time_zone=fields.time_zone,
+            request=asked.request,
+            prompts=None if asked.prompts is None else sha256,
+            name=fields.name,
+        )
+        return ScheduleView.of(jobs.get_schedule(conn, key.tenant, jobs.create_schedule(conn, new)))
+
+
+def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: bytes) -> ScheduleView:
+    """Change a schedule.
+
+    Raises:
+        NotFound: there is no such schedule.
+        InvalidItems, InvalidInput, InvalidBundle, Refused: as `create`.
+    """
+    document = read_object(body, hint='Write {"paused": true}.')
+    request = document.pop("request", None)
+    if request is not None and not isinstance(request, dict):
+        raise InvalidInput("is not an object", where="request", hint=HINT)
+    fields = read_fields(ScheduleFields, document)
+    asked = None if request is None else read_asked(AskedFields, request)[1]
+    plan = None if asked is None else asked.planned(shared.config)
+    with jobs.transaction(shared.engine) as conn:
+        changed = None
+        if asked is not None and plan is not None:
+            sha256 = stored(conn, key.tenant, plan)
+            changed = (asked.request, None if asked.prompts is None else sha256)
+        change = jobs.ScheduleChange(**fields.model_dump(), request=changed)
+        return ScheduleView.of(jobs.change_schedule(conn, key.tenant, schedule, change))

@@ -1,0 +1,204 @@
+"""`marey eval …`."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import console, evaluating, options
+from services.cli.commands import schedules
+from services.cli.evaluating import Asked
+from shared.errors import InvalidInput, NotFound
+
+app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
+app.add_typer(schedules.app, name="schedule")
+
+Run = Annotated[str, typer.Argument(metavar="RUN", help="The evaluation's id.")]
+Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help="Ids of evaluations.")]
+FORMATS = ("html", "json", "md")
+COLUMNS = ("id", "name", "state", "regressed", "bundle", "source", "created")
+
+
+class State(StrEnum):
+    """States of evaluations."""
+
+    PLANNED = "planned"
+    GENERATING = "generating"
+    SCORING = "scoring"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+@app.command()
+def run(
+    bundle: evaluating.Bundle,
+    split: evaluating.Split = evaluating.TEST,
+    evaluator: evaluating.Evaluator = None,
+    settings: evaluating.Settings = None,
+    repeats: evaluating.Repeats = None,
+    seed: evaluating.Seed = None,
+    baseline: evaluating.Baseline = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for the run.")] = None,
+    comment: Annotated[str | None, typer.Option("--comment", help="A note for people.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Show progress until it is over; exit 6 if it failed.")] = False,
+    fail_on_regression: evaluating.FailOnRegression = False,
+    timeout: evaluating.Timeout = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure a model in the background; prints the run's id.
+
+    A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
+    """
+    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
+    body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
+    from services.cli.client import Client
+
+    waits = wait or fail_on_regression
+    with Client.here() as client:
+        made = client.post_once("/v1/evaluations", body)
+        if not as_json:
+            console.result(made["id"])
+        elif not waits:
+            console.result_json(made)
+        if waits:
+            _follow(client, made["id"], timeout, fail_on_regression=fail_on_regression, as_json=as_json)
+
+
+@app.command("wait")
+def wait_for(
+    run: Run,
+    fail_on_regression: evaluating.FailOnRegression = False,
+    timeout: evaluating.Timeout = None,
+    as_json: console.Json = False,
+) -> None:
+    """Wait until a run is over; exits 6 if it failed or was cancelled."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        _follow(client, run, timeout, fail_on_regression=fail_on_regression, as_json=as_json)
+
+
+@app.command("list")
+def list_runs(
+    state: Annotated[State | None, typer.Option("--state", help="Only runs in this state.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    as_json: console.Json = False,
+) -> None:
+    """List runs, newest first: their states, and which regressed."""
+    show_runs("/v1/evaluations", limit, as_json, state=state.value if state else None)
+
+
+@app.command()
+def show(run: Run, as_json: console.Json = False) -> None:
+    """Show a run: what is measured, how it stands and why, and its numbers."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.get(f"/v1/evaluations/{run}")
+    if as_json:
+        console.result_json(found)
+        return
+    for field in ("id", "name", "comment", "schedule", "due", "state", "reason"):
+        _line(field, found[field])
+    for field in ("bundle", "evaluator", "source", "repeats", "seed", "baseline"):
+        _line(field, found["request"][field])
+    _line("prompts", found["prompts"])
+    for field in ("generation", "scoring"):
+        job = found[field]
+        _line(field, job and f"{job['ended']} of {job['total']} done, {job['succeeded']} succeeded (job {job['id']})")
+    _line("regressed", None if found["regressed"] is None else "yes" if found["regressed"] else "no")
+    for metric, value in (found["summary"] or {}).items():
+        _line("metric", f"{metric} = {'not measured' if value is None else f'{value:g}'}")
+    for event in found["events"]:
+        _line(event["state"], f"{event['at']}: {event['reason']}")
+
+
+@app.command()
+def report(
+    run: Run,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="A .html, .json or .md; none given = the text is written to stdout."),
+    ] = None,
+    overwrite: options.Overwrite = False,
+) -> None:
+    """Fetch the report of a run that is done."""
+    from services.cli.client import Client
+
+    kind = "md" if output is None else output.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
+    with Client.here() as client:
+        found = client.get(f"/v1/evaluations/{run}")
+        file = next((file for file in found["reports"] if file["format"] == kind), None)
+        if file is None:
+            raise NotFound(
+                f"there is no such report: the evaluation is {found['state']}",
+                where=f"evaluation {run}",
+                hint=found["reason"],
+            )
+        url = f"/v1/evaluations/{run}/report/{kind}"
+        if output is None:
+            with client.stream(url) as response:
+                console.result(response.read().decode().rstrip("\n"))
+            return
+        from services.cli.fetching import Download, check_folder, download_all
+
+        check_folder(output.parent)
+        download = Download(url, file["sha256"], file["size"], output)
+        download_all(client, [download], overwrite=overwrite, done=lambda _: None)
+    console.result(console.home_relative(output))
+
+
+@app.command()
+def cancel(runs: Runs, as_json: console.Json = False) -> None:
+    """Cancel runs and the jobs that work for them; what was made stays."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for each in runs:
+            client.delete(f"/v1/evaluations/{each}")
+            found = client.get(f"/v1/evaluations/{each}")
+            if as_json:
+                console.result_json(found)
+            else:
+                console.say(f"{each} {found['state']}")
+
+
+def show_runs(path: str, limit: int, as_json: bool, **params: Any) -> None:
+    """The runs of a listing, newest first."""
+    from itertools import islice
+
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = list(islice(client.pages(path, limit=min(limit, 1000), **params), limit))
+    if as_json:
+        for each in found:
+            console.result_json(each)
+        return
+    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+
+
+def _cell(run: dict[str, Any], column: str) -> object:
+    if column == "regressed":
+        return {True: "regressed", False: "no", None: None}[run[column]]
+    return run["request"][column] if column in ("bundle", "source") else run[column]
+
+
+def _line(field: str, value: object) -> None:
+    if value is not None:
+        console.result(f"{field:<11} {value}")
+
+
+def _follow(client: Any, run: str, timeout: float | None, *, fail_on_regression: bool, as_json: bool) -> None:
+    found = evaluating.watch_evaluation(client, run, timeout=timeout)
+    if as_json:
+        console.result_json(found)
+    elif found["state"] == "done":
+        console.say(f"done: {found['reason']}")
+    evaluating.check_evaluation(found, fail_on_regression=fail_on_regression)

@@ -1,0 +1,145 @@
+"""`marey eval schedule …`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from services.cli import console, evaluating
+from services.cli.evaluating import Asked
+
+COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
+
+
+class Schedules(TyperGroup):
+    """A first word that is a cron line is an `add`: no command's name holds a blank, and every such line does."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the arguments name."""
+        return super().resolve_command(ctx, ["add", *args] if " " in args[0] else args)
+
+
+app = typer.Typer(
+    cls=Schedules,
+    help='Evaluations that come again: `marey eval schedule "0 3 * * 1" --bundle hgm3` is every Monday at 03:00.',
+    no_args_is_help=True,
+)
+
+Id = Annotated[str, typer.Argument(metavar="SCHEDULE", help="The schedule's id.")]
+Ids = Annotated[list[str], typer.Argument(metavar="SCHEDULE…", help="Ids of schedules.")]
+
+
+@app.command()
+def add(
+    cron: Annotated[
+        str, typer.Argument(metavar="CRON", help="Minute, hour, day of the month, month, day of the week: in quotes.")
+    ],
+    bundle: evaluating.Bundle,
+    split: evaluating.Split = evaluating.TEST,
+    evaluator: evaluating.Evaluator = None,
+    settings: evaluating.Settings = None,
+    repeats: evaluating.Repeats = None,
+    seed: evaluating.Seed = None,
+    baseline: evaluating.Baseline = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for the schedule and its runs.")] = None,
+    time_zone: Annotated[str, typer.Option("--time-zone", help="As Europe/Berlin.")] = "UTC",
+    as_json: console.Json = False,
+) -> None:
+    """Measure a model again and again; prints the schedule's id. Each run looks up the bundles by the names given."""
+    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
+    body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        made = client.post_once("/v1/schedules", body)
+    if as_json:
+        console.result_json(made)
+    else:
+        console.result(made["id"])
+        console.say(f"first at {made['next']}")
+
+
+@app.command("list")
+def list_schedules(as_json: console.Json = False) -> None:
+    """List schedules, newest first: when they are due, and how their last runs ended."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = list(client.pages("/v1/schedules", limit=1000))
+    if as_json:
+        for each in found:
+            console.result_json(each)
+        return
+    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+
+
+@app.command()
+def pause(schedules: Ids, as_json: console.Json = False) -> None:
+    """Stop schedules; runs under way go on."""
+    _change(schedules, as_json, paused=True)
+
+
+@app.command()
+def resume(schedules: Ids, as_json: console.Json = False) -> None:
+    """Go on with schedules, from their next time on; what they missed is not made up for."""
+    _change(schedules, as_json, paused=False)
+
+
+@app.command()
+def run(schedule: Id, as_json: console.Json = False) -> None:
+    """Run a schedule's evaluation now, beside its times; prints the run's id."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        made = client.post_once(f"/v1/schedules/{schedule}/run", None)
+    if as_json:
+        console.result_json(made)
+    else:
+        console.result(made["id"])
+
+
+@app.command()
+def history(
+    schedule: Id,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    as_json: console.Json = False,
+) -> None:
+    """List the runs of a schedule, newest first."""
+    from services.cli.commands.evaluate import show_runs
+
+    show_runs(f"/v1/schedules/{schedule}/evaluations", limit, as_json)
+
+
+@app.command()
+def delete(schedules: Ids, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+    """Delete schedules; their runs stay."""
+    from services.cli.client import Client
+
+    if not yes:
+        typer.confirm(f"Delete {len(schedules)} schedules?", abort=True, err=True)
+    with Client.here() as client:
+        for each in schedules:
+            client.delete(f"/v1/schedules/{each}")
+            console.say(f"{each} deleted")
+
+
+def _change(schedules: list[str], as_json: bool, **changes: object) -> None:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for each in schedules:
+            found = client.patch(f"/v1/schedules/{each}", changes)
+            if as_json:
+                console.result_json(found)
+            else:
+                console.say(f"{each} is paused" if found["paused"] else f"{each} is next due at {found['next']}")
+
+
+def _cell(schedule: dict[str, Any], column: str) -> object:
+    if column == "next" and schedule["paused"]:
+        return "paused"
+    if column == "last_regressed":
+        return {True: "regressed", False: "no", None: None}[schedule[column]]
+    return schedule["request"][column] if column in ("bundle", "source") else schedule[column]

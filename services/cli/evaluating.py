@@ -1,0 +1,158 @@
+"""Evaluations from the command line: what a request holds, and waiting until one is over."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console
+from shared.errors import InvalidInput, ItemsFailed, Regressed, TimedOut, Unreachable
+
+if TYPE_CHECKING:
+    from services.cli.client import Client
+
+OPEN = frozenset({"planned", "generating", "scoring"})
+TEST = "test"
+POLL = 1.0
+"""Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
+PATIENCE = 60.0
+"""Seconds without a reachable server after which waiting gives up."""
+
+Bundle = Annotated[str, typer.Option("--bundle", "--model", help="Model, bundle or exact bundle that generates.")]
+Evaluator = Annotated[
+    str | None, typer.Option("--evaluator", help="Bundle that measures; none given = the one that the server has.")
+]
+Split = Annotated[
+    str,
+    typer.Option("--split", metavar="test|FILE", help="The evaluator's own captions, or a CSV or JSONL file."),
+]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of sampling; may be repeated.")
+]
+Repeats = Annotated[int | None, typer.Option("--repeats", help="Motions of each prompt; none given = 1.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first motion; none given = 0.")]
+Baseline = Annotated[str | None, typer.Option("--baseline", metavar="RUN", help="An evaluation to compare with.")]
+Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
+FailOnRegression = Annotated[
+    bool, typer.Option("--fail-on-regression", help="Wait; exit 8 when it is worse than what it is compared with.")
+]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The options of a command that asks for an evaluation."""
+
+    bundle: str
+    evaluator: str | None
+    split: str
+    settings: Sequence[str] | None
+    repeats: int | None
+    seed: int | None
+    baseline: str | None
+
+    def body(self) -> dict[str, Any]:
+        """The request, with the prompts of a file.
+
+        Raises:
+            InvalidItems, InvalidFile, NotFound: of the file, with every problem of every line.
+            InvalidInput: of a setting.
+        """
+        given = {
+            "bundle": self.bundle,
+            "evaluator": self.evaluator,
+            "settings": _settings(self.settings or ()) or None,
+            "repeats": self.repeats,
+            "seed": self.seed,
+            "baseline": self.baseline,
+            **self._prompts(),
+        }
+        return {name: value for name, value in given.items() if value is not None}
+
+    def _prompts(self) -> dict[str, Any]:
+        if self.split == TEST:
+            return {"split": TEST}
+        from services.cli.rows import evaluation_prompts_from_file
+
+        prompts = evaluation_prompts_from_file(self.split)
+        source = "stdin" if self.split == "-" else Path(self.split).name
+        return {"prompts": [prompt.as_json() for prompt in prompts], "source": source}
+
+
+def watch_evaluation(
+    client: Client, evaluation: str, *, timeout: float | None = None, quiet: bool = False
+) -> dict[str, Any]:
+    """Look until an evaluation is over; how it ended.
+
+    Args:
+        timeout: seconds; None = for ever.
+        quiet: without a progress bar.
+
+    Raises:
+        TimedOut: `timeout` passed; the evaluation goes on.
+        Unreachable: the server was away for longer than `PATIENCE`.
+    """
+    deadline = None if timeout is None else time.monotonic() + timeout
+    with console.bar() as bar:
+        bar.disable = quiet
+        task = bar.add_task("", total=None)
+        reachable = time.monotonic()
+        while True:
+            try:
+                found = client.get(f"/v1/evaluations/{evaluation}")
+                reachable = time.monotonic()
+                job = found["scoring"] or found["generation"] or {"ended": 0, "total": None}
+                bar.update(task, description=_caption(found), completed=job["ended"], total=job["total"])
+                if found["state"] not in OPEN:
+                    return found
+            except Unreachable:
+                if time.monotonic() - reachable > PATIENCE:
+                    raise
+            _sleep(deadline, evaluation)
+
+
+def check_evaluation(found: dict[str, Any], *, fail_on_regression: bool) -> None:
+    """Nothing, if an evaluation that is over is done (and, where that is asked, no worse than before).
+
+    Raises:
+        ItemsFailed: it failed or was cancelled.
+        Regressed: it is worse.
+    """
+    where = f"evaluation {found['id']}"
+    if found["state"] != "done":
+        raise ItemsFailed(f"{found['state']}: {found['reason']}", where=where)
+    if fail_on_regression and found["regressed"]:
+        raise Regressed(found["reason"], where=where, hint=f"`marey eval report {found['id']}` says what is worse.")
+
+
+def _settings(given: Sequence[str]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        try:
+            if not equals:
+                raise ValueError
+            number = float(value)
+        except ValueError:
+            raise InvalidInput(f"{text!r} is not a setting", where="--set", hint="Write --set guidance=4.5") from None
+        found[name.strip()] = number
+    return found
+
+
+def _caption(found: dict[str, Any]) -> str:
+    return f"{found['name'] or found['id'][-8:]} {found['state']}"
+
+
+def _sleep(deadline: float | None, evaluation: str) -> None:
+    left = POLL if deadline is None else deadline - time.monotonic()
+    if left <= 0:
+        raise TimedOut(
+            "the time allowed has passed; the evaluation goes on",
+            where=f"evaluation {evaluation}",
+            hint=f"`marey eval wait {evaluation}` waits again.",
+        )
+    time.sleep(min(POLL, left))

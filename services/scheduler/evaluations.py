@@ -1,0 +1,170 @@
+"""Evaluations go on, and schedules begin them. Every step is a transaction of its own under the lock of one row, which
+another scheduler skips: a second one is harmless, and one that is killed leaves nothing half done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.errors import MareyError, Unreachable
+from shared.evaluating import plan_evaluation, scoring_job
+from shared.items import InvalidItems
+from shared.jobs import (
+    EvaluationJob,
+    EvaluationRow,
+    EvaluationState,
+    ItemState,
+    JobState,
+    check_baseline,
+    due_schedules,
+    fire_schedule,
+    list_items,
+    load_prompts,
+    lock_evaluation,
+    move_evaluation,
+    open_evaluations,
+    store_prompts,
+    submit,
+    transaction,
+)
+from shared.jobs.states import ENDED
+from shared.runtime.logs import logger
+from shared.settings import Settings
+
+log = logger(__name__)
+
+FAILED = (ItemState.FAILED, ItemState.DEAD)
+MAX_NOT_MADE = 0.01
+"""Share of motions that may be missing from a report: with more, its numbers are those of another set."""
+
+
+class Evaluations:
+    """What the scheduler does for evaluations, once a round."""
+
+    def __init__(self, engine: sa.Engine, config: Settings) -> None:
+        self._engine = engine
+        self._config = config
+
+    def round(self) -> None:
+        """Begin what is due, and take every open evaluation as far as it can go now.
+
+        Raises:
+            Unreachable: the database does not answer.
+        """
+        with transaction(self._engine) as conn:
+            due = due_schedules(conn)
+        for schedule in due:
+            self._alone(self._fire, schedule)
+        with transaction(self._engine) as conn:
+            waiting = open_evaluations(conn)
+        for evaluation in waiting:
+            self._alone(self._step, evaluation)
+
+    def _alone(self, act: Callable[[UUID], None], identifier: UUID) -> None:
+        """Do it; what is wrong with one holds up no other."""
+        try:
+            act(identifier)
+        except Unreachable:
+            raise
+        except Exception:
+            log.exception("evaluation_step_failed", id=str(identifier))
+
+    def _fire(self, schedule: UUID) -> None:
+        with transaction(self._engine) as conn:
+            made = fire_schedule(conn, schedule)
+        if made is not None:
+            log.info("schedule_fired", schedule=str(schedule), evaluation=str(made))
+
+    def _step(self, evaluation: UUID) -> None:
+        with transaction(self._engine) as conn:
+            row = lock_evaluation(conn, evaluation, skip_locked=True)
+            if row is None:
+                return
+            if row.state is EvaluationState.PLANNED:
+                self._begin(conn, row)
+            elif row.state is EvaluationState.GENERATING:
+                _after_generation(conn, row)
+            elif row.state is EvaluationState.SCORING:
+                _after_scoring(conn, row)
+
+    def _begin(self, conn: sa.Connection, row: EvaluationRow) -> None:
+        """planned → generating; or failed, when what it asks for is not there any more."""
+        try:
+            with conn.begin_nested():  # a submit that is refused half way leaves nothing
+                prompts = None if row.prompts is None else load_prompts(conn, row.tenant, row.prompts)
+                plan = plan_evaluation(row.request, prompts, self._config)
+                sha256 = row.prompts or store_prompts(conn, row.tenant, plan.prompts)
+                check_baseline(conn, row.tenant, plan.request, sha256)
+                job = submit(conn, plan.generation(row))
+        except MareyError as error:
+            if isinstance(error, Unreachable):
+                raise
+            _end(conn, row, EvaluationState.FAILED, f"it cannot begin: {_told(error)}")
+            return
+        move_evaluation(
+            conn,
+            row,
+            EvaluationState.GENERATING,
+            f"{job.items} motions of {plan.request.bundle} asked for",
+            request=plan.request.as_json(),
+            prompts_sha256=sha256,
+            generate_job_id=job.id,
+        )
+
+
+def _after_generation(conn: sa.Connection, row: EvaluationRow) -> None:
+    """generating → scoring, once its job has ended and made enough."""
+    job = row.generation
+    if job is None:
+        _end(conn, row, EvaluationState.FAILED, "the job that made its motions was deleted")
+    elif job.state is JobState.CANCELLED:
+        _end(conn, row, EvaluationState.CANCELLED, f"the job that made its motions was cancelled (job {job.id})")
+    elif job.state in ENDED:
+        missing = job.total - job.succeeded
+        if missing > MAX_NOT_MADE * job.total:
+            _end(conn, row, EvaluationState.FAILED, _too_few(conn, row, job, missing))
+            return
+        scoring = submit(conn, scoring_job(row))
+        reason = f"{job.succeeded} of {job.total} motions made; {row.request.evaluator} measures them"
+        move_evaluation(conn, row, EvaluationState.SCORING, reason, score_job_id=scoring.id)
+
+
+def _after_scoring(conn: sa.Connection, row: EvaluationRow) -> None:
+    """scoring → failed, when its job ended without a score; what one ends with takes the evaluation to `done`."""
+    job = row.scoring
+    if job is None:
+        _end(conn, row, EvaluationState.FAILED, "the job that measured it was deleted")
+    elif job.state is JobState.CANCELLED:
+        _end(conn, row, EvaluationState.CANCELLED, f"the job that measured it was cancelled (job {job.id})")
+    elif job.state in ENDED:
+        why = _first_problem(conn, row.tenant, job.id) or "it left no score"
+        _end(conn, row, EvaluationState.FAILED, f"it could not be measured: {why} (job {job.id})")
+
+
+def _end(conn: sa.Connection, row: EvaluationRow, state: EvaluationState, reason: str) -> None:
+    move_evaluation(conn, row, state, reason)
+    log.warning("evaluation_ended", evaluation=str(row.id), state=state, reason=reason)
+
+
+def _too_few(conn: sa.Connection, row: EvaluationRow, job: EvaluationJob, missing: int) -> str:
+    share = f"{missing} of {job.total} motions were not made, {missing / job.total:.1%} where {MAX_NOT_MADE:.0%} may be"
+    why = _first_problem(conn, row.tenant, job.id)
+    return f"{share} (job {job.id})" + (f"; the first: {why}" if why else "")
+
+
+def _told(error: MareyError) -> str:
+    """An error in a line."""
+    if isinstance(error, InvalidItems):
+        return f"{error.total} prompts cannot be made; the first: {error.problems[0]}"
+    return f"{error.message}. {error.hint}" if error.hint else error.message
+
+
+def _first_problem(conn: sa.Connection, tenant: str, job: UUID) -> str | None:
+    """Why the first item that failed did."""
+    failed = list_items(conn, tenant, job, states=FAILED, limit=1).rows
+    if not failed:
+        return None
+    problem = failed[0].problem
+    return problem.message if problem is not None else failed[0].reason

@@ -1,0 +1,293 @@
+"""Evaluations: rows that say where each stands, and why. Their work is jobs like any other.
+
+Every change of state happens under the lock of the evaluation's row, which comes before the locks of its jobs, and
+leaves an event with its reason. What makes an evaluation `done` stands in `scoring.py`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import insert
+
+from shared.errors import InvalidInput, NotFound
+from shared.evaluation_prompts import EvaluationPrompt, prompts_of, prompts_sha256
+from shared.jobs import schema
+from shared.jobs.evaluation_types import (
+    EvaluationEvent,
+    EvaluationJob,
+    EvaluationRequest,
+    EvaluationRow,
+    NewEvaluation,
+    ReportFile,
+)
+from shared.jobs.ids import new_id
+from shared.jobs.journal import CLOCK, among
+from shared.jobs.operate import cancel
+from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
+from shared.jobs.submit import check_text
+from shared.jobs.types import Page
+
+
+def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[EvaluationPrompt]) -> str:
+    """Keep prompts, once however often they are used; their digest."""
+    sha256 = prompts_sha256(prompts)
+    rows = [prompt.as_json() for prompt in prompts]
+    new = insert(schema.prompt_set).values(tenant_id=tenant, sha256=sha256, count=len(rows), prompts=rows)
+    conn.execute(new.on_conflict_do_nothing())
+    return sha256
+
+
+def load_prompts(conn: sa.Connection, tenant: str, sha256: str) -> tuple[EvaluationPrompt, ...]:
+    """The prompts of a digest.
+
+    Raises:
+        NotFound: the tenant has none of that digest.
+    """
+    table = schema.prompt_set.c
+    query = sa.select(table.prompts).where(table.tenant_id == tenant, table.sha256 == sha256)
+    rows = conn.execute(query).scalar_one_or_none()
+    if rows is None:
+        raise NotFound("there are no such prompts", where=f"prompts {sha256[:12]}")
+    return prompts_of(rows)
+
+
+def create_evaluation(conn: sa.Connection, new: NewEvaluation) -> UUID | None:
+    """Plan an evaluation; None when its schedule has one for that time already.
+
+    Raises:
+        InvalidInput: text that the database cannot hold.
+    """
+    check_text(new.name, "name")
+    check_text(new.comment, "comment")
+    identifier = new_id()
+    row = insert(schema.evaluation).values(
+        id=identifier,
+        tenant_id=new.tenant,
+        schedule_id=new.schedule,
+        due_at=new.due,
+        name=new.name,
+        comment=new.comment,
+        request=new.request.as_json(),
+        prompts_sha256=new.prompts,
+        reason=new.reason,
+    )
+    made = conn.execute(
+        row.on_conflict_do_nothing(index_elements=["schedule_id", "due_at"]).returning(schema.evaluation.c.id)
+    ).scalar_one_or_none()
+    if made is not None:
+        _note(conn, identifier, EvaluationState.PLANNED, new.reason)
+    return made
+
+
+def get_evaluation(conn: sa.Connection, tenant: str, evaluation: UUID) -> EvaluationRow:
+    """One evaluation.
+
+    Raises:
+        NotFound: the tenant has no such evaluation.
+    """
+    table = schema.evaluation.c
+    found = _read(conn, _evaluations().where(table.tenant_id == tenant, table.id == evaluation))
+    if not found:
+        raise _no_such_evaluation(evaluation)
+    return found[0]
+
+
+def list_evaluations(
+    conn: sa.Connection,
+    tenant: str,
+    *,
+    schedule: UUID | None = None,
+    states: Collection[EvaluationState] = (),
+    cursor: str | None = None,
+    limit: int = 50,
+) -> Page[EvaluationRow]:
+    """Evaluations, newest first; of a schedule, of these states, if any are given."""
+    table = schema.evaluation.c
+    query = _evaluations().where(table.tenant_id == tenant)
+    if schedule is not None:
+        query = query.where(table.schedule_id == schedule)
+    if states:
+        query = query.where(table.state.in_([str(state) for state in states]))
+    if cursor is not None:
+        query = query.where(table.id < read_cursor(cursor, UUID))
+    rows = _read(conn, query.order_by(table.id.desc()).limit(page_limit(limit) + 1))
+    return cut_page(rows, limit, lambda row: str(row.id))
+
+
+def evaluation_events(conn: sa.Connection, evaluation: UUID) -> list[EvaluationEvent]:
+    """Its changes of state, in order."""
+    table = schema.evaluation_event.c
+    query = sa.select(table.state, table.reason, table.at).where(table.evaluation_id == evaluation).order_by(table.at)
+    return [EvaluationEvent(EvaluationState(state), reason, at) for state, reason, at in conn.execute(query)]
+
+
+def check_baseline(conn: sa.Connection, tenant: str, request: EvaluationRequest, prompts: str) -> None:
+    """Nothing, if the baseline that is asked for, if any, can be compared with: done, of the same prompts, measured by
+    the same evaluator. Distances in the space of another one are other numbers.
+
+    Raises:
+        InvalidInput: it cannot.
+    """
+    if request.baseline is None:
+        return
+    try:
+        baseline = get_evaluation(conn, tenant, request.baseline)
+    except NotFound as error:
+        raise InvalidInput(error.message, where="baseline", hint=error.hint) from error
+    other = None
+    if baseline.state is not EvaluationState.DONE:
+        other = f"is {baseline.state}, not done"
+    elif baseline.prompts != prompts:
+        other = f"was made with other prompts ({baseline.request.source})"
+    elif baseline.request.evaluator != request.evaluator:
+        other = f"was measured by {baseline.request.evaluator}, not by {request.evaluator}"
+    if other is not None:
+        raise InvalidInput(f"evaluation {request.baseline} {other}", where="baseline", hint="Choose another.")
+
+
+# --- changes of state ---
+
+
+def open_evaluations(conn: sa.Connection) -> list[UUID]:
+    """Those that are not over, oldest first."""
+    table = schema.evaluation.c
+    return list(conn.execute(sa.select(table.id).where(table.finished_at.is_(None)).order_by(table.id)).scalars())
+
+
+def lock_evaluation(conn: sa.Connection, evaluation: UUID, *, skip_locked: bool = False) -> EvaluationRow | None:
+    """An evaluation, its row locked until the transaction ends; None when there is none (or, with `skip_locked`, when
+    somebody else has it)."""
+    table = schema.evaluation.c
+    lock = sa.select(table.id).where(table.id == evaluation)
+    # NO KEY: reports and events that refer to the row may be looked at by others meanwhile.
+    locked = conn.execute(lock.with_for_update(key_share=True, skip_locked=skip_locked)).one_or_none()
+    return None if locked is None else _read(conn, _evaluations().where(table.id == evaluation))[0]
+
+
+def move_evaluation(
+    conn: sa.Connection, row: EvaluationRow, state: EvaluationState, reason: str, **values: object
+) -> None:
+    """Take an evaluation under lock to another state.
+
+    Raises:
+        ValueError: it may not go there from where it is.
+    """
+    if state not in EVALUATION_TRANSITIONS[row.state]:
+        raise ValueError(f"an evaluation may not go from {row.state} to {state}")
+    times: dict[str, object] = {}
+    if state not in OPEN_EVALUATIONS:
+        times["finished_at"] = CLOCK
+    elif row.started is None:
+        times["started_at"] = CLOCK
+    table = schema.evaluation
+    changed = {"state": state, "reason": reason, **times, **values}
+    conn.execute(sa.update(table).where(table.c.id == row.id).values(changed))
+    _note(conn, row.id, state, reason)
+
+
+def cancel_evaluation(
+    conn: sa.Connection, tenant: str, evaluation: UUID, reason: str = "cancelled by operator"
+) -> EvaluationRow:
+    """Cancel an evaluation and the job that runs for it; what was made stays. Over already: no change.
+
+    Raises:
+        NotFound: the tenant has no such evaluation.
+    """
+    row = lock_evaluation(conn, evaluation)
+    if row is None or row.tenant != tenant:
+        raise _no_such_evaluation(evaluation)
+    if row.state in OPEN_EVALUATIONS:
+        for job in (row.generation, row.scoring):
+            if job is not None and job.state not in ENDED:
+                cancel(conn, tenant, job.id, f"its evaluation was cancelled: {reason}")
+        move_evaluation(conn, row, EvaluationState.CANCELLED, reason)
+    return get_evaluation(conn, tenant, evaluation)
+
+
+# --- helpers ---
+
+
+def _no_such_evaluation(evaluation: UUID) -> NotFound:
+    return NotFound(
+        "there is no such evaluation", where=f"evaluation {evaluation}", hint="`marey eval list` shows yours."
+    )
+
+
+def _note(conn: sa.Connection, evaluation: UUID, state: EvaluationState, reason: str) -> None:
+    event = {"evaluation_id": evaluation, "state": state, "reason": reason, "at": CLOCK}
+    conn.execute(sa.insert(schema.evaluation_event).values(event))
+
+
+def _evaluations() -> sa.Select[*tuple[Any, ...]]:
+    c, prompts = schema.evaluation.c, schema.prompt_set.c
+    jobs = {"generation": schema.job.alias("generation"), "scoring": schema.job.alias("scoring")}
+    return (
+        sa.select(
+            *(c.id, c.tenant_id.label("tenant"), c.schedule_id.label("schedule"), c.due_at.label("due"), c.name),
+            *(c.comment, c.request, c.prompts_sha256.label("prompts"), prompts.count.label("prompt_count")),
+            *(c.state, c.reason, c.summary, c.regressed, c.created_at.label("created")),
+            *(c.started_at.label("started"), c.finished_at.label("finished")),
+            *(
+                job.c[name].label(f"{what}_{name}")
+                for what, job in jobs.items()
+                for name in ("id", "state", "total", "succeeded", "ready", "leased", "started_at", "finished_at")
+            ),
+        )
+        .outerjoin(schema.prompt_set, (prompts.tenant_id == c.tenant_id) & (prompts.sha256 == c.prompts_sha256))
+        .outerjoin(jobs["generation"], jobs["generation"].c.id == c.generate_job_id)
+        .outerjoin(jobs["scoring"], jobs["scoring"].c.id == c.score_job_id)
+    )
+
+
+def _read(conn: sa.Connection, query: sa.Select[Any]) -> list[EvaluationRow]:
+    """Evaluations with their reports: two queries, however many."""
+    rows = conn.execute(query).mappings().all()
+    reports = _reports(conn, [row["id"] for row in rows])
+    return [_row(row, tuple(reports[row["id"]])) for row in rows]
+
+
+def _row(row: sa.RowMapping, reports: tuple[ReportFile, ...]) -> EvaluationRow:
+    values: dict[str, Any] = {name: row[name] for name in EvaluationRow.__dataclass_fields__ if name in row}
+    values.update(
+        request=EvaluationRequest.of(row["request"]),
+        state=EvaluationState(row["state"]),
+        generation=_job(row, "generation"),
+        scoring=_job(row, "scoring"),
+        reports=reports,
+    )
+    return EvaluationRow(**values)
+
+
+def _job(row: sa.RowMapping, what: str) -> EvaluationJob | None:
+    if row[f"{what}_id"] is None:
+        return None
+    total = row[f"{what}_total"]
+    return EvaluationJob(
+        id=row[f"{what}_id"],
+        state=JobState(row[f"{what}_state"]),
+        total=total,
+        succeeded=row[f"{what}_succeeded"],
+        ended=total - row[f"{what}_ready"] - row[f"{what}_leased"],
+        started=row[f"{what}_started_at"],
+        finished=row[f"{what}_finished_at"],
+    )
+
+
+def _reports(conn: sa.Connection, evaluations: Sequence[UUID]) -> dict[UUID, list[ReportFile]]:
+    report, asset = schema.evaluation_report.c, schema.asset.c
+    rows = conn.execute(
+        sa.select(report.evaluation_id, report.format, asset.sha256, asset.size, asset.media_type)
+        .join(schema.asset, asset.id == report.asset_id)
+        .where(among(report.evaluation_id, evaluations))
+        .order_by(report.format)
+    )
+    found: defaultdict[UUID, list[ReportFile]] = defaultdict(list)
+    for evaluation, *values in rows:
+        found[evaluation].append(ReportFile(*values))
+    return found

@@ -1,0 +1,80 @@
+"""What a score item is measured on: a port to the motions that an evaluation made, without database or store."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.errors import NotFound
+from shared.jobs import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem, asset_key, load_score, transaction
+from shared.storage import AssetStore
+
+
+@dataclass(frozen=True)
+class ScoreInput:
+    """An evaluation whose motions are made.
+
+    Attributes:
+        request: what was asked for, with exact bundles.
+        prompts: digest of its prompts: equal ones may be compared.
+        generation: the job that made the motions, with its times.
+        items: every motion that was asked for, in input order, repeats (`variant`) within prompt (`index`); those that
+            were not made have a `problem` and no motion.
+        history: the last 20 runs that are done, of the same model and prompts, by the same evaluator; the oldest first.
+        baseline: the run that the request names to compare with.
+    """
+
+    evaluation: UUID
+    name: str | None
+    request: EvaluationRequest
+    prompts: str
+    generation: EvaluationJob
+    items: tuple[MadeItem, ...]
+    history: tuple[EarlierRun, ...]
+    baseline: EarlierRun | None
+    read: Callable[[str], bytes] = field(repr=False)
+    """Content by sha256."""
+
+    @property
+    def previous(self) -> EarlierRun | None:
+        """The last of `history`."""
+        return self.history[-1] if self.history else None
+
+    def npz(self, item: MadeItem) -> bytes:
+        """The npz of an item's motion, read now; safe to call from several threads.
+
+        Raises:
+            NotFound: it has none, or the store has lost it.
+            Unreachable: the store does not answer; let it through, and the item is given back.
+        """
+        if item.npz is None:
+            raise NotFound("there is no motion", where=f"prompt {item.index}, repeat {item.variant}")
+        return self.read(item.npz.sha256)
+
+
+def score_input(engine: sa.Engine, store: AssetStore, job: UUID) -> ScoreInput:
+    """What the score item of this job is measured on.
+
+    Raises:
+        NotFound, Conflict: as `load_score`.
+        Unreachable: the database does not answer.
+    """
+    with transaction(engine) as conn:
+        rows = load_score(conn, job)
+    evaluation = rows.evaluation
+    assert evaluation.prompts is not None  # `load_score` looks
+    assert evaluation.generation is not None
+    return ScoreInput(
+        evaluation=evaluation.id,
+        name=evaluation.name,
+        request=evaluation.request,
+        prompts=evaluation.prompts,
+        generation=evaluation.generation,
+        items=rows.items,
+        history=rows.history,
+        baseline=rows.baseline,
+        read=lambda sha256: store.get(asset_key(evaluation.tenant, sha256)),
+    )

@@ -1,0 +1,88 @@
+"""An evaluation as a studio runs it: command line, server, queue, generator, evaluator, report."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.marey import TINY, Marey, serving, tiny_models
+from tests.support.prepared import write_prepared
+
+PROMPTS = "prompt,seconds,expected\n" + "".join(f"a person walks {n} steps,1.5,walk\n" for n in range(1, 41))
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
+    """A server with a small trained evaluator beside its models."""
+    from workers.evaluator.assembly import assemble
+    from workers.evaluator.config import TINY as SMALL
+    from workers.evaluator.train import train_stage
+    from workers.training.budget import Budget
+    from workers.training.staging import TrainOptions
+
+    folder = tmp_path_factory.mktemp("judged")
+    models = tiny_models(folder / "models")
+    data, run = write_prepared(folder / "data", 240, ("walks", "runs", "waves", "bows")), folder / "run"
+    train_stage("tmr", TrainOptions(data, run, SMALL, Budget(steps=2), device="cpu", bf16=False, quiet=True))
+    assemble(data, run, models / "judge", SMALL)
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    marey = Marey(home, models)
+    with serving(marey):
+        yield marey
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="module")
+def prompts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("prompts") / "studio.csv"
+    path.write_text(PROMPTS)
+    return path
+
+
+@pytest.fixture(scope="module")
+def first(judged: Marey, prompts: Path) -> str:
+    """A run of the studio's own prompts that is done."""
+    ran = judged("eval", "run", "--bundle", TINY, "--split", prompts, "--name", "monday", "--wait").ok()
+    return ran.out.split()[0]
+
+
+def test_a_run_ends_in_a_report_in_three_formats(judged: Marey, first: str, tmp_path: Path) -> None:
+    for ending in ("html", "json", "md"):
+        judged("eval", "report", first, "-o", tmp_path / f"report.{ending}").ok()
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert (report["prompts"], report["motions"], report["failed"]) == (40, 40, 0)
+    assert report["generator"]["name"] == TINY
+    assert report["evaluator"]["name"] == "judge"
+    rows = {row["key"]: row["values"] for row in report["rows"]}
+    assert rows["exported"]["r_precision_3_of_32"]["n"] == 32
+    assert 0 <= rows["exported"]["obeyed"]["mean"] < 60  # random weights walk nowhere
+    assert rows["exported"]["fid"]["mean"] > 0
+    assert "three" in (tmp_path / "report.html").read_text().lower()
+    assert "Prompts obeyed" in (tmp_path / "report.md").read_text()
+
+
+def test_the_same_run_again_is_compared_with_the_first_and_did_not_regress(
+    judged: Marey, first: str, prompts: Path, tmp_path: Path
+) -> None:
+    again = judged("eval", "run", "--bundle", TINY, "--split", prompts, "--wait", "--fail-on-regression").ok()
+    second = again.out.split()[0]
+    judged("eval", "report", second, "-o", tmp_path / "second.json").ok()
+    report = json.loads((tmp_path / "second.json").read_text())
+    assert report["regressed"] is False
+    assert [baseline["evaluation"] for baseline in report["baselines"]] == [first]
+    assert {change["verdict"] for change in report["changes"]} == {"no difference found"}
+    assert all(change["before"] == change["after"] for change in report["changes"])  # the same seeds, the same motions
+    assert len(report["trend"]) == 2
+
+
+def test_a_file_without_prompts_is_refused_and_leaves_no_run(judged: Marey, tmp_path: Path) -> None:
+    before = judged("eval", "list", "--json").ok().lines
+    empty = tmp_path / "empty.csv"
+    empty.write_text("prompt,seconds,expected\n")
+    judged("eval", "run", "--bundle", TINY, "--split", empty).refused(2)
+    assert judged("eval", "list", "--json").ok().lines == before

@@ -1,0 +1,181 @@
+"""Evaluations for tests: bundles that are only looked at, and real handlers that do next to nothing."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from uuid import UUID
+
+import numpy as np
+import sqlalchemy as sa
+
+from services.scheduler.evaluations import Evaluations
+from shared.bundles import BundleWriter, TextSpec
+from shared.evaluation_prompts import EvaluationPrompt
+from shared.jobs import (
+    DEFAULT_TENANT,
+    EVALUATOR_QUEUE,
+    TEXT_QUEUE,
+    ClaimedItem,
+    EvaluationRequest,
+    EvaluationRow,
+    EvaluationState,
+    NewEvaluation,
+    create_evaluation,
+    get_evaluation,
+    store_prompts,
+    transaction,
+)
+from shared.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
+from shared.runtime.scoring import ScoreInput
+from shared.settings import Settings
+from tests.support import toy
+
+GENERATOR, JUDGE = "toy-starter", "judge"
+CLIPS = [
+    {"acts": ["walk"], "sides": [""], "frames": 60, "captions": ["walk", "a person walks"]},
+    {"acts": ["walk", "wave"], "sides": ["", "left"], "frames": 196, "captions": ["walk and wave"] * 2},
+    {"acts": ["guide"], "sides": ["left"], "frames": 12, "captions": ["walk ahead", "walk on", "walk as a guide"]},
+]  # fmt: skip
+PROMPTS = (EvaluationPrompt("walk", 2.0, "walk"), EvaluationPrompt("walk away"), EvaluationPrompt("walk on", 3.0))
+
+
+def write_generator(models: Path, name: str = GENERATOR, *, model: str = toy.QUEUE, weight: float = 0.0) -> None:
+    """A generator's bundle; another `weight` makes it another exact bundle."""
+    with BundleWriter(models / name, overwrite=True) as writer:
+        writer.add_part("masked", {"w": np.full(3, weight, np.float32)})
+        writer.finish(
+            name=name, version="1", kind="generator", model=model, config="tiny", fps=20.0, licence="MIT",
+            parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 10}},
+            text=TextSpec(labeller="none", encoder_sha256="0" * 64),
+        )  # fmt: skip
+
+
+def write_evaluator(
+    models: Path, name: str = JUDGE, *, clips: Sequence[dict[str, Any]] = CLIPS, weight: float = 0.0
+) -> None:
+    """An evaluator's bundle with the captions of these clips."""
+    full = [{"id": f"c{n}", "label": "x", "captured": True, **clip} for n, clip in enumerate(clips)]
+    with BundleWriter(models / name, overwrite=True) as writer:
+        writer.add_part("motion", {"w": np.full(3, weight, np.float32)})
+        writer.add_json("reference.json", {"test": full})
+        writer.finish(
+            name=name, version="1", kind="evaluator", model="toy", config="tiny", parameters={}, fps=20.0, licence="MIT"
+        )
+
+
+def models_of(home: Path) -> Settings:
+    """Settings with one generator and one evaluator."""
+    models = home / "models"
+    write_generator(models)
+    write_evaluator(models)
+    return Settings(home=home, models=models)
+
+
+class ToyTexts:
+    """Reads no prompt and says that it did."""
+
+    queue = TEXT_QUEUE
+    batch_size = 64
+
+    def load(self, bundle: str) -> None:
+        pass
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        return [batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        for item in batch.items:
+            yield TextDone(item.id, item.text_key, b"text")
+
+
+class ToyEvaluator:
+    """Counts motions and bytes.
+
+    Attributes:
+        seen: what it was given.
+        problems: raised, one a call, before it answers.
+        forget: motions that it leaves out of its count, which is worse than before.
+    """
+
+    queue = EVALUATOR_QUEUE
+    batch_size = 1
+
+    def __init__(self, *problems: Exception, seconds: float = 0.0) -> None:
+        self.seen: list[ScoreInput] = []
+        self.problems = list(problems)
+        self.seconds = seconds
+        self.forget = 0
+
+    def load(self, bundle: str) -> None:
+        pass
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        return [batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        score = batch.scoring
+        assert score is not None
+        self.seen.append(score)
+        if self.problems:
+            raise self.problems.pop(0)
+        (item,) = batch.items
+        until = time.monotonic() + self.seconds
+        while time.monotonic() < until:
+            if item.id in control.dropped():
+                return
+            control.progress(0, 1)
+            time.sleep(0.01)
+        made = [each for each in score.items if each.npz is not None]
+        read = sum(len(score.npz(each)) for each in made)
+        summary = {"made": float(len(made) - self.forget), "bytes": float(read), "fid": None}
+        before = score.baseline or score.previous
+        regressed = None if before is None else summary["made"] < (before.summary["made"] or 0)
+        files = tuple(
+            ExportedFile(name, content, media)
+            for name, content, media in (
+                ("html", f"<p>{len(made)} motions of {score.evaluation}</p>".encode(), "text/html; charset=utf-8"),
+                ("json", json.dumps(summary).encode(), "application/json"),
+                ("md", f"# {len(made)} motions of {score.evaluation}\n".encode(), "text/markdown; charset=utf-8"),
+            )
+        )
+        yield Scored(item.id, files, summary, regressed, f"{len(made)} motions measured")
+
+
+def new_evaluation(
+    engine: sa.Engine,
+    prompts: Sequence[EvaluationPrompt] | None = PROMPTS,
+    *,
+    bundle: str = GENERATOR,
+    evaluator: str | None = None,
+    repeats: int = 1,
+    baseline: UUID | None = None,
+    tenant: str = DEFAULT_TENANT,
+) -> UUID:
+    """A planned evaluation of these prompts; None = those of the evaluator's bundle."""
+    source = "test" if prompts is None else "mine"
+    request = EvaluationRequest(bundle, evaluator, source=source, repeats=repeats, seed=7, baseline=baseline)
+    with transaction(engine) as conn:
+        sha256 = None if prompts is None else store_prompts(conn, tenant, prompts)
+        made = create_evaluation(conn, NewEvaluation(tenant, request, sha256))
+    assert made is not None
+    return made
+
+
+def evaluation_row(engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
+    """The evaluation as it stands."""
+    with transaction(engine) as conn:
+        return get_evaluation(conn, DEFAULT_TENANT, evaluation)
+
+
+def state_of(engine: sa.Engine, evaluation: UUID) -> EvaluationState:
+    """Where the evaluation stands."""
+    return evaluation_row(engine, evaluation).state
+
+
+def another_scheduler(engine: sa.Engine, config: Settings) -> Evaluations:
+    """A scheduler's part that knows nothing of what one before it did."""
+    return Evaluations(engine, config)

@@ -1,0 +1,101 @@
+"""`marey eval` without a server."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from services.cli.commands import schedules
+from services.cli.evaluating import Asked, check_evaluation
+from services.cli.roles import default_roles, parse_roles
+from shared.errors import InvalidInput, ItemsFailed, Regressed
+from shared.settings import Settings
+from tests.support.evaluations import write_evaluator, write_generator
+
+
+def asked(**changes: Any) -> Asked:
+    values: dict[str, Any] = dict.fromkeys(("evaluator", "settings", "repeats", "seed", "baseline"))
+    return Asked(**{**values, "bundle": "hgm3", "split": "test", **changes})
+
+
+def ended(**changes: Any) -> dict[str, Any]:
+    return {"id": "x", "state": "done", "reason": "FID fell", "regressed": None, **changes}
+
+
+def test_only_what_was_given_is_asked_for() -> None:
+    assert asked().body() == {"bundle": "hgm3", "split": "test"}
+    assert asked(settings=["guidance=4.5", "steps = 10"], repeats=3, seed=0).body() == {
+        "bundle": "hgm3", "split": "test", "settings": {"guidance": 4.5, "steps": 10.0}, "repeats": 3, "seed": 0,
+    }  # fmt: skip
+
+
+def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:
+    (tmp_path / "studio.csv").write_text("prompt,expected\na person walks,walk\na person bows,\n")
+    assert asked(split=str(tmp_path / "studio.csv")).body() == {
+        "bundle": "hgm3",
+        "prompts": [{"prompt": "a person walks", "expected": "walk"}, {"prompt": "a person bows"}],
+        "source": "studio.csv",
+    }
+
+
+@pytest.mark.parametrize("text", ["guidance", "guidance=", "guidance=high", "=3x"])
+def test_a_setting_that_is_none_is_told(text: str) -> None:
+    with pytest.raises(InvalidInput, match="not a setting"):
+        asked(settings=[text]).body()
+
+
+def test_a_run_that_is_worse_exits_8_only_where_that_was_asked() -> None:
+    worse = ended(regressed=True)
+    check_evaluation(worse, fail_on_regression=False)
+    with pytest.raises(Regressed, match="FID fell") as caught:
+        check_evaluation(worse, fail_on_regression=True)
+    assert caught.value.exit_code == 8
+    for regressed in (False, None):
+        check_evaluation(ended(regressed=regressed), fail_on_regression=True)
+
+
+@pytest.mark.parametrize("state", ["failed", "cancelled"])
+def test_a_run_that_is_not_done_exits_6(state: str) -> None:
+    with pytest.raises(ItemsFailed, match=state) as caught:
+        check_evaluation(ended(state=state), fail_on_regression=True)
+    assert caught.value.exit_code == 6
+
+
+@pytest.fixture
+def commands(monkeypatch: pytest.MonkeyPatch) -> tuple[typer.Typer, list[list[str]]]:
+    """The real group around commands that only note what they were called with."""
+    called: list[list[str]] = []
+    app = typer.Typer(cls=schedules.Schedules)
+
+    @app.command()
+    def add(cron: str, bundle: str = typer.Option(...)) -> None:
+        called.append(["add", cron, bundle])
+
+    @app.command("list")
+    def list_() -> None:
+        called.append(["list"])
+
+    return app, called
+
+
+def test_a_cron_line_in_place_of_a_command_is_an_add(commands: tuple[typer.Typer, list[list[str]]]) -> None:
+    app, called = commands
+    runner = CliRunner()
+    assert runner.invoke(app, ["0 3 * * 1", "--bundle", "hgm3"]).exit_code == 0
+    assert runner.invoke(app, ["add", "0 3 * * 1", "--bundle", "hgm3"]).exit_code == 0
+    assert runner.invoke(app, ["list"]).exit_code == 0
+    assert called == [["add", "0 3 * * 1", "hgm3"]] * 2 + [["list"]]
+    assert runner.invoke(app, ["nonsense"]).exit_code == 2
+
+
+def test_a_server_measures_by_itself_where_it_has_a_bundle_that_does(tmp_path: Path) -> None:
+    config = Settings(home=tmp_path, models=tmp_path / "models")
+    write_generator(config.models, "hgm3-x", model="hgm3")
+    assert default_roles(config) == "hgm3+text"
+    write_evaluator(config.models)
+    assert default_roles(config) == "hgm3+text+evaluator"
+    assert parse_roles(default_roles(config)) == [("hgm3", "text", "evaluator")]

@@ -1,0 +1,102 @@
+"""Prompts of evaluations and what they expect."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shared.errors import InvalidInput, TooLarge
+from shared.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
+from shared.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
+from shared.items import InvalidItems
+from workers.training.checks.judge import Act, Side
+
+acts = st.one_of(
+    st.builds(ExpectedAct, st.sampled_from(TRAVELS), st.just(""), st.booleans()),
+    st.sampled_from([ExpectedAct("turn", side) for side in SIDED["turn"]]),
+    st.builds(ExpectedAct, st.sampled_from(["wave", "raise"]), st.sampled_from(["", *SIDED["wave"]])),
+    st.builds(ExpectedAct, st.sampled_from(["bow", "kick", "dance"])),
+)
+
+
+def test_the_acts_and_sides_are_those_that_can_be_judged() -> None:
+    assert set(ACTS) == set(get_args(Act))
+    assert {side for sides in SIDED.values() for side in sides} | {""} == set(get_args(Side))
+
+
+@given(st.lists(acts, min_size=1, max_size=4).map(tuple))
+def test_what_is_expected_is_read_back_as_it_was_written(expected: tuple[ExpectedAct, ...]) -> None:
+    assert read_expected(format_expected(expected)) == expected
+
+
+def test_capitals_and_blanks_do_not_matter() -> None:
+    assert read_expected("  Walk STRAIGHT then  wave left ") == (
+        ExpectedAct("walk", straight=True),
+        ExpectedAct("wave", "left"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "missing"),
+        ("walk then", "missing"),
+        ("then walk", "missing"),
+        ("fly", "'fly' is not an act; known are walk"),
+        ("walk, wave", "'walk,' is not an act"),
+        ("walk left", "'left' does not belong to 'walk'; it may have straight"),
+        ("walk straight straight", "'straight' does not belong"),
+        ("wave left right", "'right' does not belong to 'wave'"),
+        ("turn both", "'both' does not belong to 'turn'; it may have left or right"),
+        ("turn", "needs its side"),
+        ("bow twice", "'twice' does not belong"),
+        ("walk then walk then walk then walk then walk", "over the limit of 4"),
+    ],
+)
+def test_what_cannot_be_judged_is_refused_in_words(text: str, said: str) -> None:
+    with pytest.raises(InvalidInput, match=said):
+        read_expected(text)
+
+
+def test_every_bad_line_is_told_with_its_number() -> None:
+    raws = [
+        (2, {"prompt": "a person walks", "expected": "fly"}),
+        (3, {"prompt": "a person runs", "seed": 3}),
+        (4, {"prompt": "", "seconds": 100}),
+        (5, {"prompt": "a person waves"}),
+    ]
+    with pytest.raises(InvalidItems) as caught:
+        read_prompts(raws)
+    assert [(p.line, p.field) for p in caught.value.problems] == [
+        (2, "expected"), (3, "seed"), (4, "prompt"), (4, "seconds"),
+    ]  # fmt: skip
+    assert "known are prompt, seconds, expected" in caught.value.problems[1].message
+
+
+def test_one_prompt_is_too_few_and_ten_thousand_and_one_too_many() -> None:
+    with pytest.raises(InvalidInput, match="single prompt"):
+        read_prompts([(1, {"prompt": "a person walks"})])
+    with pytest.raises(InvalidInput, match="no prompt"):
+        read_prompts([])
+    many = [(n, {"prompt": "a person walks"}) for n in range(MAX_PROMPTS + 1)]
+    assert len(read_prompts(many[1:])) == MAX_PROMPTS
+    with pytest.raises(TooLarge, match="10001 prompts"):
+        read_prompts(many)
+
+
+def test_the_digest_is_that_of_prompts_lengths_expectations_and_order() -> None:
+    one, other = EvaluationPrompt("walk", 2.0, "walk"), EvaluationPrompt("run")
+    same = prompts_of([one.as_json(), other.as_json()])
+    assert same == (one, other)
+    assert prompts_sha256(same) == prompts_sha256([one, other])
+    different = [
+        [other, one],
+        [one],
+        [EvaluationPrompt("walk", 3.0, "walk"), other],
+        [EvaluationPrompt("walk", 2.0), other],
+        [EvaluationPrompt("walk on", 2.0, "walk"), other],
+    ]
+    assert len({prompts_sha256(prompts) for prompts in [same, *different]}) == 6

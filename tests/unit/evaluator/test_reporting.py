@@ -1,0 +1,230 @@
+"""An evaluation from its npz files to its report, by a small trained evaluator."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from uuid import uuid4
+
+import numpy as np
+import pytest
+
+from shared.bundles import Bundle
+from shared.errors import InvalidInput, NotFound
+from shared.jobs import (
+    AssetDigest,
+    EarlierRun,
+    EvaluationJob,
+    EvaluationRequest,
+    ItemState,
+    JobState,
+    MadeItem,
+    Problem,
+)
+from shared.motion.features import HUMANML3D_263
+from shared.motion.finish import finish_motion
+from shared.runtime.scoring import ScoreInput
+from tests.support.prepared import write_prepared
+from workers.evaluator.assembly import assemble
+from workers.evaluator.config import TINY
+from workers.evaluator.measuring import Measured, encoded, measure
+from workers.evaluator.reference import Reference
+from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
+from workers.evaluator.reporting import report_of, summary_of
+from workers.evaluator.scoring import OBEYED, RETRIEVED
+from workers.evaluator.tmr import TMREvaluator
+from workers.evaluator.train import train_stage
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+from workers.training.staging import TrainOptions
+
+ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
+NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
+
+
+def sha256(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
+    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("scored") / "prepared", 240, ACTS))
+
+
+@pytest.fixture(scope="module")
+def bundle(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    run = tmp_path_factory.mktemp("scored") / "run"
+    train_stage("tmr", TrainOptions(prepared.path, run, TINY, Budget(steps=3), device="cpu", bf16=False, quiet=True))
+    assemble(prepared.path, run, run / "judge", TINY)
+    return Bundle.open(run / "judge")
+
+
+@pytest.fixture(scope="module")
+def evaluator(bundle: Bundle) -> TMREvaluator:
+    return TMREvaluator.load(bundle, device="cpu")
+
+
+@pytest.fixture(scope="module")
+def real(bundle: Bundle) -> Reference:
+    return Reference.of(bundle)
+
+
+@pytest.fixture(scope="module")
+def files(prepared: PreparedData) -> list[bytes]:
+    """The real clips of the test split, as if a model had made them."""
+    clips = [clip for clip in prepared.clips if clip.split == "test"]
+    manifest = {"software": {"marey": "0.1.0"}}
+    return [finish_motion(prepared.features(c), HUMANML3D_263, manifest=manifest).to_npz() for c in clips]
+
+
+def source_of(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference, *, repeats: int = 1, **changes: object
+) -> ScoreInput:
+    """An evaluation whose motions are these files, each `repeats` times."""
+    store = {sha256(data): data for data in files}
+    items = [
+        MadeItem(
+            index=index, variant=variant, prompt=real.split("test").clips[index].captions[0], expected="walk",
+            seconds=None, seed=index * repeats + variant, state=ItemState.SUCCEEDED, problem=None, frames=60, fps=20.0,
+            elapsed=0.1, licence="MIT", npz=AssetDigest(sha256(data), len(data), "application/x-npz"),
+        )
+        for index, data in enumerate(files)
+        for variant in range(repeats)
+    ]  # fmt: skip
+    request = EvaluationRequest("hgm3-starter@96a91328572d", evaluator.name, "hgm3", repeats=repeats)
+    job = EvaluationJob(uuid4(), JobState.SUCCEEDED, len(items), len(items), len(items), NOON, NOON + timedelta(0, 80))
+    source = ScoreInput(uuid4(), "monday", request, "f" * 64, job, tuple(items), (), None, store.__getitem__)
+    return replace(source, **changes)
+
+
+def measured_of(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
+    return measure(source.items, source.npz, evaluator)
+
+
+@pytest.fixture(scope="module")
+def source(files: list[bytes], evaluator: TMREvaluator, real: Reference) -> ScoreInput:
+    return source_of(files, evaluator, real)
+
+
+@pytest.fixture(scope="module")
+def measured(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
+    return measured_of(source, evaluator)
+
+
+@pytest.fixture(scope="module")
+def report(source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference) -> Report:
+    return report_of(source, measured, evaluator, real)
+
+
+def test_features_encoded_again_are_those_that_the_joints_were_decoded_from(prepared: PreparedData) -> None:
+    features = np.array(prepared.features(prepared.clips[0]))
+    clip = finish_motion(features, HUMANML3D_263, clean=False)
+    again = encoded(HUMANML3D_263, clip)
+    assert again.shape == features.shape
+    positions = HUMANML3D_263.slices["positions"]
+    assert np.abs(again[:, positions] - features[:, positions]).max() < 0.02
+
+
+def test_motions_that_are_the_real_ones_have_no_distance_to_them(report: Report) -> None:
+    raw = report.row("raw")
+    assert raw.values["fid"].mean == pytest.approx(0, abs=1e-3)
+    assert raw.values["kid"].mean == pytest.approx(0, abs=1e-3)
+    assert raw.values[RETRIEVED].n == report.row("exported").values[RETRIEVED].n == 32
+
+
+def test_what_cannot_be_measured_is_marked_with_its_reason(report: Report) -> None:
+    assert report.row("raw").values["r_precision_1_of_100"].mean is None  # 40 clips
+    assert "100" in report.row("raw").values["r_precision_1_of_100"].note
+    assert report.row("raw").values["diversity"].mean is None  # of 100 pairs
+    assert report.row("exported").values["multimodality"].mean is None
+    assert report.row("reconstruction").values["fid"].mean is None
+    assert report.row("raw").values["fid"].too_few is (report.row("raw").values["fid"].n < 5 * 16)
+    assert report.regressed is None  # nothing to compare with
+
+
+def test_the_report_says_how_motions_came_and_what_made_them(report: Report, evaluator: TMREvaluator) -> None:
+    assert (report.prompts, report.motions, report.failed) == (40, 40, 0)
+    assert report.generator.name == "hgm3-starter"
+    assert f"{report.evaluator.name}@{report.evaluator.sha256}" == evaluator.name if report.evaluator else False
+    assert report.speed is not None
+    assert report.speed.motions_per_second == pytest.approx(0.5)
+    assert report.software == {"marey": "0.1.0"}
+    assert 0 < len(report.worst) <= 6
+    assert not {e.prompt + str(e.seed) for e in report.best} & {e.prompt + str(e.seed) for e in report.worst}
+    assert summary_of(report)[OBEYED] == report.row("exported").values[OBEYED].mean
+
+
+def test_all_three_files_are_written_and_the_numbers_can_be_read_back(report: Report) -> None:
+    assert b"<canvas" in to_html(report)
+    assert b"Prompts obeyed" in to_markdown(report)
+    assert from_json(to_json(report)).scores == report.scores
+    assert len(report.scores) == 40
+
+
+def test_the_same_evaluation_gives_the_same_numbers(
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference, report: Report
+) -> None:
+    again = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert again.rows == report.rows
+    assert again.scores == report.scores
+
+
+def test_repeats_give_an_interval_to_what_is_measured_on_joints(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference
+) -> None:
+    source = source_of(files[:34], evaluator, real, repeats=2)
+    found = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert found.repeats.regenerated == 2
+    assert found.row("exported").values["jerk"].half_width == pytest.approx(0)  # both repeats are the same motions
+    assert found.row("exported").values["jerk"].n == 34
+
+
+def test_a_run_whose_motions_stop_doing_what_they_should_has_regressed(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference, report: Report
+) -> None:
+    scores = tuple(replace(score, obeyed=1.0) for score in report.scores)
+    data = to_json(replace(report, scores=scores))
+    digest = AssetDigest(sha256(data), len(data), "application/json")
+    base = source_of(files, evaluator, real)
+    before = EarlierRun(uuid4(), "last week", base.request, summary_of(report), NOON, digest)
+    source = replace(base, history=(before,), read=lambda sha: data if sha == digest.sha256 else base.read(sha))
+    source = replace(source, items=tuple(replace(item, expected="kick") for item in source.items))
+    found = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert found.regressed is True
+    assert found.alarms[0].startswith("Prompts obeyed fell from 100.0")
+    assert [point.evaluation for point in found.trend] == [str(before.id), str(source.evaluation)]
+
+
+def test_a_motion_that_is_lost_or_broken_is_named_and_counts_in_no_number(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference
+) -> None:
+    base = source_of(files, evaluator, real)
+    bad = AssetDigest("0" * 64, 3, "application/x-npz")
+    lost = AssetDigest("1" * 64, 3, "application/x-npz")
+
+    def read(sha256: str) -> bytes:
+        if sha256 == lost.sha256:
+            raise NotFound("the store has lost it")
+        return b"PK?" if sha256 == bad.sha256 else base.read(sha256)
+
+    items = list(base.items)
+    items[3], items[7] = replace(items[3], npz=bad), replace(items[7], npz=lost)
+    problem = Problem("invalid-input", "too long", None, None)
+    items[9] = replace(items[9], npz=None, state=ItemState.FAILED, problem=problem)
+    source = replace(base, items=tuple(items), read=read)
+    found = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert (found.motions, found.failed) == (37, 3)
+    assert any("prompt 7" in note and "lost" in note for note in found.notes)
+    assert any("prompt 9" in note and "too long" in note for note in found.notes)
+    assert {score.index for score in found.scores} == set(range(40)) - {3, 7, 9}
+
+
+def test_motions_of_another_feature_layout_are_refused(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference, prepared: PreparedData
+) -> None:
+    clip = finish_motion(np.array(prepared.features(prepared.clips[0])), HUMANML3D_263)
+    narrow = replace(clip, features=clip.features[:, :251]).to_npz()
+    source = source_of([narrow, *files[1:]], evaluator, real)
+    with pytest.raises(InvalidInput, match="251 features"):
+        measured_of(source, evaluator)

@@ -1,0 +1,77 @@
+"""The work of the queue `evaluator`: one item, one evaluation, from its motions to its report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from shared.bundles import find_bundle
+from shared.errors import MareyError, NotFound, Unreachable
+from shared.jobs import EVALUATOR_QUEUE, ClaimedItem
+from shared.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Handler, Outcome, Scored
+from shared.runtime.scoring import ScoreInput
+from shared.settings import settings
+from workers.evaluator.loading import load_evaluator
+from workers.evaluator.measuring import measure
+from workers.evaluator.port import Evaluator
+from workers.evaluator.reference import Reference
+from workers.evaluator.report import headline, to_html, to_json, to_markdown
+from workers.evaluator.reporting import report_of, summary_of
+
+
+class EvaluatorHandler:
+    """Measures with one loaded evaluator."""
+
+    queue = EVALUATOR_QUEUE
+    batch_size = 1
+
+    def __init__(self, device: str) -> None:
+        """Nothing is loaded yet; `device` as in the settings."""
+        self._device = device
+        self._loaded: tuple[Evaluator, Reference] | None = None
+
+    def load(self, bundle: str) -> None:
+        """Load an evaluator with the real clips that it knows.
+
+        Raises:
+            NotFound, InvalidBundle, Refused: see `find_bundle`.
+            InvalidInput: there is no such device.
+        """
+        found = find_bundle(bundle)
+        self._loaded = load_evaluator(found, device=self._device), Reference.of(found)
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        """One item at a time."""
+        return [[item] for item in batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        """Measure the motions of one evaluation and write its report."""
+        assert self._loaded is not None  # the loop loads before it runs
+        evaluator, real = self._loaded
+        item, source = batch.items[0], batch.scoring
+        if source is None:
+            yield Failed(item.id, NotFound("this item scores no evaluation", where=f"item {item.id}"))
+            return
+        try:
+            yield _scored(item, source, evaluator, real, control)
+        except Unreachable:
+            raise
+        except MareyError as error:
+            yield Failed(item.id, error)
+
+
+def _scored(
+    item: ClaimedItem, source: ScoreInput, evaluator: Evaluator, real: Reference, control: BatchControl
+) -> Scored:
+    measured = measure(source.items, source.npz, evaluator, progress=control.progress)
+    report = report_of(source, measured, evaluator, real)
+    files = (
+        ExportedFile("html", to_html(report), "text/html; charset=utf-8"),
+        ExportedFile("json", to_json(report), "application/json"),
+        ExportedFile("md", to_markdown(report), "text/markdown; charset=utf-8"),
+    )
+    return Scored(item.id, files, summary_of(report), report.regressed, headline(report).sentence)
+
+
+def create_handler() -> Handler:
+    """The handler of this process's settings."""
+    return EvaluatorHandler(settings().device)

@@ -1,0 +1,161 @@
+"""The motions of an evaluation, each measured by itself: what the checker says, how it moves, where it is embedded.
+
+Two rows stand beside each other. `raw` are the features as the network generated them; `exported` are features encoded
+again from the joints of the npz, after rotations were solved and feet locked: what users get.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidFile, InvalidInput, NotFound
+from shared.expected import read_expected
+from shared.jobs import MadeItem
+from shared.motion.clip import MotionClip, parse_npz
+from shared.motion.features import FeatureLayout, layout
+from shared.motion.resample import resample
+from workers.evaluator.port import Embeddings, Evaluator
+from workers.training.checks.judge import Act, Expectation, Side, Verdict, judge
+from workers.training.checks.quality import Quality, quality
+
+TOGETHER = 64
+"""Motions held at a time: 10,000 of them would be 2 GB of features."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion and what was found on it; `verdict` is None where nothing is expected of it."""
+
+    item: MadeItem
+    verdict: Verdict | None
+    quality: Quality
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A motion that was made, but that nothing can be measured on."""
+
+    item: MadeItem
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """All motions of an evaluation, in input order, repeats within prompt."""
+
+    motions: tuple[Motion, ...]
+    raw: Embeddings  # (N, E)
+    exported: Embeddings  # (N, E)
+    text: Embeddings  # (N, E) of each motion's prompt
+    broken: tuple[Broken, ...]
+
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """(N,) prompt of each motion."""
+        return np.array([motion.item.index for motion in self.motions], np.int64)
+
+    @property
+    def variants(self) -> NDArray[np.int64]:
+        """(N,) repeat of each motion."""
+        return np.array([motion.item.variant for motion in self.motions], np.int64)
+
+
+def measure(
+    items: Sequence[MadeItem],
+    read: Callable[[MadeItem], bytes],
+    evaluator: Evaluator,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Measured:
+    """Measure every motion that was made.
+
+    Args:
+        items: of the generation; those without a motion are passed over.
+        read: the npz of an item.
+        evaluator: embeds motions and prompts.
+        progress: called with (motions done, motions in all).
+
+    Raises:
+        InvalidInput: the motions are of another feature layout or frame rate than the evaluator reads.
+        Unreachable: the store does not answer.
+    """
+    made = [item for item in items if item.npz is not None]
+    space = layout(evaluator.layout)
+    found: list[Motion] = []
+    broken: list[Broken] = []
+    raw, exported = [np.zeros((0, evaluator.width), np.float32)], [np.zeros((0, evaluator.width), np.float32)]
+    done = 0
+    for some in _chunks(made, TOGETHER):
+        clips: list[MotionClip] = []
+        for item in some:
+            clip = _read(item, read, evaluator, space)
+            if isinstance(clip, Broken):
+                broken.append(clip)
+                continue
+            clips.append(clip)
+            found.append(Motion(item, _verdict(item, clip), quality(clip.joints, clip.fps)))
+        raw.append(evaluator.embed_motion([clip.features for clip in clips]))
+        exported.append(evaluator.embed_motion([encoded(space, clip) for clip in clips]))
+        done += len(some)
+        progress(done, len(made))
+    return Measured(
+        tuple(found),
+        np.concatenate(raw),
+        np.concatenate(exported),
+        _texts([motion.item.prompt for motion in found], evaluator),
+        tuple(broken),
+    )
+
+
+def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
+    """Features (T, D) of a clip at the layout's rate.
+
+    An encoder needs the step behind the last frame: it goes on as the step before did.
+    """
+    joints = np.asarray(clip.joints, np.float64)
+    return space.encode(np.concatenate([joints, 2 * joints[-1:] - joints[-2:-1]]))
+
+
+def _read(
+    item: MadeItem, read: Callable[[MadeItem], bytes], evaluator: Evaluator, space: FeatureLayout
+) -> MotionClip | Broken:
+    """The clip of an item, at the evaluator's rate; `Broken` where it is lost, damaged or holds NaN."""
+    try:
+        clip = parse_npz(read(item), where=f"prompt {item.index}, repeat {item.variant}")
+    except (InvalidFile, NotFound) as error:
+        return Broken(item, error.message)
+    if clip.features.shape[1] != space.dim or clip.features_fps != space.fps:
+        raise InvalidInput(
+            f"the motions have {clip.features.shape[1]} features at {clip.features_fps:g} fps; "
+            f"{evaluator.name} reads {space.dim} at {space.fps:g} fps ({space.name})",
+            where=f"prompt {item.index}, repeat {item.variant}",
+            hint="Take an evaluator of the generator's feature layout.",
+        )
+    return clip if clip.fps == space.fps else resample(clip, space.fps)
+
+
+def _verdict(item: MadeItem, clip: MotionClip) -> Verdict | None:
+    if item.expected is None:
+        return None
+    acts = read_expected(item.expected)
+    expected = [Expectation(cast("Act", each.act), cast("Side", each.side), each.straight) for each in acts]
+    return judge(clip.joints, clip.fps, expected)
+
+
+def _texts(prompts: Sequence[str], evaluator: Evaluator) -> Embeddings:
+    """(N, E); a prompt that stands there several times is read once."""
+    distinct = list(dict.fromkeys(prompts))
+    rows = {prompt: row for row, prompt in enumerate(distinct)}
+    return evaluator.embed_text(distinct)[[rows[prompt] for prompt in prompts]]
+
+
+def _chunks(items: Iterable[MadeItem], size: int) -> Iterator[list[MadeItem]]:
+    rest = iter(items)
+    while some := list(islice(rest, size)):
+        yield some

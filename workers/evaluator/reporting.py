@@ -1,0 +1,262 @@
+"""A measured evaluation told as a `Report`: rows beside real motion, what changed, where it fails, how to repeat it."""
+
+from __future__ import annotations
+
+import statistics
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.jobs import TEST_SPLIT, EarlierRun
+from shared.motion.clip import parse_npz
+from shared.runtime.scoring import ScoreInput
+from workers.evaluator.comparing import Earlier, alarms, changes
+from workers.evaluator.measuring import Measured, Motion
+from workers.evaluator.port import Evaluator
+from workers.evaluator.reference import Reference as RealClips
+from workers.evaluator.report import (
+    Baseline,
+    Exhibit,
+    HeatCell,
+    MotionScore,
+    Reference,
+    Repeats,
+    Report,
+    Row,
+    Speed,
+    TrendPoint,
+    Value,
+    from_json,
+)
+from workers.evaluator.report.model import GROUND_TRUTH, MOST_EXHIBITS, RECONSTRUCTION, Against
+from workers.evaluator.scoring import OBEYED, REPEATS, RETRIEVED, Side, embedded, generated_rows, metrics_of, retrieved
+
+ANY = "any"
+TRENDS = (OBEYED, RETRIEVED, "fid", "kid", "skate", "jerk")
+
+
+def report_of(source: ScoreInput, measured: Measured, evaluator: Evaluator, real: RealClips) -> Report:
+    """The report of an evaluation.
+
+    Args:
+        source: what was asked for, and the runs to compare with.
+        measured: its motions.
+        evaluator: what embedded them.
+        real: the clips that the evaluator's bundle knows; their split `test` is the ground truth.
+
+    Raises:
+        InvalidInput: a run to compare with is of other prompts.
+        Unreachable: the store does not answer.
+    """
+    seed = source.request.seed
+    metrics = metrics_of(evaluator)
+    labels = _labels(source, measured, real)
+    truth = real.split(TEST_SPLIT)
+    raw, exported = generated_rows(measured, labels, truth.motion, evaluator, seed)
+    scores = _scores(measured, labels, evaluator, seed)
+    earlier = _earlier(source)
+    found = tuple(change for run in earlier for change in changes(run, scores, seed=seed))
+    why = alarms(found, {metric.key: metric for metric in metrics})
+    now = datetime.now(UTC)
+    best, worst = _exhibits(source, measured, scores)
+    return Report(
+        title=f"Evaluation {source.name or str(source.evaluation)[-8:]}",
+        evaluation=str(source.evaluation),
+        created=now,
+        generator=_bundle(source.request.bundle),
+        licence=next((motion.item.licence or "" for motion in measured.motions), ""),
+        evaluator=_bundle(evaluator.name),
+        source=Reference(source.request.source, source.prompts),
+        prompts=len({item.index for item in source.items}),
+        motions=len(measured.motions),
+        failed=len(source.items) - len(measured.motions),
+        repeats=Repeats(REPEATS, min(source.request.repeats, REPEATS)),
+        metrics=metrics,
+        rows=(_truth(real, evaluator, seed), _reconstruction(), raw, exported),
+        baselines=tuple(run.baseline for run in earlier),
+        changes=found,
+        regressed=bool(why) if earlier else None,
+        alarms=why,
+        trend=_trend(source, exported, now),
+        heat=_heat(source, measured, real),
+        ranked_by="prompts obeyed, then R-precision",
+        best=best,
+        worst=worst,
+        speed=_speed(source, measured),
+        command=_command(source),
+        settings=dict(source.request.settings) | {"seed": seed, "repeats": source.request.repeats},
+        software=_software(measured, source),
+        notes=_notes(source, measured),
+        scores=scores,
+    )
+
+
+def summary_of(report: Report) -> dict[str, float | None]:
+    """The judged row by metric: what lists and trends show."""
+    values = report.row(report.judged).values
+    return {key: value.mean for key, value in values.items()}
+
+
+def _labels(source: ScoreInput, measured: Measured, real: RealClips) -> NDArray[np.int64]:
+    """(N,) of each motion's prompt: the real clip's label, or, of own prompts, the prompt itself."""
+    if source.request.source == TEST_SPLIT:
+        return real.split(TEST_SPLIT).labels[measured.indices]
+    numbers: dict[str, int] = {}
+    return np.array([numbers.setdefault(m.item.prompt, len(numbers)) for m in measured.motions], np.int64)
+
+
+def _scores(measured: Measured, labels: NDArray[np.int64], evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
+    """What later runs are paired with."""
+    side = Side(measured.exported, measured.text, labels, measured.variants)
+    found = retrieved(side, evaluator, seed)
+    return tuple(
+        MotionScore(
+            motion.item.index,
+            motion.item.variant,
+            None if motion.verdict is None else float(motion.verdict.passed),
+            None if np.isnan(share) else round(float(share), 4),
+        )
+        for motion, share in zip(measured.motions, found, strict=True)
+    )
+
+
+def _truth(real: RealClips, evaluator: Evaluator, seed: int) -> Row:
+    """Real motion with its own captions, by the same network."""
+    split = real.split(TEST_SPLIT)
+    captions = [clip.captions[number % len(clip.captions)] for number, clip in enumerate(split.clips)]
+    side = Side(split.motion, evaluator.embed_text(captions), split.labels, np.zeros(len(captions), np.int64))
+    joints = Value.missing("the evaluator's bundle carries no joints of real clips")
+    values = embedded(side, None, evaluator, seed) | dict.fromkeys((OBEYED, "skate", "jerk"), joints)
+    return Row(GROUND_TRUTH, "Real motion", f"{len(captions)} clips of the test split with their captions", values)
+
+
+def _reconstruction() -> Row:
+    why = Value.missing("real motion is not on this server, so no tokenizer could be asked to give it back")
+    return Row(RECONSTRUCTION, "Reconstruction", "real motion through the tokenizer", {RETRIEVED: why, "fid": why})
+
+
+def _earlier(source: ScoreInput) -> tuple[Earlier, ...]:
+    """The last run and the pinned one, where their reports are still there."""
+    runs: list[tuple[Against, EarlierRun | None]] = [
+        ("last run", source.previous),
+        ("pinned baseline", source.baseline),
+    ]
+    found: list[Earlier] = []
+    for against, run in runs:
+        if run is not None and run.report is not None:
+            scores = from_json(source.read(run.report.sha256)).scores
+            found.append(Earlier(Baseline(against, str(run.id), run.request.bundle, run.finished), scores))
+    return tuple(found)
+
+
+def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...]:
+    here = {key: value.mean for key, value in row.values.items() if value.mean is not None}
+    points = [(run.finished, str(run.id), run.request.bundle, run.summary) for run in source.history]
+    points.append((now, str(source.evaluation), source.request.bundle, here))
+    return tuple(
+        TrendPoint(finished, run, bundle, {k: v for k, v in values.items() if k in TRENDS and v is not None})
+        for finished, run, bundle, values in points
+    )
+
+
+def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[HeatCell, ...]:
+    """Prompt checks by what was expected and, of the test split, by style."""
+    styles = _styles(source, real)
+    cells: dict[tuple[str, str], list[bool]] = defaultdict(list)
+    for motion in measured.motions:
+        if motion.verdict is not None and motion.item.expected is not None:
+            cells[motion.item.expected, styles(motion.item.index)].append(motion.verdict.passed)
+    return tuple(HeatCell(act, style, len(found), sum(found)) for (act, style), found in sorted(cells.items()))
+
+
+def _styles(source: ScoreInput, real: RealClips) -> Callable[[int], str]:
+    if source.request.source != TEST_SPLIT:
+        return lambda index: ANY
+    clips = real.split(TEST_SPLIT).clips
+    return lambda index: clips[index].label.rpartition(", ")[2]
+
+
+def _exhibits(
+    source: ScoreInput, measured: Measured, scores: Sequence[MotionScore]
+) -> tuple[tuple[Exhibit, ...], tuple[Exhibit, ...]]:
+    """The best and the worst motions; a prompt is shown once."""
+    order = sorted(range(len(scores)), key=lambda row: _rank(scores[row]))
+    worst = _distinct(order, measured)[:MOST_EXHIBITS]
+    shown = {measured.motions[row].item.index for row in worst}
+    rest = [row for row in order[::-1] if measured.motions[row].item.index not in shown]
+    best = _distinct(rest, measured)[:MOST_EXHIBITS]
+    one, two = (
+        tuple(_exhibit(source, measured.motions[row], _rank(scores[row])) for row in rows) for rows in (best, worst)
+    )
+    return one, two
+
+
+def _rank(score: MotionScore) -> float:
+    """Whether it does what was asked counts first; where nothing is expected, retrieval alone."""
+    return (0.0 if score.obeyed is None else score.obeyed) + 0.5 * (score.retrieved or 0.0)
+
+
+def _distinct(order: Sequence[int], measured: Measured) -> list[int]:
+    first: dict[int, int] = {}
+    for row in order:
+        first.setdefault(measured.motions[row].item.index, row)
+    return list(first.values())
+
+
+def _exhibit(source: ScoreInput, motion: Motion, score: float) -> Exhibit:
+    verdict = motion.verdict
+    return Exhibit(
+        prompt=motion.item.prompt,
+        seed=motion.item.seed,
+        passed=verdict is None or verdict.passed,
+        reason="nothing is checked" if verdict is None else verdict.reason,
+        score=round(score, 3),
+        clip=parse_npz(source.npz(motion.item)),
+    )
+
+
+def _speed(source: ScoreInput, measured: Measured) -> Speed | None:
+    """Of the whole job, waiting included: what users get."""
+    job = source.generation
+    elapsed = [motion.item.elapsed for motion in measured.motions if motion.item.elapsed is not None]
+    if job.started is None or job.finished is None or not elapsed:
+        return None
+    seconds = (job.finished - job.started).total_seconds()
+    note = "at background priority, from the first claim to the last commit"
+    return Speed(len(measured.motions) / max(seconds, 1e-3), statistics.median(elapsed), note)
+
+
+def _bundle(reference: str) -> Reference:
+    name, _, sha256 = reference.partition("@")
+    return Reference(name, sha256)
+
+
+def _command(source: ScoreInput) -> str:
+    request = source.request
+    settings = "".join(f" --set {name}={value:g}" for name, value in sorted(request.settings.items()))
+    return (
+        f"marey eval run --bundle {request.bundle} --evaluator {request.evaluator} --split {request.source} "
+        f"--repeats {request.repeats} --seed {request.seed}{settings}"
+    )
+
+
+def _software(measured: Measured, source: ScoreInput) -> Mapping[str, str]:
+    """That of the workers which generated, as their motions say; a report of several says so."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for motion in measured.motions[:: max(1, len(measured.motions) // 8)]:
+        manifest = parse_npz(source.npz(motion.item)).manifest
+        for name, version in manifest.get("software", {}).items():
+            found[name].add(str(version))
+    return {name: ", ".join(sorted(versions)) for name, versions in sorted(found.items())}
+
+
+def _notes(source: ScoreInput, measured: Measured) -> tuple[str, ...]:
+    notes = [f"Not measured: prompt {b.item.index}, repeat {b.item.variant}: {b.reason}" for b in measured.broken[:20]]
+    unmade = [item for item in source.items if item.npz is None]
+    for item in unmade[:20]:
+        why = item.problem.message if item.problem else str(item.state)
+        notes.append(f"Not generated: prompt {item.index}, repeat {item.variant}: {why}")
+    return tuple(notes)

@@ -1,0 +1,227 @@
+"""From measured motions to the rows of a report: retrieval, distances of distributions, prompt checks, quality.
+
+Repeat k of 20 takes repeat k mod R of each prompt, of R that were generated, and draws pools, pairs and subsets anew
+from the evaluation's seed: where R is 1 an interval tells what the draws do, and nothing of another generation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.errors import InvalidInput
+from workers.evaluator.measuring import Measured
+from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
+from workers.evaluator.metrics.intervals import redraw, repeated
+from workers.evaluator.metrics.retrieval import RPrecision, clip_score, matching_score, r_precision
+from workers.evaluator.port import Embeddings, Evaluator
+from workers.evaluator.report import Metric, Row, Value
+
+REPEATS = 20
+POOLS = (32, 100)
+"""T2M's pool, and SnapMoGen's."""
+TOP = (1, 2, 3)
+OBEYED, RETRIEVED = "obeyed", "r_precision_3_of_32"
+KID_SUBSETS, KID_SIZE = 50, 100
+PAIRS_OF_A_PROMPT = 10
+JOINTS = "joints, without a network"
+QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 1000.0}
+"""Numbers of `Quality`, and what makes them the unit they are printed in: per cent, m/s³, mm, mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One row's embeddings: N motions with their prompts, R repeats of each."""
+
+    motion: Embeddings  # (N, E)
+    text: Embeddings  # (N, E)
+    labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
+    variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
+
+    @property
+    def generated(self) -> int:
+        """R."""
+        return int(self.variants.max(initial=0)) + 1
+
+    def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
+        """For each of the 20 repeats the rows that it takes, and its random numbers."""
+        for number, rng in enumerate(redraw(lambda rng: rng, repeats=REPEATS, seed=seed)):
+            yield np.flatnonzero(self.variants == number % self.generated), rng
+
+    def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
+        """For each repeat its rows, and retrieval among them.
+
+        Raises:
+            InvalidInput: fewer motions than a pool.
+        """
+        return [
+            (rows, r_precision(
+                self.text[rows], self.motion[rows], pool=pool, top=TOP, distance=evaluator.distance,
+                labels=self.labels[rows], rng=rng,
+            ))
+            for rows, rng in self.repeats(seed)
+        ]  # fmt: skip
+
+
+def metrics_of(evaluator: Evaluator) -> tuple[Metric, ...]:
+    """The columns, in order."""
+    by = evaluator.name
+    nearest = "How often a motion of what the prompt asked for is among the {} nearest of {}."
+    pools = [
+        Metric(_key(pool, k), f"R-precision {k} of {pool}", "%", "higher", 1, nearest.format(k, pool), by)
+        for pool in POOLS
+        for k in TOP
+    ]
+    return (
+        Metric(OBEYED, "Prompts obeyed", "%", "higher", 1, "Motions that do what their prompt says, in order.", JOINTS),
+        *pools,
+        Metric("clip_score", "CLIP score", "", "higher", 3, "Mean cosine of prompt and motion.", by),
+        Metric("mm_dist", "MM-Dist", "", "lower", 3, "Mean Euclidean distance of prompt and motion.", by),
+        Metric("fid", "FID", "", "lower", 4, "Fréchet distance to the real motions of the test split.", by),
+        Metric("kid", "KID", "", "lower", 5, "Kernel distance to the real motions, unbiased where there are few.", by),
+        Metric("diversity", "Diversity", "", "", 3, "Mean distance of random pairs; best as the real motions'.", by),
+        Metric("multimodality", "MultiModality", "", "", 3, "Mean distance of motions of one prompt.", by),
+        Metric("skate", "Foot skate", "%", "lower", 2, "Frames with a toe on the floor that slides.", JOINTS),
+        Metric("jerk", "Jerk", "m/s³", "lower", 1, "Mean third derivative of the joints.", JOINTS),
+        Metric("bone_drift", "Bone drift", "mm", "lower", 3, "How far bones leave their median length.", JOINTS),
+        Metric("penetration", "Floor penetration", "mm", "lower", 1, "Deepest joint under the floor.", JOINTS),
+    )
+
+
+def generated_rows(
+    measured: Measured, labels: NDArray[np.int64], real: Embeddings, evaluator: Evaluator, seed: int
+) -> tuple[Row, Row]:
+    """The rows `raw` and `exported`.
+
+    Args:
+        measured: N motions.
+        labels: (N,) of each motion's prompt.
+        real: (M, E) motions to compare distributions with.
+        evaluator: whose embeddings they are.
+        seed: of the draws.
+    """
+    raw, exported = (
+        embedded(Side(motion, measured.text, labels, measured.variants), real, evaluator, seed)
+        for motion in (measured.raw, measured.exported)
+    )
+    return (
+        Row("raw", "Generated", "features as the network made them", raw),
+        Row(
+            "exported",
+            "Exported",
+            "as users get them: feet locked, rotations solved",
+            exported | {"multimodality": several(measured, seed)} | on_joints(measured),
+        ),
+    )
+
+
+def embedded(side: Side, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
+    """All values that come from embeddings; `real` (M, E) None leaves distances to real motions out."""
+    found: dict[str, Value] = {}
+    for pool in POOLS:
+        found |= _retrieval(side, evaluator, pool, seed)
+    pairs = {"clip_score": clip_score, "mm_dist": matching_score}
+    for name, metric in pairs.items():
+        found[name] = _drawn(side, seed, lambda rows, rng, metric=metric: metric(side.text[rows], side.motion[rows]))
+    found["diversity"] = _drawn(side, seed, lambda rows, rng: diversity(side.motion[rows], rng=rng))
+    if real is not None:
+        found |= _distances(side, real, seed)
+    return found
+
+
+def several(measured: Measured, seed: int) -> Value:
+    """MultiModality of the exported motions: prompts whose repeats were all made, against each other."""
+    repeats = int(measured.variants.max(initial=0)) + 1
+    if repeats <= PAIRS_OF_A_PROMPT:
+        return Value.missing(f"needs more than {PAIRS_OF_A_PROMPT} motions of each prompt, there are {repeats}")
+    _, counts = np.unique(measured.indices, return_counts=True)
+    whole = measured.exported[np.repeat(counts == repeats, counts)].reshape(-1, repeats, measured.exported.shape[1])
+    if not len(whole):
+        return Value.missing("no prompt has all of its motions")
+    drawn = redraw(lambda rng: multimodality(whole, pairs=PAIRS_OF_A_PROMPT, rng=rng), repeats=REPEATS, seed=seed)
+    return _interval(drawn, len(whole) * repeats)
+
+
+def on_joints(measured: Measured) -> dict[str, Value]:
+    """All values that come from joints alone; their intervals are over the repeats that were generated."""
+    verdicts = [motion.verdict for motion in measured.motions]
+    checked = np.array([verdict is not None for verdict in verdicts], bool)
+    passed = np.array([100.0 * (verdict is not None and verdict.passed) for verdict in verdicts])
+    found = {OBEYED: _over_repeats(measured, passed, checked, "no prompt says what is expected of its motion")}
+    for name, factor in QUALITY.items():
+        numbers = np.array([factor * getattr(motion.quality, name) for motion in measured.motions])
+        found[name] = _over_repeats(measured, numbers, np.ones(len(numbers), bool), "there is no motion")
+    return found
+
+
+def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
+    """(N,) share of the draws in which each motion was among the three nearest of its pool of 32; NaN = never drawn.
+
+    Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
+
+    Raises:
+        InvalidInput: fewer motions than a pool.
+    """
+    hits, drawn = np.zeros(len(side.motion)), np.zeros(len(side.motion))
+    for rows, found in side.pools(evaluator, POOLS[0], seed):
+        hits[rows[found.clips]] += found.hits[:, TOP.index(3)]
+        drawn[rows[found.clips]] += 1
+    return np.divide(hits, drawn, out=np.full(len(hits), np.nan), where=drawn > 0)
+
+
+def _retrieval(side: Side, evaluator: Evaluator, pool: int, seed: int) -> dict[str, Value]:
+    try:
+        found = [result for _, result in side.pools(evaluator, pool, seed)]
+    except InvalidInput as error:
+        return {_key(pool, k): Value.missing(error.message) for k in TOP}
+    count = min(len(result.clips) for result in found)
+    return {_key(pool, k): _interval([100 * result.at(k) for result in found], count) for k in TOP}
+
+
+def _distances(side: Side, real: Embeddings, seed: int) -> dict[str, Value]:
+    """FID once a generated repeat, for it draws nothing; KID by subsets."""
+    statistics, sizes = GaussianStatistics.of(real, name="real"), np.bincount(side.variants, minlength=1)
+    size = min(KID_SIZE, len(real), int(sizes.min()))
+    try:
+        rows = [np.flatnonzero(side.variants == number) for number in range(side.generated)]
+        frechet = [fid(statistics, side.motion[some]).value for some in rows]
+    except InvalidInput as error:
+        return {name: Value.missing(error.message) for name in ("fid", "kid")}
+    return {
+        "fid": _interval(frechet, min(len(real), int(sizes.min())), dimensions=real.shape[1]),
+        "kid": _drawn(
+            side,
+            seed,
+            lambda rows, rng: kid(real, side.motion[rows], subsets=KID_SUBSETS, subset_size=size, rng=rng).mean,
+        ),
+    }
+
+
+def _drawn(side: Side, seed: int, metric: Callable[[NDArray[np.int64], np.random.Generator], float]) -> Value:
+    try:
+        found = [metric(rows, rng) for rows, rng in side.repeats(seed)]
+    except InvalidInput as error:
+        return Value.missing(error.message)
+    return _interval(found, int(np.bincount(side.variants).min()))
+
+
+def _over_repeats(measured: Measured, numbers: NDArray[np.float64], which: NDArray[np.bool_], why: str) -> Value:
+    """Mean of `numbers` (N,) where `which` (N,), in each repeat that was generated."""
+    kinds = [which & (measured.variants == k) for k in range(int(measured.variants.max(initial=0)) + 1)]
+    if not all(kind.any() for kind in kinds):
+        return Value.missing(why)
+    return _interval([float(numbers[kind].mean()) for kind in kinds], int(min(kind.sum() for kind in kinds)))
+
+
+def _interval(found: Sequence[float], count: int, *, dimensions: int | None = None) -> Value:
+    if len(found) < 2:
+        return Value(found[0], None, count, dimensions=dimensions)
+    interval = repeated(found)
+    return Value(interval.mean, interval.half_width, count, dimensions=dimensions)
+
+
+def _key(pool: int, k: int) -> str:
+    return f"r_precision_{k}_of_{pool}"
