@@ -113,14 +113,16 @@ PAPER = MOGOConfig()
 
 STARTER = MOGOConfig(
     name="starter",
+    corruption=1.0,  # with .5 a frame tells so much of the next that prompts are hardly read
     first_level=5.0,  # it decides what is done; the others how exactly
     # 220,000 training frames cannot fill 6 x 8192 codes
     tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, noise=0.3),
     transformer=TransformerConfig(
-        layers=4, heads=4, width=256, feedforward=512, dropout=0.0, level_gain=True, joint=True
+        layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384, share=0.25),
+    inference=InferenceConfig(temperature=0.8, guidance=4.0),  # by validation captions
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),
