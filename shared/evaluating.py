@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from shared.bundles import choose_bundle, choose_evaluator
+from shared.bundles import Bundle, choose_bundle, choose_evaluator
 from shared.bundles.reference import reference_prompts
 from shared.errors import InvalidInput
 from shared.evaluation_prompts import EvaluationPrompt
@@ -79,6 +79,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
     offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
     if prompts is None:
         prompts = reference_prompts(evaluator, TEST_SPLIT)
+    _check_skeleton(offer.bundle, evaluator)
     offer.check_settings(request.settings)
     if request.source != TEST_SPLIT:
         _check_seconds(prompts, offer)
@@ -113,6 +114,17 @@ def scoring_job(row: EvaluationRow) -> NewJob:
         comment=f"score of evaluation {row.id}",
         priority=BACKGROUND,
     )
+
+
+def _check_skeleton(generator: Bundle, evaluator: Bundle) -> None:
+    """Better said now than when thousands of motions were made."""
+    made, measured = generator.manifest.skeleton, evaluator.manifest.skeleton
+    if made is not None and measured is not None and made != measured:
+        raise InvalidInput(
+            f"{evaluator.manifest.name} measures motions of the skeleton {measured}, not of {made}",
+            where="evaluator",
+            hint="Choose an evaluator of the generator's skeleton.",
+        )
 
 
 def _check_seconds(prompts: tuple[EvaluationPrompt, ...], offer: Offer) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,15 +44,13 @@ def read_prompts(
         InvalidInput: fewer than `MIN_PROMPTS`.
         TooLarge: more than `MAX_PROMPTS`.
     """
-    prompts = tuple(collect(raws, _read, where=where))
+    prompts = tuple(collect(_counted(raws, where), _read, where=where))
     if len(prompts) < MIN_PROMPTS:
         raise InvalidInput(
             "there is a single prompt in it, and nothing can be measured over one",
             where=where,
             hint=f"Give at least {MIN_PROMPTS}; a few hundred give numbers that mean something.",
         )
-    if len(prompts) > MAX_PROMPTS:
-        raise TooLarge(f"{len(prompts)} prompts are over the limit of {MAX_PROMPTS} an evaluation", where=where)
     return prompts
 
 
@@ -65,6 +63,14 @@ def prompts_sha256(prompts: Sequence[EvaluationPrompt]) -> str:
     """One digest for prompts, lengths, expectations and their order: equal ones may be compared."""
     rows = json.dumps([prompt.as_json() for prompt in prompts], ensure_ascii=False, sort_keys=True)
     return hashlib.sha256(rows.encode()).hexdigest()
+
+
+def _counted(raws: Iterable[tuple[int | None, object]], where: str | None) -> Iterator[tuple[int | None, object]]:
+    """What is far too long is not looked at to its end."""
+    for number, row in enumerate(raws):
+        if number == MAX_PROMPTS:
+            raise TooLarge(f"more than {MAX_PROMPTS:,} prompts, the limit of an evaluation", where=where)
+        yield row
 
 
 def _read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[Problem]]:

@@ -9,11 +9,11 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import NotFound
+from shared.errors import InvalidInput, NotFound
 from shared.jobs import schema
 from shared.jobs.cron import check_cron, check_zone, last_time, next_time
 from shared.jobs.evaluation_types import EvaluationRequest, NewEvaluation, NewSchedule, ScheduleChange, ScheduleRow
-from shared.jobs.evaluations import create_evaluation
+from shared.jobs.evaluations import create_evaluation, lock_evaluation, move_evaluation
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK
 from shared.jobs.pages import cut_page, page_limit, read_cursor
@@ -83,14 +83,14 @@ def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: Sc
     """
     check_text(change.name, "name")
     row = _locked(conn, tenant, schedule)
-    cron = row.cron if change.cron is None else check_cron(change.cron)
-    zone = row.time_zone if change.time_zone is None else check_zone(change.time_zone)
+    times = (change.cron or row.cron, change.time_zone or row.time_zone)
     paused = row.paused if change.paused is None else change.paused
-    values: dict[str, Any] = {"cron": cron, "time_zone": zone, "paused": paused}
+    values: dict[str, Any] = {"paused": paused}
     if change.name is not None:
         values["name"] = change.name
-    if (cron, zone) != (row.cron, row.time_zone) or (row.paused and not paused):
-        values["next_at"] = next_time(cron, zone, _now(conn))
+    if times != (row.cron, row.time_zone) or (row.paused and not paused):
+        cron, zone = check_cron(times[0]), check_zone(times[1])
+        values |= {"cron": cron, "time_zone": zone, "next_at": next_time(cron, zone, _now(conn))}
     if change.request is not None:
         request, prompts = change.request
         values |= {"request": request.as_json(), "prompts_sha256": prompts}
@@ -132,10 +132,8 @@ def due_schedules(conn: sa.Connection) -> list[UUID]:
 def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
     """Plan the evaluation that a schedule is due for; None when it is not due (any more), or somebody else does it.
 
-    After an outage the newest of the missed times stands for all of them.
-
-    Raises:
-        InvalidInput: of its cron line or time zone, which this version does not know.
+    After an outage the newest of the missed times stands for all of them. A schedule whose cron line or time zone is
+    known no longer is paused, and its evaluation has failed with the reason.
     """
     table = schema.schedule
     lock = sa.select(table.c.next_at).where(table.c.id == schedule, _is_due())
@@ -145,10 +143,14 @@ def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
         return None
     row = _row(conn.execute(_schedules().where(table.c.id == schedule)).mappings().one())
     now = _now(conn)
-    zone = check_zone(row.time_zone)
-    due = last_time(row.cron, zone, now, since)
-    values = {"next_at": next_time(row.cron, zone, now)}
-    conn.execute(sa.update(table).where(table.c.id == schedule).values(values))
+    change = sa.update(table).where(table.c.id == schedule)
+    try:
+        zone = check_zone(row.time_zone)
+        due = last_time(row.cron, zone, now, since)
+        conn.execute(change.values(next_at=next_time(row.cron, zone, now)))
+    except InvalidInput as error:
+        conn.execute(change.values(paused=True))
+        return _give_up(conn, row, since, f"its schedule cannot go on, and is paused: {error.message}")
     reason = f"due at {due:%Y-%m-%d %H:%M} UTC"
     if due > since:
         reason += f"; makes up for what was missed since {since:%Y-%m-%d %H:%M}"
@@ -156,6 +158,15 @@ def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
 
 
 # --- helpers ---
+
+
+def _give_up(conn: sa.Connection, row: ScheduleRow, due: datetime, reason: str) -> UUID | None:
+    """An evaluation that has failed: what its owner finds in the history."""
+    made = create_evaluation(conn, _evaluation(row, due, "due"))
+    planned = None if made is None else lock_evaluation(conn, made)
+    if planned is not None:
+        move_evaluation(conn, planned, EvaluationState.FAILED, reason)
+    return made
 
 
 def _is_due() -> sa.ColumnElement[bool]:

@@ -214,7 +214,7 @@ def test_ten_thousand_prompts_are_taken_and_one_more_is_not(http: httpx2.Client)
     prompts = [{"prompt": f"walk {n} steps in a large circle to the left and then stop in front of the door to wave"}
                for n in range(10_001)]  # fmt: skip
     problem = refused(http.post("/v1/evaluations", json={**BODY, "prompts": prompts}), 413, "too-large")
-    assert "10001 prompts" in problem["detail"]
+    assert "more than 10,000 prompts" in problem["detail"]
     made = begin(http, prompts=prompts[1:])
     assert made["prompts"] == 10_000
     http.delete(f"/v1/evaluations/{made['id']}")

@@ -301,6 +301,17 @@ def test_lengths_that_the_bundle_cannot_make_fail_the_evaluation_before_anything
     assert "1 prompts cannot be made; the first: line 4: seconds: 30 is outside 0.8 to 9.8" in row.reason
 
 
+def test_an_evaluator_of_another_skeleton_is_refused_before_anything_is_made(
+    engine: sa.Engine, scheduler: Evaluations, config: Settings
+) -> None:
+    write_evaluator(config.models, "judge-of-hands", skeleton="hands")
+    evaluation = new_evaluation(engine, evaluator="judge-of-hands")
+    scheduler.round()
+    row = evaluation_row(engine, evaluation)
+    assert (row.state, jobs_there(engine)) == (S.FAILED, 0)
+    assert "measures motions of the skeleton hands, not of humanml3d" in row.reason
+
+
 def test_an_evaluator_that_refuses_fails_the_evaluation_with_its_message(
     engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator
 ) -> None:

@@ -331,14 +331,22 @@ def test_a_bad_line_or_zone_changes_nothing(engine: sa.Engine) -> None:
         assert len(list_schedules(conn, DEFAULT_TENANT).rows) == 1
 
 
-def test_a_zone_that_is_known_no_longer_holds_up_no_other_schedule(engine: sa.Engine, scheduler: Evaluations) -> None:
+def test_a_zone_that_is_known_no_longer_pauses_its_schedule_and_marks_the_run(
+    engine: sa.Engine, scheduler: Evaluations
+) -> None:
     lost, good = new_schedule(engine), new_schedule(engine)
     for schedule in (lost, good):
         time_passes(engine, schedule, missed=1)
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE schedule SET time_zone = 'Mars/Olympus' WHERE id = :id"), {"id": lost})
-    scheduler.round()
-    assert (len(runs(engine, lost)), len(runs(engine, good))) == (0, 1)
+    for _ in range(2):
+        scheduler.round()
+    (failed,), (run,) = runs(engine, lost), runs(engine, good)
+    assert (failed.state, "no time zone 'Mars/Olympus'" in failed.reason, run.state) == (S.FAILED, True, S.GENERATING)
+    assert schedule_row(engine, lost).paused
+    with pytest.raises(InvalidInput, match="no time zone"):
+        change(engine, lost, paused=False)
+    assert not change(engine, lost, paused=False, time_zone="UTC").paused
 
 
 def test_the_runs_of_a_deleted_schedule_stay_and_go_on(engine: sa.Engine, scheduler: Evaluations) -> None:

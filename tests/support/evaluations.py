@@ -49,13 +49,19 @@ def write_generator(models: Path, name: str = GENERATOR, *, model: str = toy.QUE
         writer.add_part("masked", {"w": np.full(3, weight, np.float32)})
         writer.finish(
             name=name, version="1", kind="generator", model=model, config="tiny", fps=20.0, licence="MIT",
+            skeleton="humanml3d",
             parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 10}},
             text=TextSpec(labeller="none", encoder_sha256="0" * 64),
         )  # fmt: skip
 
 
 def write_evaluator(
-    models: Path, name: str = JUDGE, *, clips: Sequence[dict[str, Any]] = CLIPS, weight: float = 0.0
+    models: Path,
+    name: str = JUDGE,
+    *,
+    clips: Sequence[dict[str, Any]] = CLIPS,
+    weight: float = 0.0,
+    skeleton: str = "humanml3d",
 ) -> None:
     """An evaluator's bundle with the captions of these clips."""
     full = [{"id": f"c{n}", "label": "x", "captured": True, **clip} for n, clip in enumerate(clips)]
@@ -63,7 +69,15 @@ def write_evaluator(
         writer.add_part("motion", {"w": np.full(3, weight, np.float32)})
         writer.add_json("reference.json", {"test": full})
         writer.finish(
-            name=name, version="1", kind="evaluator", model="toy", config="tiny", parameters={}, fps=20.0, licence="MIT"
+            name=name,
+            version="1",
+            kind="evaluator",
+            model="toy",
+            config="tiny",
+            parameters={},
+            fps=20.0,
+            skeleton=skeleton,
+            licence="MIT",
         )
 
 

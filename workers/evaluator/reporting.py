@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.expected import JOIN
 from shared.jobs import TEST_SPLIT, EarlierRun
 from shared.motion.clip import parse_npz
 from shared.runtime.scoring import ScoreInput
@@ -163,12 +164,14 @@ def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...
 
 
 def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[HeatCell, ...]:
-    """Prompt checks by what was expected and, of the test split, by style."""
+    """Prompt checks by what was expected and, of the test split, by style; sequences by how many acts they have."""
     styles = _styles(source, real)
     cells: dict[tuple[str, str], list[bool]] = defaultdict(list)
     for motion in measured.motions:
         if motion.verdict is not None and motion.item.expected is not None:
-            cells[motion.item.expected, styles(motion.item.index)].append(motion.verdict.passed)
+            acts = motion.item.expected.split(f" {JOIN} ")
+            what = acts[0] if len(acts) == 1 else f"{len(acts)} acts in order"
+            cells[what, styles(motion.item.index)].append(motion.verdict.passed)
     return tuple(HeatCell(act, style, len(found), sum(found)) for (act, style), found in sorted(cells.items()))
 
 

@@ -83,7 +83,7 @@ def test_one_prompt_is_too_few_and_ten_thousand_and_one_too_many() -> None:
         read_prompts([])
     many = [(n, {"prompt": "a person walks"}) for n in range(MAX_PROMPTS + 1)]
     assert len(read_prompts(many[1:])) == MAX_PROMPTS
-    with pytest.raises(TooLarge, match="10001 prompts"):
+    with pytest.raises(TooLarge, match="more than 10,000 prompts"):
         read_prompts(many)
 
 

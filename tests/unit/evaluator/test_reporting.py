@@ -155,6 +155,17 @@ def test_the_report_says_how_motions_came_and_what_made_them(report: Report, eva
     assert summary_of(report)[OBEYED] == report.row("exported").values[OBEYED].mean
 
 
+def test_sequences_stand_in_one_line_of_the_heat_map_and_single_acts_in_their_own(
+    source: ScoreInput, evaluator: TMREvaluator, real: Reference
+) -> None:
+    expected = ("walk", "walk then bow", "bow then walk", "walk then bow then run")
+    items = tuple(replace(item, expected=expected[item.index % 4]) for item in source.items)
+    mixed = replace(source, items=items)
+    heat = report_of(mixed, measured_of(mixed, evaluator), evaluator, real).heat
+    trials = {act: sum(cell.trials for cell in heat if cell.act == act) for act in {cell.act for cell in heat}}
+    assert trials == {"walk": 10, "2 acts in order": 20, "3 acts in order": 10}
+
+
 def test_all_three_files_are_written_and_the_numbers_can_be_read_back(report: Report) -> None:
     assert b"<canvas" in to_html(report)
     assert b"Prompts obeyed" in to_markdown(report)
