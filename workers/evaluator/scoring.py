@@ -158,15 +158,17 @@ def on_joints(measured: Measured) -> dict[str, Value]:
 
 
 def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
-    """(N,) share of the draws in which each motion was among the three nearest of its pool of 32; NaN = never drawn.
+    """(N,) share of the draws in which each motion was among the three nearest of its pool of 32; NaN = never drawn,
+    as all of them are where there are fewer motions than a pool.
 
     Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
-
-    Raises:
-        InvalidInput: fewer motions than a pool.
     """
     hits, drawn = np.zeros(len(side.motion)), np.zeros(len(side.motion))
-    for rows, found in side.pools(evaluator, POOLS[0], seed):
+    try:
+        pools = side.pools(evaluator, POOLS[0], seed)
+    except InvalidInput:
+        pools = []
+    for rows, found in pools:
         hits[rows[found.clips]] += found.hits[:, TOP.index(3)]
         drawn[rows[found.clips]] += 1
     return np.divide(hits, drawn, out=np.full(len(hits), np.nan), where=drawn > 0)

@@ -155,6 +155,16 @@ def test_the_report_says_how_motions_came_and_what_made_them(report: Report, eva
     assert summary_of(report)[OBEYED] == report.row("exported").values[OBEYED].mean
 
 
+def test_fewer_motions_than_a_pool_make_a_report_without_retrieval(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference
+) -> None:
+    source = source_of(files[:20], evaluator, real)
+    found = report_of(source, measured_of(source, evaluator), evaluator, real)
+    assert found.row("exported").values[RETRIEVED].mean is None
+    assert {score.retrieved for score in found.scores} == {None}
+    assert found.row("exported").values[OBEYED].n == 20
+
+
 def test_sequences_stand_in_one_line_of_the_heat_map_and_single_acts_in_their_own(
     source: ScoreInput, evaluator: TMREvaluator, real: Reference
 ) -> None:
