@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterator
 from typing import Any
 from uuid import uuid4
@@ -211,8 +212,9 @@ def test_a_body_that_makes_no_sense_is_a_problem_and_no_500(http: httpx2.Client,
 
 
 def test_ten_thousand_prompts_are_taken_and_one_more_is_not(http: httpx2.Client) -> None:
-    prompts = [{"prompt": f"walk {n} steps in a large circle to the left and then stop in front of the door to wave"}
-               for n in range(10_001)]  # fmt: skip
+    way = "in a large circle to the left, then stop in front of the door, wave with the right hand and go back"
+    prompts = [{"prompt": f"walk {n} steps {way}"} for n in range(10_001)]
+    assert len(json.dumps(prompts)) > 2**20  # more than other bodies may have
     problem = refused(http.post("/v1/evaluations", json={**BODY, "prompts": prompts}), 413, "too-large")
     assert "more than 10,000 prompts" in problem["detail"]
     made = begin(http, prompts=prompts[1:])

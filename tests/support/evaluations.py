@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -25,7 +26,9 @@ from shared.jobs import (
     EvaluationState,
     NewEvaluation,
     create_evaluation,
+    evaluation_events,
     get_evaluation,
+    schema,
     store_prompts,
     transaction,
 )
@@ -33,6 +36,7 @@ from shared.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, S
 from shared.runtime.scoring import ScoreInput
 from shared.settings import Settings
 from tests.support import toy
+from tests.support.runtime import Loop
 
 GENERATOR, JUDGE = "toy-starter", "judge"
 CLIPS = [
@@ -190,6 +194,70 @@ def state_of(engine: sa.Engine, evaluation: UUID) -> EvaluationState:
     return evaluation_row(engine, evaluation).state
 
 
-def another_scheduler(engine: sa.Engine, config: Settings) -> Evaluations:
-    """A scheduler's part that knows nothing of what one before it did."""
-    return Evaluations(engine, config)
+# --- moving on ---
+
+
+def wait(condition: Callable[[], bool], seconds: float = 120.0) -> None:
+    """Wait for something that others do."""
+    until = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < until, "not in time"
+        time.sleep(0.02)
+
+
+def work(loop: Loop) -> None:
+    """Do all there is: what a stage writes down at its end may be claimed by the next drain alone."""
+    while loop.run():
+        pass
+
+
+def bring_to(scheduler: Evaluations, loop: Loop, engine: sa.Engine, evaluation: UUID, state: EvaluationState) -> None:
+    """Take an evaluation to a state by what the scheduler and workers do."""
+    for _ in range(6):
+        if state_of(engine, evaluation) is state:
+            return
+        scheduler.round()
+        if state_of(engine, evaluation) is not state:
+            work(loop)
+    assert state_of(engine, evaluation) is state
+
+
+def finish(scheduler: Evaluations, loop: Loop, engine: sa.Engine, evaluation: UUID) -> EvaluationRow:
+    """Let everybody work until it is over."""
+    for _ in range(3):
+        scheduler.round()
+        work(loop)
+    scheduler.round()
+    return evaluation_row(engine, evaluation)
+
+
+def history(engine: sa.Engine, evaluation: UUID) -> list[str]:
+    """The states it went through."""
+    with transaction(engine) as conn:
+        return [str(event.state) for event in evaluation_events(conn, evaluation)]
+
+
+def jobs_there(engine: sa.Engine) -> int:
+    """How many jobs there are."""
+    with transaction(engine) as conn:
+        return conn.execute(sa.select(sa.func.count()).select_from(schema.job)).scalar_one()
+
+
+def at_once(*actions: Callable[[], None]) -> None:
+    """Run these in threads that begin together; none may raise."""
+    errors: list[BaseException] = []
+    barrier = threading.Barrier(len(actions))
+
+    def act(action: Callable[[], None]) -> None:
+        barrier.wait()
+        try:
+            action()
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=act, args=(action,)) for action in actions]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert errors == []

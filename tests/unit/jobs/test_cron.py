@@ -92,6 +92,11 @@ def test_after_days_of_outage_the_newest_time_stands_for_all() -> None:
     assert next_time("0 3 * * *", BERLIN, now) == datetime(2026, 11, 10, 2, tzinfo=UTC)
 
 
+def test_a_time_of_the_hour_that_came_twice_is_still_due_in_its_second_round() -> None:
+    since = datetime(2026, 10, 25, 0, 30, tzinfo=UTC)  # 02:30 summer time
+    assert last_time("30 2 * * *", BERLIN, since + timedelta(minutes=40), since) == since
+
+
 def test_a_moment_that_is_a_time_itself_is_due() -> None:
     now = datetime(2026, 11, 9, 2, tzinfo=UTC)
     assert last_time("0 3 * * *", BERLIN, now, now - timedelta(days=3)) == now

@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import subprocess
-import sys
-import threading
-import time
-from collections.abc import Callable, Iterator
-from datetime import UTC, datetime, timedelta
-from pathlib import Path
-from uuid import UUID, uuid4
+from collections.abc import Callable
+from datetime import UTC, timedelta
+from uuid import uuid4
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -23,16 +15,11 @@ from shared.errors import InvalidInput, NotFound
 from shared.jobs import (
     DEFAULT_TENANT,
     EvaluationRequest,
-    EvaluationRow,
     EvaluationState,
     NewEvaluation,
-    NewSchedule,
     ScheduleChange,
-    ScheduleRow,
-    cancel_evaluation,
     change_schedule,
     create_evaluation,
-    create_schedule,
     delete_schedule,
     due_schedules,
     fire_schedule,
@@ -41,94 +28,28 @@ from shared.jobs import (
     list_schedules,
     run_schedule,
     schema,
-    store_prompts,
     transaction,
 )
 from shared.jobs.cron import next_time
-from shared.settings import REPOSITORY, Settings
-from shared.storage import FolderStore
+from shared.settings import Settings
 from tests.support.evaluations import (
     GENERATOR,
-    PROMPTS,
-    ToyEvaluator,
-    ToyTexts,
-    models_of,
-    state_of,
+    at_once,
     write_generator,
 )
-from tests.support.runtime import Loop
-from tests.support.toy import ToyHandler
-from tests.support.toy_jobs import audit
+from tests.support.schedules import (
+    BERLIN,
+    CRON,
+    change,
+    database_now,
+    end,
+    new_schedule,
+    runs,
+    schedule_row,
+    time_passes,
+)
 
-BERLIN = "Europe/Berlin"
-CRON = "0 3 * * *"
 S = EvaluationState
-
-
-@pytest.fixture
-def config(tmp_path: Path) -> Settings:
-    return models_of(tmp_path)
-
-
-@pytest.fixture
-def scheduler(engine: sa.Engine, config: Settings) -> Evaluations:
-    return Evaluations(engine, config)
-
-
-def new_schedule(
-    engine: sa.Engine,
-    cron: str | None = None,
-    zone: str = BERLIN,
-    *,
-    bundle: str = GENERATOR,
-    own_prompts: bool = True,
-) -> UUID:
-    """By default once a day, six hours before now: no test lasts until it is due."""
-    if cron is None:
-        cron = f"0 {(database_now(engine).astimezone(ZoneInfo(zone)).hour - 6) % 24} * * *"
-    request = EvaluationRequest(bundle, source="mine" if own_prompts else "test")
-    with transaction(engine) as conn:
-        prompts = store_prompts(conn, DEFAULT_TENANT, PROMPTS) if own_prompts else None
-        return create_schedule(conn, NewSchedule(DEFAULT_TENANT, cron, zone, request, prompts, "nightly"))
-
-
-def schedule_row(engine: sa.Engine, schedule: UUID) -> ScheduleRow:
-    with transaction(engine) as conn:
-        return get_schedule(conn, DEFAULT_TENANT, schedule)
-
-
-def runs(engine: sa.Engine, schedule: UUID) -> list[EvaluationRow]:
-    """Its evaluations, the oldest first."""
-    with transaction(engine) as conn:
-        return list(reversed(list_evaluations(conn, DEFAULT_TENANT, schedule=schedule).rows))
-
-
-def time_passes(engine: sa.Engine, schedule: UUID, *, missed: int = 0) -> datetime:
-    """As if the schedule were due now, for its last time before now, or for one so many times earlier; that time."""
-    row, now = schedule_row(engine, schedule), database_now(engine)
-    times = [next_time(row.cron, row.time_zone, now - timedelta(days=missed + 3))]
-    while times[-1] <= now:
-        times.append(next_time(row.cron, row.time_zone, times[-1]))
-    due = times[-2 - missed]
-    with transaction(engine) as conn:
-        table = schema.schedule
-        conn.execute(sa.update(table).where(table.c.id == schedule).values(next_at=due))
-    return due
-
-
-def database_now(engine: sa.Engine) -> datetime:
-    with transaction(engine) as conn:
-        return conn.execute(sa.text("SELECT clock_timestamp()")).scalar_one()
-
-
-def end(engine: sa.Engine, evaluation: UUID) -> None:
-    with transaction(engine) as conn:
-        cancel_evaluation(conn, DEFAULT_TENANT, evaluation)
-
-
-def change(engine: sa.Engine, schedule: UUID, **changes: object) -> ScheduleRow:
-    with transaction(engine) as conn:
-        return change_schedule(conn, DEFAULT_TENANT, schedule, ScheduleChange(**changes))  # pyright: ignore[reportArgumentType]
 
 
 def test_a_new_schedule_is_due_at_its_next_time_in_its_zone(engine: sa.Engine) -> None:
@@ -194,23 +115,7 @@ def test_two_schedulers_at_once_fire_a_due_schedule_once(engine: sa.Engine, conf
     schedules = [new_schedule(engine) for _ in range(5)]
     for schedule in schedules:
         time_passes(engine, schedule, missed=2)
-    errors: list[BaseException] = []
-    barrier = threading.Barrier(4)
-
-    def act() -> None:
-        own = Evaluations(engine, config)
-        barrier.wait()
-        try:
-            own.round()
-        except BaseException as error:
-            errors.append(error)
-
-    threads = [threading.Thread(target=act) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert errors == []
+    at_once(*(Evaluations(engine, config).round for _ in range(4)))
     assert [len(runs(engine, schedule)) for schedule in schedules] == [1] * 5
 
 
@@ -378,94 +283,3 @@ def test_a_foreign_tenant_sees_and_changes_nothing(engine: sa.Engine) -> None:
             with pytest.raises(NotFound):
                 act()
     assert not schedule_row(engine, schedule).paused
-
-
-# --- real processes ---
-
-
-@pytest.fixture
-def start(
-    database_url: str, queue_url: str, config: Settings, tmp_path: Path
-) -> Iterator[Callable[[], subprocess.Popen[bytes]]]:
-    """Starts `marey scheduler`s of this test."""
-    started: list[subprocess.Popen[bytes]] = []
-    environment = {
-        **{name: value for name, value in os.environ.items() if not name.startswith("MAREY_")},
-        "MAREY_HOME": str(config.home),
-        "MAREY_MODELS": str(config.models),
-        "MAREY_DATABASE_URL": database_url,
-        "MAREY_QUEUE_URL": queue_url,
-        "MAREY_EVALUATION_SECONDS": "0.05",
-        "MAREY_LOG_JSON": "true",
-    }
-
-    def run() -> subprocess.Popen[bytes]:
-        with (tmp_path / f"scheduler{len(started)}.log").open("wb") as log:
-            command = [sys.executable, "-m", "tests.chaos.process", "scheduler"]
-            started.append(subprocess.Popen(command, cwd=REPOSITORY, env=environment, stdout=log, stderr=log))
-        return started[-1]
-
-    yield run
-    for process in started:
-        process.kill()
-        process.wait()
-
-
-def wait(condition: Callable[[], bool], seconds: float = 120.0) -> None:
-    until = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < until, "not in time"
-        time.sleep(0.05)
-
-
-def test_a_scheduled_run_survives_a_scheduler_killed_in_each_state(
-    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
-) -> None:
-    schedule = new_schedule(engine)
-    time_passes(engine, schedule, missed=1)
-    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
-    try:
-        for state in (S.GENERATING, S.SCORING):
-            process = start()
-            wait(lambda state=state: any(run.state is state for run in runs(engine, schedule)))
-            process.send_signal(signal.SIGKILL)
-            process.wait()
-            while loop.run():
-                pass
-    finally:
-        loop.close()
-    (run,) = runs(engine, schedule)
-    assert run.state is S.DONE
-    fired = [
-        json.loads(line)
-        for log in sorted(tmp_path.glob("scheduler*.log"))
-        for line in log.read_text().splitlines()
-        if "schedule_fired" in line
-    ]
-    assert [each["evaluation"] for each in fired] == [str(run.id)]
-    assert audit(engine, folder_store) == []
-
-
-def test_two_schedulers_of_one_server_fire_once_and_take_each_step_once(
-    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]]
-) -> None:
-    schedules = [new_schedule(engine) for _ in range(3)]
-    for schedule in schedules:
-        time_passes(engine, schedule, missed=1)
-    start()
-    start()
-    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
-
-    def all_done() -> bool:
-        loop.run()
-        found = [run for schedule in schedules for run in runs(engine, schedule)]
-        return len(found) == 3 and {state_of(engine, run.id) for run in found} == {S.DONE}
-
-    try:
-        wait(all_done)
-    finally:
-        loop.close()
-    assert [len(runs(engine, schedule)) for schedule in schedules] == [1] * 3
-    with transaction(engine) as conn:
-        assert conn.execute(sa.text("SELECT count(*) FROM job")).scalar_one() == 6
-    assert audit(engine, folder_store) == []

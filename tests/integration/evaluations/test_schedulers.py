@@ -1,0 +1,118 @@
+"""Real `marey scheduler` processes: killed in each state, and two at once."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+
+from shared.jobs import (
+    EvaluationState,
+    transaction,
+)
+from shared.settings import REPOSITORY, Settings
+from shared.storage import FolderStore
+from tests.support.evaluations import (
+    ToyEvaluator,
+    ToyTexts,
+    state_of,
+    wait,
+)
+from tests.support.runtime import Loop
+from tests.support.schedules import (
+    new_schedule,
+    runs,
+    time_passes,
+)
+from tests.support.toy import ToyHandler
+from tests.support.toy_jobs import audit
+
+S = EvaluationState
+
+
+@pytest.fixture
+def start(
+    database_url: str, queue_url: str, config: Settings, tmp_path: Path
+) -> Iterator[Callable[[], subprocess.Popen[bytes]]]:
+    """Starts `marey scheduler`s of this test."""
+    started: list[subprocess.Popen[bytes]] = []
+    environment = {
+        **{name: value for name, value in os.environ.items() if not name.startswith("MAREY_")},
+        "MAREY_HOME": str(config.home),
+        "MAREY_MODELS": str(config.models),
+        "MAREY_DATABASE_URL": database_url,
+        "MAREY_QUEUE_URL": queue_url,
+        "MAREY_EVALUATION_SECONDS": "0.05",
+        "MAREY_LOG_JSON": "true",
+    }
+
+    def run() -> subprocess.Popen[bytes]:
+        with (tmp_path / f"scheduler{len(started)}.log").open("wb") as log:
+            command = [sys.executable, "-m", "tests.chaos.process", "scheduler"]
+            started.append(subprocess.Popen(command, cwd=REPOSITORY, env=environment, stdout=log, stderr=log))
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def test_a_scheduled_run_survives_a_scheduler_killed_in_each_state(
+    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
+) -> None:
+    schedule = new_schedule(engine)
+    time_passes(engine, schedule, missed=1)
+    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
+    try:
+        for state in (S.GENERATING, S.SCORING):
+            process = start()
+            wait(lambda state=state: any(run.state is state for run in runs(engine, schedule)))
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            while loop.run():
+                pass
+    finally:
+        loop.close()
+    (run,) = runs(engine, schedule)
+    assert run.state is S.DONE
+    fired = [
+        json.loads(line)
+        for log in sorted(tmp_path.glob("scheduler*.log"))
+        for line in log.read_text().splitlines()
+        if "schedule_fired" in line
+    ]
+    assert [each["evaluation"] for each in fired] == [str(run.id)]
+    assert audit(engine, folder_store) == []
+
+
+def test_two_schedulers_of_one_server_fire_once_and_take_each_step_once(
+    engine: sa.Engine, folder_store: FolderStore, start: Callable[[], subprocess.Popen[bytes]]
+) -> None:
+    schedules = [new_schedule(engine) for _ in range(3)]
+    for schedule in schedules:
+        time_passes(engine, schedule, missed=1)
+    start()
+    start()
+    loop = Loop(engine, folder_store, ToyTexts(), ToyHandler(), ToyEvaluator())
+
+    def all_done() -> bool:
+        loop.run()
+        found = [run for schedule in schedules for run in runs(engine, schedule)]
+        return len(found) == 3 and {state_of(engine, run.id) for run in found} == {S.DONE}
+
+    try:
+        wait(all_done)
+    finally:
+        loop.close()
+    assert [len(runs(engine, schedule)) for schedule in schedules] == [1] * 3
+    with transaction(engine) as conn:
+        assert conn.execute(sa.text("SELECT count(*) FROM job")).scalar_one() == 6
+    assert audit(engine, folder_store) == []
