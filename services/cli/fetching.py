@@ -89,6 +89,7 @@ def naming(item: dict[str, Any]) -> Naming:
         variant=item["variant"],
         model=item["model"],
         job=item["job"],
+        tags=item["tags"],
     )
 
 

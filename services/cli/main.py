@@ -18,6 +18,7 @@ from services.cli.commands import (
     generate,
     jobs,
     models,
+    motions,
     serve,
     stream,
     submit,
@@ -80,6 +81,7 @@ def root(
 app.command("generate")(generate.generate)
 app.command("submit")(submit.submit)
 app.add_typer(jobs.app, name="jobs")
+app.add_typer(motions.app, name="motions")
 app.command("fetch")(fetch.fetch)
 app.command("stream")(stream.stream)
 app.command("serve")(serve.serve)

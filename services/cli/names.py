@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import string
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shared.errors import InvalidInput
@@ -12,7 +13,9 @@ from shared.items import NAME, RESERVED
 
 DEFAULT_TEMPLATE = "{index:05}_{name}_{seed}"
 MAX_SLUG = 48
-FIELDS = ("index", "name", "seed", "variant", "model", "job")
+FIELDS = ("index", "name", "seed", "variant", "model", "job", "tags")
+TAG = re.compile(r"tag\[[\w-]{1,64}\]")
+"""`{tag[shot]}` is `010` where the item has the tag `shot=010`."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,23 @@ class Naming:
     variant: int
     model: str
     job: str
+    tags: Sequence[str] = ()
+
+
+class _Values(dict[str, str]):
+    """Values of tags such as `shot=010`, by their key."""
+
+    def __missing__(self, key: str) -> str:
+        raise InvalidInput(
+            f"an item has no tag {key}=…, which the file names want", where="--name-template", hint=_HINT
+        )
+
+
+class _AnyValue(dict[str, str]):
+    """While a template is looked at, every tag has a value."""
+
+    def __missing__(self, _: str) -> str:
+        return "tag"
 
 
 def slug(text: str, limit: int = MAX_SLUG) -> str:
@@ -46,10 +66,10 @@ def check_template(template: str) -> str:
         fields = [name for _, name, _, _ in string.Formatter().parse(template) if name is not None]
     except ValueError as error:
         raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
-    unknown = [name for name in fields if name not in FIELDS]
+    unknown = [name for name in fields if name not in FIELDS and not TAG.fullmatch(name)]
     if unknown:
         raise InvalidInput(f"{unknown[0]!r} is not a field of a template", where="--name-template", hint=_HINT)
-    file_name(template, Naming(1, "name", 0, 0, "hgm3", "job"), "npz")
+    _file_name(template, Naming(1, "name", 0, 0, "hgm3", "job"), "npz", _AnyValue())
     return template
 
 
@@ -57,10 +77,20 @@ def file_name(template: str, naming: Naming, extension: str) -> str:
     """The file name of one motion.
 
     Raises:
-        InvalidInput: what comes out is not a plain file name.
+        InvalidInput: what comes out is not a plain file name, or the item lacks a tag.
     """
+    return _file_name(template, naming, extension, _Values(values_of(naming.tags)))
+
+
+def values_of(tags: Sequence[str]) -> dict[str, str]:
+    """What tags such as `shot=010` say, by their key; the first of a key counts."""
+    pairs = (tag.partition("=") for tag in reversed(tags) if "=" in tag)
+    return {key.strip(): value.strip() for key, _, value in pairs}
+
+
+def _file_name(template: str, naming: Naming, extension: str, values: dict[str, str]) -> str:
     try:
-        stem = template.format(**vars(naming))
+        stem = template.format(**{**vars(naming), "tags": "_".join(naming.tags), "tag": values})
     except (ValueError, TypeError) as error:
         raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
     if not NAME.match(stem) or "/" in stem or "\\" in stem or ".." in stem or not stem.isprintable():
@@ -70,4 +100,7 @@ def file_name(template: str, naming: Naming, extension: str) -> str:
     return f"{stem}.{extension}"
 
 
-_HINT = f"Fields are {', '.join('{' + f + '}' for f in FIELDS)}; the default is {DEFAULT_TEMPLATE!r}. No folders in it."
+_HINT = (
+    f"Fields are {', '.join('{' + f + '}' for f in FIELDS)} and {{tag[shot]}} for the value of a tag shot=…; "
+    f"the default is {DEFAULT_TEMPLATE!r}. No folders in it."
+)

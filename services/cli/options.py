@@ -36,7 +36,11 @@ PromptFormat = Annotated[
 Formats = Annotated[list[FileFormat] | None, typer.Option("--format", help="File format; may be repeated.")]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; made if it is not there.")]
 Template = Annotated[
-    str, typer.Option("--name-template", help="File names, of {index} {name} {seed} {variant} {model} {job}.")
+    str,
+    typer.Option(
+        "--name-template",
+        help="File names, of {index} {name} {seed} {variant} {model} {job} {tags}, and {tag[shot]} for shot=….",
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that hold something else.")]
 Seconds = Annotated[float | None, typer.Option("--seconds", help="Length; none given = the model decides.")]

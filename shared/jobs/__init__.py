@@ -51,11 +51,12 @@ from shared.jobs.evaluations import (
 )
 from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets
 from shared.jobs.keys import SCOPES, authenticate, create_key, list_keys, revoke_key
-from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions
+from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_priority
 from shared.jobs.policy import Policy, policy
 from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
+from shared.jobs.reviews import MAX_REVIEWED, reroll, review
 from shared.jobs.schedules import (
     change_schedule,
     create_schedule,
@@ -67,7 +68,7 @@ from shared.jobs.schedules import (
     run_schedule,
 )
 from shared.jobs.scoring import commit_score, load_score
-from shared.jobs.states import EvaluationState, ItemState, JobControl, JobState, Stage, StreamState
+from shared.jobs.states import EvaluationState, ItemState, JobControl, JobState, Review, Stage, StreamState
 from shared.jobs.streams import (
     abandoned_streams,
     add_chunk,
@@ -83,6 +84,7 @@ from shared.jobs.submit import submit
 from shared.jobs.sweep import sweep
 from shared.jobs.types import (
     DEFAULT_TENANT,
+    MAX_KEEP_DAYS,
     NO_TEXT,
     PRIORITY_LIMIT,
     SEED_LIMIT,
@@ -99,6 +101,7 @@ from shared.jobs.types import (
     ItemRow,
     JobRow,
     MotionFile,
+    MotionFilter,
     MotionRow,
     NewApiKey,
     NewItem,
@@ -108,6 +111,7 @@ from shared.jobs.types import (
     NewText,
     Page,
     Problem,
+    Reroll,
     StreamChunk,
     StreamPast,
     StreamRow,
@@ -122,6 +126,8 @@ __all__ = [
     "DEFAULT_TENANT",
     "EVALUATOR_QUEUE",
     "EVENT_CHANNEL",
+    "MAX_KEEP_DAYS",
+    "MAX_REVIEWED",
     "NO_TEXT",
     "PRIORITY_LIMIT",
     "QUEUE_CHANNEL",
@@ -154,6 +160,7 @@ __all__ = [
     "Listener",
     "MadeItem",
     "MotionFile",
+    "MotionFilter",
     "MotionRow",
     "NewApiKey",
     "NewEvaluation",
@@ -169,6 +176,8 @@ __all__ = [
     "Policy",
     "Problem",
     "ReportFile",
+    "Reroll",
+    "Review",
     "ScheduleChange",
     "ScheduleRow",
     "ScoreRows",
@@ -230,6 +239,7 @@ __all__ = [
     "load_score",
     "load_texts",
     "lock_evaluation",
+    "motions_of",
     "move_evaluation",
     "open_evaluations",
     "open_streams",
@@ -237,9 +247,11 @@ __all__ = [
     "policy",
     "release",
     "remove_stale_assets",
+    "reroll",
     "resume",
     "retire",
     "retry",
+    "review",
     "revoke_key",
     "run_schedule",
     "set_comment",

@@ -50,6 +50,8 @@ class LockedJob:
     failed: int
     dead: int
     cancelled: int
+    erased: bool = False
+    """Its prompts are gone: nothing of it can be made again."""
 
     @property
     def state(self) -> JobState:
@@ -92,6 +94,7 @@ def lock_job(
         table.started_at.is_not(None).label("started"),
         table.total,
         *(table[str(state)] for state in ItemState),
+        table.erased_at.is_not(None).label("erased"),
     ).where(table.id == job)
     if tenant is not None:
         query = query.where(table.tenant_id == tenant)
@@ -127,15 +130,18 @@ def record(
     events: Sequence[NewEvent] = (),
     *,
     moved: Mapping[tuple[ItemState, ItemState], int] | None = None,
+    added: int = 0,
     control: JobControl | None = None,
 ) -> LockedJob:
     """Write what happened to a job under lock: counters, control, times, events with their numbers, notification.
 
     Args:
         moved: how many items went from one state to another.
+        added: how many were added, ready.
         events: in order. When the job's state changes an event `state` follows them.
     """
-    after = _moved(replace(job, control=control or job.control), moved or {})
+    grown = replace(job, control=control or job.control, total=job.total + added, ready=job.ready + added)
+    after = _moved(grown, moved or {})
     if after.state is not job.state:
         change = NewEvent("state", f"{job.state} → {after.state}", data={"from": job.state, "to": after.state})
         events = [*events, change]
@@ -146,6 +152,7 @@ def record(
         .where(table.c.id == job.id)
         .values(
             control=after.control,
+            total=after.total,
             **{str(state): getattr(after, state) for state in ItemState},
             event_seq=table.c.event_seq + len(events),
             started_at=sa.func.coalesce(table.c.started_at, CLOCK) if after.started else None,

@@ -13,8 +13,11 @@ from shared.errors import NotFound
 from shared.jobs import schema
 from shared.jobs.journal import among, no_such_job
 from shared.jobs.pages import cut_page, page_limit, read_cursor
-from shared.jobs.states import ItemState, JobControl, JobState, Stage
-from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionRow, Page, Problem
+from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from shared.jobs.submit import check_text
+from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionFilter, MotionRow, Page, Problem
+
+EVERYTHING = MotionFilter()
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
@@ -50,43 +53,58 @@ def list_items(
     job: UUID,
     *,
     states: Collection[ItemState] = (),
+    reviews: Collection[Review] = (),
     cursor: str | None = None,
     limit: int = 100,
 ) -> Page[ItemRow]:
-    """Items of a job with their motions, in input order, variants within prompt.
+    """Items of a job with their motions, in input order, variants within prompt; re-rolls come last.
+
+    Args:
+        states: only items in one of these.
+        reviews: only items with a motion of which one of these was said.
 
     Raises:
         NotFound: the tenant has no such job.
     """
     get_job(conn, tenant, job)
     table = schema.item.c
-    query = sa.select(
-        *(table.id, table.job_id.label("job"), table.position, table.index, table.variant, table.name, table.prompt),
-        *(table.model, table.bundle, table.seed, table.seconds, table.settings, table.tags, table.stage, table.state),
-        *(table.attempts, table.solo, table.run_after, table.reason, table.problem),
-        table.created_at.label("created"),
-        table.finished_at.label("finished"),
-    ).where(table.job_id == job)
+    query = _items().where(table.job_id == job)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
+    if reviews:
+        motion = schema.motion.c
+        said = motion.review.in_([str(review) for review in reviews])
+        query = query.join(schema.motion, (motion.item_id == table.id) & said)
     if cursor is not None:
         query = query.where(table.position > read_cursor(cursor, int))
     rows = conn.execute(query.order_by(table.position).limit(page_limit(limit) + 1)).mappings().all()
-    items = [row["id"] for row in rows if row["state"] == ItemState.SUCCEEDED]
-    by_item = {motion.item: motion for motion in _motions(conn, among(schema.motion.c.item_id, items))}
-    return cut_page([_item(row, by_item.get(row["id"])) for row in rows], limit, lambda row: str(row.position))
+    return cut_page(_with_motions(conn, rows), limit, lambda row: str(row.position))
+
+
+def items_of(conn: sa.Connection, items: Collection[UUID]) -> list[ItemRow]:
+    """These items, those that are there, by job and in input order. Whose they are the caller knows."""
+    table = schema.item.c
+    query = _items().where(among(table.id, items)).order_by(table.job_id, table.position)
+    return _with_motions(conn, conn.execute(query).mappings().all())
 
 
 def list_motions(
-    conn: sa.Connection, tenant: str, *, job: UUID | None = None, cursor: str | None = None, limit: int = 50
+    conn: sa.Connection,
+    tenant: str,
+    *,
+    job: UUID | None = None,
+    found: MotionFilter = EVERYTHING,
+    cursor: str | None = None,
+    limit: int = 50,
 ) -> Page[MotionRow]:
-    """Motions: of a job in the order they were made; of the whole tenant newest first.
+    """Motions that a filter finds: of a job in the order they were made; of the whole tenant newest first.
 
     Raises:
         NotFound: the tenant has no such job.
+        InvalidInput: a filter that holds what no text can.
     """
     table = schema.motion.c
-    wanted = table.tenant_id == tenant
+    wanted = (table.tenant_id == tenant) & _found(found)
     if job is not None:
         get_job(conn, tenant, job)
         wanted &= table.job_id == job
@@ -104,11 +122,25 @@ def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
     Raises:
         NotFound: the tenant has no such motion.
     """
+    return motions_of(conn, tenant, [motion])[0]
+
+
+def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> list[MotionRow]:
+    """These motions, in the order given, each once.
+
+    Raises:
+        NotFound: the tenant lacks one of them.
+    """
+    asked = list(dict.fromkeys(motions))
     table = schema.motion.c
-    found = _motions(conn, (table.tenant_id == tenant) & (table.id == motion))
-    if not found:
-        raise NotFound("there is no such motion", where=f"motion {motion}")
-    return found[0]
+    rows = {row.id: row for row in _motions(conn, (table.tenant_id == tenant) & among(table.id, asked))}
+    missing = [motion for motion in asked if motion not in rows]
+    if missing:
+        more = f" (and {len(missing) - 1} more of those given)" if len(missing) > 1 else ""
+        raise NotFound(
+            f"there is no such motion{more}", where=f"motion {missing[0]}", hint="`marey motions list` shows yours."
+        )
+    return [rows[motion] for motion in asked]
 
 
 def events_after(conn: sa.Connection, tenant: str, job: UUID, seq: int = 0, limit: int = 500) -> list[EventRow]:
@@ -142,6 +174,9 @@ def _jobs() -> sa.Select[*tuple[Any, ...]]:
         table.created_at.label("created"),
         table.started_at.label("started"),
         table.finished_at.label("finished"),
+        table.keep_days,
+        (table.finished_at + sa.func.make_interval(0, 0, 0, table.keep_days)).label("expires"),
+        table.erased_at.label("erased"),
     )
 
 
@@ -149,6 +184,23 @@ def _job(row: sa.RowMapping) -> JobRow:
     values: dict[str, Any] = dict(row)
     values.update(control=JobControl(row["control"]), state=JobState(row["state"]))
     return JobRow(**values)
+
+
+def _items() -> sa.Select[*tuple[Any, ...]]:
+    table = schema.item.c
+    return sa.select(
+        *(table.id, table.job_id.label("job"), table.position, table.index, table.variant, table.name, table.prompt),
+        *(table.model, table.bundle, table.seed, table.seconds, table.settings, table.tags, table.stage, table.state),
+        *(table.attempts, table.solo, table.run_after, table.reason, table.problem, table.replaces),
+        table.created_at.label("created"),
+        table.finished_at.label("finished"),
+    )
+
+
+def _with_motions(conn: sa.Connection, rows: Sequence[sa.RowMapping]) -> list[ItemRow]:
+    made = [row["id"] for row in rows if row["state"] == ItemState.SUCCEEDED]
+    by_item = {motion.item: motion for motion in _motions(conn, among(schema.motion.c.item_id, made))}
+    return [_item(row, by_item.get(row["id"])) for row in rows]
 
 
 def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
@@ -164,6 +216,27 @@ def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
     return ItemRow(**values)
 
 
+def _found(found: MotionFilter) -> sa.ColumnElement[bool]:
+    """The condition of a filter, in the words of the indexes."""
+    item, motion = schema.item.c, schema.motion.c
+    made = item.state == ItemState.SUCCEEDED
+    wanted: list[sa.ColumnElement[bool]] = []
+    for where, text in (("name", found.name), ("text", found.text), *(("tag", tag) for tag in found.tags)):
+        check_text(text, where)
+    if found.tags:
+        wanted.append(made & item.tags.contains(list(found.tags)) & sa.literal_column("item.tags <> '{}'"))
+    if found.name is not None:
+        wanted.append(made & sa.func.lower(item.name).startswith(found.name.lower(), autoescape=True))
+    if found.text is not None:
+        words = sa.func.to_tsvector(sa.literal_column("'english'::regconfig"), item.prompt)
+        asked = sa.func.websearch_to_tsquery(sa.literal_column("'english'::regconfig"), found.text)
+        wanted.append(made & words.bool_op("@@")(asked))
+    if found.reviews or found.unreviewed:
+        said = motion.review.in_([str(review) for review in found.reviews])
+        wanted.append(sa.or_(said, motion.review.is_(None)) if found.unreviewed else said)
+    return sa.and_(sa.true(), *wanted)
+
+
 def _motions(
     conn: sa.Connection,
     wanted: sa.ColumnElement[bool],
@@ -173,19 +246,30 @@ def _motions(
 ) -> list[MotionRow]:
     """Motions with their files: two queries, however many."""
     motion, item = schema.motion.c, schema.item.c
+    later = schema.item.alias("later")
     query = (
         sa.select(
             *(motion.id, motion.tenant_id.label("tenant"), motion.job_id.label("job"), motion.item_id.label("item")),
             *(item.name, item.prompt, item.model, item.bundle, motion.licence, item.seed, item.variant),
             *(motion.frames, motion.fps, motion.elapsed, motion.metadata.label("metadata")),
             motion.created_at.label("created"),
+            *(item.index, item.tags, item.replaces, later.c.id.label("replaced_by")),
+            *(motion.review, motion.reviewed_at.label("reviewed"), motion.reviewed_by, motion.review_comment),
         )
         .join(schema.item, item.id == motion.item_id)
+        .outerjoin(later, later.c.replaces == motion.id)
         .where(wanted)
     )
     rows = conn.execute(query.order_by(motion.id if order is None else order).limit(limit)).mappings().all()
     files = _files(conn, [row["id"] for row in rows])
-    return [MotionRow(**row, files=tuple(files[row["id"]])) for row in rows]
+    return [_motion(row, files[row["id"]]) for row in rows]
+
+
+def _motion(row: sa.RowMapping, files: Sequence[MotionFile]) -> MotionRow:
+    values: dict[str, Any] = dict(row)
+    review = row["review"]
+    values.update(tags=tuple(row["tags"]), review=None if review is None else Review(review))
+    return MotionRow(**values, files=tuple(files))
 
 
 def _files(conn: sa.Connection, motions: Sequence[UUID]) -> dict[UUID, list[MotionFile]]:
@@ -193,7 +277,7 @@ def _files(conn: sa.Connection, motions: Sequence[UUID]) -> dict[UUID, list[Moti
     rows = conn.execute(
         sa.select(file.motion_id, file.format, asset.sha256, asset.size, asset.media_type)
         .join(schema.asset, asset.id == file.asset_id)
-        .where(among(file.motion_id, motions))
+        .where(among(file.motion_id, motions), ~file.erasing)
         .order_by(file.format)
     )
     files: defaultdict[UUID, list[MotionFile]] = defaultdict(list)

@@ -65,9 +65,10 @@ def retry(
 
     Raises:
         NotFound: the tenant has no such job.
-        Conflict: no item can be retried.
+        Conflict: no item can be retried, or the prompts were erased.
     """
     locked = lock_job_of(conn, tenant, job)
+    refuse_erased(locked, "retried")
     wanted = RETRYABLE - {ItemState.CANCELLED} if failed_only else RETRYABLE
     moved = {(state, ItemState.READY): getattr(locked, state) for state in wanted if getattr(locked, state)}
     if not moved:
@@ -131,7 +132,7 @@ def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
         NotFound: the tenant has no such job.
         Conflict: the job has open items, or works for an evaluation that is not over; cancel it first.
     """
-    _refuse_needed(conn, tenant, job)
+    refuse_needed(conn, tenant, job)
     locked = lock_job_of(conn, tenant, job)
     if locked.state not in ENDED:
         raise Conflict(
@@ -163,8 +164,12 @@ def cancel_open_items(
     record(conn, job, [event], moved=moved, control=control)
 
 
-def _refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
-    """An evaluation's row is locked before its jobs: deleting one changes both."""
+def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
+    """Nothing, if no evaluation that is not over works with this job. Its row is locked, before the job's.
+
+    Raises:
+        Conflict: one does.
+    """
     table = schema.evaluation.c
     ours = (table.tenant_id == tenant) & ((table.generate_job_id == job) | (table.score_job_id == job))
     rows = conn.execute(sa.select(table.id, table.finished_at).where(ours).order_by(table.id).with_for_update())
@@ -174,6 +179,20 @@ def _refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
             f"evaluation {needed} needs this job",
             where=f"job {job}",
             hint=f"Wait for it, or cancel it: `marey eval cancel {needed}`.",
+        )
+
+
+def refuse_erased(job: LockedJob, verb: str) -> None:
+    """Nothing, if the job's prompts are still there.
+
+    Raises:
+        Conflict: they were erased.
+    """
+    if job.erased:
+        raise Conflict(
+            f"the job's prompts were erased, so it cannot be {verb}",
+            where=f"job {job.id}",
+            hint="Submit the prompts again as a new job.",
         )
 
 

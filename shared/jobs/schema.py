@@ -16,7 +16,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB, TIMESTAMP, UUID
 
-from shared.jobs.states import EvaluationState, ItemState, JobControl, Stage, StreamState
+from shared.jobs.states import EvaluationState, ItemState, JobControl, Review, Stage, StreamState
 
 metadata = sa.MetaData(
     naming_convention={
@@ -91,6 +91,8 @@ job = sa.Table(
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("started_at", Time),
     sa.Column("finished_at", Time),
+    sa.Column("keep_days", sa.Integer),  # deleted this long after it ended; null = by hand alone
+    sa.Column("erased_at", Time),  # its prompts are gone
     sa.CheckConstraint(_one_of("control", list(JobControl)), name="control"),
     sa.CheckConstraint("priority BETWEEN -1000 AND 1000", name="priority"),
     sa.CheckConstraint("fail_early BETWEEN 0 AND 1", name="fail_early"),
@@ -99,7 +101,9 @@ job = sa.Table(
         " AND ready + leased + succeeded + failed + dead + cancelled = total",
         name="counters",
     ),
+    sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
     sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_job_keep_days", "id", postgresql_where=sa.text("keep_days IS NOT NULL")),
     postgresql_with={"fillfactor": 50},
 )
 
@@ -133,6 +137,8 @@ item = sa.Table(
     sa.Column("problem", JSONB),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("finished_at", Time),
+    # The motion that this item is another take of.
+    sa.Column("replaces", Id, sa.ForeignKey("motion.id", ondelete="SET NULL", use_alter=True)),
     sa.CheckConstraint(_one_of("state", list(ItemState)), name="state"),
     sa.CheckConstraint(_one_of("stage", list(Stage)), name="stage"),
     sa.CheckConstraint("(state = 'leased') = (lease_token IS NOT NULL)", name="lease"),
@@ -150,6 +156,26 @@ item = sa.Table(
     sa.Index("ix_item_run_after", "run_after", postgresql_where=sa.text("run_after IS NOT NULL")),
     sa.Index("ix_item_lease_token", "lease_token", postgresql_where=sa.text("lease_token IS NOT NULL")),
     sa.Index("ix_item_text_key", "job_id", "text_key", postgresql_where=sa.text("state = 'ready' AND stage = 'text'")),
+    sa.Index("ix_item_replaces", "replaces", unique=True, postgresql_where=sa.text("replaces IS NOT NULL")),
+    # What motions are searched by. Items that succeeded alone are in them: a submit pays nothing.
+    sa.Index(
+        "ix_item_tags",
+        "tags",
+        postgresql_using="gin",
+        postgresql_where=sa.text("state = 'succeeded' AND tags <> '{}'"),
+    ),
+    sa.Index(
+        "ix_item_name",
+        sa.func.lower(sa.literal_column("name")).label("lower_name"),
+        postgresql_ops={"lower_name": "text_pattern_ops"},
+        postgresql_where=sa.text("state = 'succeeded' AND name IS NOT NULL"),
+    ),
+    sa.Index(
+        "ix_item_words",
+        sa.text("to_tsvector('english'::regconfig, prompt)"),
+        postgresql_using="gin",
+        postgresql_where=sa.text("state = 'succeeded'"),
+    ),
 )
 
 lane = sa.Table(
@@ -242,8 +268,16 @@ motion = sa.Table(
     sa.Column("elapsed", sa.Double, nullable=False),
     sa.Column("metadata", JSONB, nullable=False),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
+    sa.Column("review", sa.Text),  # null = nobody looked at it yet
+    sa.Column("reviewed_at", Time),
+    sa.Column("reviewed_by", sa.Text),  # the name of an API key
+    sa.Column("review_comment", sa.Text),
+    sa.CheckConstraint(_one_of("review", list(Review)), name="review"),
+    sa.CheckConstraint("num_nulls(review, reviewed_at, reviewed_by) IN (0, 3)", name="reviewed"),
+    sa.CheckConstraint("review IS NOT NULL OR review_comment IS NULL", name="review_comment"),
     sa.Index("ix_motion_tenant_id_id", "tenant_id", "id"),
     sa.Index("ix_motion_job_id_id", "job_id", "id"),
+    sa.Index("ix_motion_review", "tenant_id", "review", "id", postgresql_where=sa.text("review IS NOT NULL")),
 )
 
 motion_file = sa.Table(
@@ -252,7 +286,10 @@ motion_file = sa.Table(
     sa.Column("motion_id", Id, sa.ForeignKey("motion.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("format", sa.Text, primary_key=True),
     sa.Column("asset_id", Id, sa.ForeignKey("asset.id"), nullable=False),
+    # It holds an erased prompt and waits to be written anew: nobody gets it any more.
+    sa.Column("erasing", sa.Boolean, nullable=False, server_default=sa.false()),
     sa.Index("ix_motion_file_asset_id", "asset_id"),
+    sa.Index("ix_motion_file_erasing", "motion_id", postgresql_where=sa.text("erasing")),
 )
 
 job_event = sa.Table(

@@ -95,6 +95,15 @@ def allowed(before: ItemState, after: ItemState) -> bool:
     return (before, after) in TRANSITIONS
 
 
+class Review(StrEnum):
+    """What a person thought of a motion; any may follow any."""
+
+    KEPT = "kept"
+    REJECTED = "rejected"
+    REROLLED = "rerolled"
+    """Another take was asked for in its place."""
+
+
 class StreamState(StrEnum):
     """Where a live stream stands. `ENDED` and `FAILED` are final."""
 

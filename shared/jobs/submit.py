@@ -21,13 +21,22 @@ from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, Lane, LaneChange, NewEvent, among, change_lanes, interval, lock_job, record
 from shared.jobs.policy import policy
 from shared.jobs.states import JobState, Stage
-from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, NewItem, NewJob, SubmittedJob
+from shared.jobs.types import (
+    MAX_KEEP_DAYS,
+    NO_TEXT,
+    PRIORITY_LIMIT,
+    SEED_LIMIT,
+    TEXT_QUEUE,
+    NewItem,
+    NewJob,
+    SubmittedJob,
+)
 
 CHUNK = 2000  # items held in memory at a time, and keys of one look-up
 
 COLUMNS = (
     *("id", "job_id", "position", "index", "variant", "name", "prompt", "model", "bundle", "seed", "seconds"),
-    *("settings", "tags", "text_key", "generate_batch_key", "stage", "queue", "batch_key"),
+    *("settings", "tags", "text_key", "generate_batch_key", "stage", "queue", "batch_key", "replaces"),
 )
 COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
 
@@ -46,6 +55,8 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
         raise InvalidInput(f"{job.priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
     if job.fail_early is not None and not 0 <= job.fail_early <= 1:
         raise InvalidInput(f"{job.fail_early} is not a share between 0 and 1", where="fail_early")
+    if job.keep_days is not None and not 1 <= job.keep_days <= MAX_KEEP_DAYS:
+        raise InvalidInput(f"{job.keep_days} is not between 1 and {MAX_KEEP_DAYS} days", where="keep_days")
     for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
         check_text(text, where)
     identifier = new_id()
@@ -60,9 +71,10 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
             comment=job.comment,
             priority=job.priority,
             fail_early=job.fail_early,
+            keep_days=job.keep_days,
         )
     )
-    lanes = _write_items(conn, identifier, job.items)
+    lanes = write_items(conn, identifier, job.items)
     total = sum(lanes.values())
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
@@ -113,11 +125,12 @@ def _take_key(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJo
     return SubmittedJob(earlier.job_id, replayed=True, items=earlier.total)
 
 
-def _write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem]) -> Counter[Lane]:
-    """COPY the items in chunks; how many each lane has got."""
+def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0) -> Counter[Lane]:
+    """COPY the items in chunks, their positions from `first` on; how many each lane has got. Counters and lanes are the
+    caller's."""
     lanes: Counter[Lane] = Counter()
     connection = cast("psycopg.Connection", conn.connection.driver_connection)
-    positions = itertools.count()
+    positions = itertools.count(first)
     for chunk in _chunks(items):
         known = _known_texts(conn, {item.text_key for item in chunk}) | {NO_TEXT}
         with connection.cursor() as cursor, cursor.copy(COPY) as copy:
@@ -140,7 +153,7 @@ def _row(item: NewItem, job: UUID, position: int, stage: Stage, lane: Lane) -> t
     return (
         *(new_id(), job, position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle),
         *(item.seed, item.seconds, json.dumps(dict(item.settings)), list(item.tags), item.text_key, item.batch_key),
-        *(str(stage), *lane),
+        *(str(stage), *lane, item.replaces),
     )
 
 

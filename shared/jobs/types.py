@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from uuid import UUID
 
 from shared.errors import MareyError
-from shared.jobs.states import ItemState, JobControl, JobState, Stage, StreamState
+from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage, StreamState
 
 DEFAULT_TENANT = "default"
 TEXT_QUEUE = "text"
@@ -19,6 +19,8 @@ SEED_LIMIT = 2**31
 """Seeds are 0 … 2³¹ − 1."""
 PRIORITY_LIMIT = 1000
 """Priorities are −1000 … 1000; higher first."""
+
+MAX_KEEP_DAYS = 36_500
 
 JsonObject = Mapping[str, object]
 Row = TypeVar("Row")
@@ -57,6 +59,7 @@ class NewItem:
         seed: 0 … 2³¹ − 1.
         seconds: length wanted; None = the model's estimate.
         settings: what the handler needs (steps, guidance, fps, formats, …).
+        replaces: the motion that it is another take of.
     """
 
     index: int
@@ -72,6 +75,7 @@ class NewItem:
     seconds: float | None = None
     settings: JsonObject = field(default_factory=dict[str, object])
     tags: Sequence[str] = ()
+    replaces: UUID | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,8 @@ class NewJob:
     priority: int = 0
     fail_early: float | None = None
     """Share of failed and dead items (0 … 1) above which the rest is cancelled; None = never."""
+    keep_days: int | None = None
+    """Days after its end when it is deleted, motions and files too; None = by hand alone."""
     idempotency_key: str | None = None
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
@@ -259,6 +265,11 @@ class JobRow:
     created: datetime
     started: datetime | None
     finished: datetime | None
+    keep_days: int | None
+    expires: datetime | None
+    """When it is deleted; None = never, or not before it ends."""
+    erased: datetime | None
+    """When its prompts were erased."""
 
 
 @dataclass(frozen=True)
@@ -269,6 +280,22 @@ class MotionFile:
     sha256: str
     size: int
     media_type: str
+
+
+@dataclass(frozen=True)
+class MotionFilter:
+    """Which motions a listing shows: those that fit everything given."""
+
+    tags: Sequence[str] = ()
+    """All of them, as written."""
+    name: str | None = None
+    """How the name begins, in any case."""
+    text: str | None = None
+    """Words of the prompt in any form and order; "a phrase", or, -not as on the web."""
+    reviews: Sequence[Review] = ()
+    """One of these."""
+    unreviewed: bool = False
+    """Or not looked at yet."""
 
 
 @dataclass(frozen=True)
@@ -292,6 +319,30 @@ class MotionRow:
     metadata: JsonObject
     files: tuple[MotionFile, ...]
     created: datetime
+    index: int
+    tags: tuple[str, ...]
+    review: Review | None
+    reviewed: datetime | None
+    reviewed_by: str | None
+    """Name of an API key."""
+    review_comment: str | None
+    replaces: UUID | None
+    """The motion that it is another take of."""
+    replaced_by: UUID | None
+    """The item that is another take of it."""
+
+
+@dataclass(frozen=True)
+class Reroll:
+    """Another take of a motion: an item in the same job."""
+
+    motion: UUID
+    item: UUID
+    job: UUID
+    seed: int
+    state: ItemState
+    made: bool
+    """Now; else it was asked for before."""
 
 
 @dataclass(frozen=True)
@@ -322,6 +373,8 @@ class ItemRow:
     problem: Problem | None
     created: datetime
     finished: datetime | None
+    replaces: UUID | None
+    """The motion that it is another take of."""
     motion: MotionRow | None
 
 

@@ -264,6 +264,7 @@ class StreamServer:
             "job": JOB,
             "index": 0,
             "name": None,
+            "tags": [],
             "prompt": "a person walks",
             "variant": 0,
             "seed": 7,
@@ -271,6 +272,7 @@ class StreamServer:
             "bundle": "mogo-x",
             "state": "succeeded",
             "error": None,
+            "replaces": None,
             "motion": {
                 "id": "motion",
                 "files": [

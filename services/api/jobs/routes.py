@@ -25,6 +25,7 @@ from services.api.jobs.schemas import (
     NewItemBody,
     NewJobBody,
 )
+from services.api.motions.routes import Found
 from services.api.motions.schemas import MotionView
 from services.api.problems import RESPONSES
 from services.api.schemas import Cursor, Limit, PageView
@@ -73,6 +74,7 @@ async def submit_job(
     comment: Annotated[str | None, Query(max_length=2000)] = None,
     priority: Annotated[int, Query(ge=-1000, le=1000)] = 0,
     fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
+    keep_days: Annotated[int | None, Query(ge=1, le=jobs.MAX_KEEP_DAYS)] = None,
     validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,
     idempotency_key: IdempotencyKey = None,
 ) -> Response:
@@ -83,7 +85,13 @@ async def submit_job(
     """
     body = await read_body(request, limit_of_submit())
     kind = request.headers.get("content-type", JSON).partition(";")[0].strip().lower()
-    fields = {"name": name, "comment": comment, "priority": priority, "fail_early": fail_early}
+    fields = {
+        "name": name,
+        "comment": comment,
+        "priority": priority,
+        "fail_early": fail_early,
+        "keep_days": keep_days,
+    }
     submission = await run_in_threadpool(_read, kind, body, fields, shared)
     if validate_only:
         checked = CheckedView(valid=True, items=submission.count, bundles=submission.bundles)
@@ -192,20 +200,21 @@ def list_items(
     conn: Connection,
     key: Reader,
     state: Annotated[list[jobs.ItemState] | None, Query()] = None,
+    review: Annotated[list[jobs.Review] | None, Query(description="Those of whose motion it was said.")] = None,
     cursor: Cursor = None,
     limit: Limit = 100,
 ) -> PageView[ItemView]:
-    """Items with their motions, in input order, variants within prompt."""
-    page = jobs.list_items(conn, key.tenant, job, states=state or (), cursor=cursor, limit=limit)
+    """Items with their motions, in input order, variants within prompt; re-rolls come last."""
+    page = jobs.list_items(conn, key.tenant, job, states=state or (), reviews=review or (), cursor=cursor, limit=limit)
     return PageView[ItemView](items=[ItemView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{job}/motions")
 def list_job_motions(
-    job: UUID, conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 100
+    job: UUID, conn: Connection, key: Reader, found: Found, cursor: Cursor = None, limit: Limit = 100
 ) -> PageView[MotionView]:
-    """Motions of a job, in the order they were made."""
-    page = jobs.list_motions(conn, key.tenant, job=job, cursor=cursor, limit=limit)
+    """Motions of a job that fit everything given, in the order they were made."""
+    page = jobs.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
 
 

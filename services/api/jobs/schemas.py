@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from services.api.motions.schemas import MotionView
 from services.api.schemas import View
 from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
-from shared.jobs import EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
+from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
 MAX_NAME, MAX_COMMENT, MAX_PRIORITY = 200, 2000, 1000
 
@@ -41,6 +41,9 @@ class JobFields(BaseModel):
     priority: int = Field(0, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
     fail_early: float | None = Field(
         None, ge=0, le=1, description="Share of failed items above which the rest is cancelled."
+    )
+    keep_days: int | None = Field(
+        None, ge=1, le=MAX_KEEP_DAYS, description="Days after its end when the job is deleted, with motions and files."
     )
 
 
@@ -95,6 +98,9 @@ class JobView(View):
     created: datetime
     started: datetime | None
     finished: datetime | None
+    keep_days: int | None
+    expires: datetime | None = Field(description="When it is deleted; null = never, or not before it ends.")
+    erased: datetime | None = Field(description="When its prompts were erased.")
 
     @classmethod
     def of(cls, row: JobRow) -> JobView:
@@ -141,6 +147,7 @@ class ItemView(View):
     error: ErrorView | None
     created: datetime
     finished: datetime | None
+    replaces: UUID | None = Field(description="The motion that it is another take of.")
     motion: MotionView | None
 
     @classmethod

@@ -5,25 +5,94 @@ from __future__ import annotations
 from typing import Annotated
 from uuid import UUID
 
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Depends, Path, Query, Response
+from pydantic import Field
 
-from services.api.auth import Reader
+from services.api.auth import Reader, Submitter
 from services.api.context import Connection, Shared
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.api.motions.schemas import MotionDetailView, MotionView
+from services.api.motions.schemas import (
+    MotionDetailView,
+    MotionView,
+    NewRerollBody,
+    NewReviewBody,
+    RerollsView,
+    RerollView,
+    ReviewFilter,
+)
+from services.api.motions.service import made_again
 from services.api.problems import RESPONSES
 from services.api.schemas import Cursor, Limit, PageView
 from shared import jobs
 from shared.errors import NotFound
+from shared.items import MAX_TAG_LENGTH, MAX_TAGS
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 
 
+def motion_filter(
+    tag: Annotated[
+        list[Annotated[str, Field(min_length=1, max_length=MAX_TAG_LENGTH)]] | None,
+        Query(max_length=MAX_TAGS, description="A tag as it was given, such as `shot=010`; several: all of them."),
+    ] = None,
+    name: Annotated[str | None, Query(min_length=1, max_length=100, description="How the name begins.")] = None,
+    text: Annotated[
+        str | None,
+        Query(min_length=1, max_length=500, description='Words of the prompt in any form; `"a phrase"`, `or`, `-not`.'),
+    ] = None,
+    review: Annotated[list[ReviewFilter] | None, Query(description="One of these was said of it.")] = None,
+) -> jobs.MotionFilter:
+    """Which motions a listing shows: those that fit everything given."""
+    said = review or []
+    return jobs.MotionFilter(
+        tags=tag or (),
+        name=name,
+        text=text,
+        reviews=[jobs.Review(each) for each in said if each is not ReviewFilter.NEW],
+        unreviewed=ReviewFilter.NEW in said,
+    )
+
+
+Found = Annotated[jobs.MotionFilter, Depends(motion_filter)]
+
+
 @router.get("")
-def list_motions(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[MotionView]:
-    """Motions, newest first."""
-    page = jobs.list_motions(conn, key.tenant, cursor=cursor, limit=limit)
+def list_motions(
+    conn: Connection,
+    key: Reader,
+    found: Found,
+    job: Annotated[UUID | None, Query(description="Of this job, in the order they were made.")] = None,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> PageView[MotionView]:
+    """Motions that fit everything given, newest first."""
+    page = jobs.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.post("/review")
+def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> list[MotionView]:
+    """Keep or reject motions, all or none; said again, nothing changes. Answers them in the order given."""
+    verdict = None if body.verdict is None else jobs.Review(body.verdict)
+    rows = jobs.review(conn, key.tenant, body.motions, verdict, by=key.name, comment=body.comment)
+    return [MotionView.of(row) for row in rows]
+
+
+@router.post("/reroll", status_code=202)
+def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: Submitter) -> RerollsView:
+    """Make motions again with the next seeds, all or none: new items in their jobs, linked to what they replace.
+
+    A motion has one take after it; asked again, the same one is answered. To go on, re-roll that take.
+    """
+    takes = jobs.reroll(
+        conn,
+        key.tenant,
+        body.motions,
+        lambda item: made_again(item, shared.catalogue),
+        by=key.name,
+        comment=body.comment,
+    )
+    return RerollsView(items=[RerollView.of(take) for take in takes])
 
 
 @router.get("/{motion}")

@@ -3,12 +3,85 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from enum import StrEnum
+from typing import Annotated, Any
 from uuid import UUID
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.files import FileView
 from services.api.schemas import View
-from shared.jobs import MotionRow
+from shared.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
+
+
+class ReviewFilter(StrEnum):
+    """What was said of a motion; `new` = nothing yet."""
+
+    NEW = "new"
+    KEPT = "kept"
+    REJECTED = "rejected"
+    REROLLED = "rerolled"
+
+
+class Verdict(StrEnum):
+    """What may be said of a motion."""
+
+    KEPT = "kept"
+    REJECTED = "rejected"
+
+
+Comment = Annotated[str | None, Field(max_length=2000, pattern=r"^[^\x00]*$")]
+Motions = Annotated[list[UUID], Field(min_length=1, max_length=MAX_REVIEWED)]
+
+
+class NewReviewBody(BaseModel):
+    """A verdict on motions."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    motions: Motions
+    verdict: Verdict | None = Field(description="Null takes back what was said.")
+    comment: Comment = None
+
+
+class NewRerollBody(BaseModel):
+    """Motions to make again, with the next seeds."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    motions: Motions
+    comment: Comment = None
+
+
+class RerollView(View):
+    """Another take of a motion: an item of the same job."""
+
+    motion: UUID
+    item: UUID
+    job: UUID
+    seed: int
+    state: ItemState
+    made: bool = Field(description="False: it was asked for before.")
+
+    @classmethod
+    def of(cls, row: Reroll) -> RerollView:
+        """From a row."""
+        return cls(**vars(row))
+
+
+class RerollsView(View):
+    """Takes, in the order of the motions that they replace."""
+
+    items: list[RerollView]
+
+
+class ReviewView(View):
+    """What a person said of a motion."""
+
+    verdict: Review
+    at: datetime
+    by: str = Field(description="Name of an API key.")
+    comment: str | None
 
 
 class MotionView(View):
@@ -17,7 +90,9 @@ class MotionView(View):
     id: UUID
     job: UUID
     item: UUID
+    index: int
     name: str | None
+    tags: list[str]
     prompt: str
     model: str
     bundle: str
@@ -29,12 +104,23 @@ class MotionView(View):
     elapsed: float
     files: list[FileView]
     created: datetime
+    review: ReviewView | None
+    replaces: UUID | None = Field(description="The motion that it is another take of.")
+    replaced_by: UUID | None = Field(description="The item that is another take of it.")
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionView:
         """From a row."""
         files = [FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.files]
-        return cls(files=files, **{n: getattr(row, n) for n in cls.model_fields if n != "files"})
+        apart = {"files", "tags", "review"}
+        own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
+        return cls(files=files, tags=list(row.tags), review=_review(row), **own)
+
+
+def _review(row: MotionRow) -> ReviewView | None:
+    if row.review is None or row.reviewed is None or row.reviewed_by is None:
+        return None
+    return ReviewView(verdict=row.review, at=row.reviewed, by=row.reviewed_by, comment=row.review_comment)
 
 
 class MotionDetailView(MotionView):

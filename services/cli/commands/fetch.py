@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,22 +18,37 @@ if TYPE_CHECKING:
     from services.cli.fetching import Download
 
 
+class Review(StrEnum):
+    """What was said of a motion."""
+
+    KEPT = "kept"
+    REJECTED = "rejected"
+    REROLLED = "rerolled"
+
+
 def fetch(
     jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help="Jobs whose motions to fetch.")],
     output: options.Folder = Path(),
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
+    only: Annotated[Review | None, typer.Option("--only", help="Only motions of which this was said.")] = None,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
-    """Fetch the motions of jobs: eight files at a time, resumed and checked. Of several jobs, each has its folder."""
+    """Fetch the motions of jobs: eight files at a time, resumed and checked, with a manifest.csv beside them.
+
+    Of several jobs, each has its folder.
+    """
     from services.cli.client import Client
 
     check_template(name_template)
     with Client.here() as client:
         for job in jobs:
             folder = output if len(jobs) == 1 else output / job
-            write_job(client, job, folder, formats, template=name_template, overwrite=overwrite, as_json=as_json)
+            write_job(
+                client, job, folder, formats,
+                template=name_template, only=only, overwrite=overwrite, as_json=as_json,
+            )  # fmt: skip
 
 
 def write_job(
@@ -42,11 +58,12 @@ def write_job(
     formats: Sequence[options.FileFormat] | None,
     *,
     template: str = options.TEMPLATE,
+    only: Review | None = None,
     overwrite: bool = False,
     as_json: bool = False,
 ) -> None:
     """Fetch what a job has made so far and print a line for each of its items, in input order."""
-    lines = fetch_job(client, job, folder, formats, template=template, overwrite=overwrite)
+    lines = fetch_job(client, job, folder, formats, template=template, only=only, overwrite=overwrite)
     for line in lines:
         if as_json:
             console.result_json(line)
@@ -56,6 +73,8 @@ def write_job(
     waiting = sum(line["state"] in ("ready", "leased") for line in lines)
     if waiting:
         console.say(f"{waiting} items of job {job} are not done yet; fetch again later.")
+    if only is not None and not lines:
+        console.say(f"no motion of job {job} is {only.value}: `marey motions keep ID…` says so of some.")
 
 
 def fetch_job(
@@ -65,18 +84,28 @@ def fetch_job(
     formats: Sequence[options.FileFormat] | None = None,
     *,
     template: str = options.TEMPLATE,
+    only: Review | None = None,
     overwrite: bool = False,
 ) -> list[dict[str, Any]]:
-    """Fetch what a job has made so far; the output line of each of its items, in input order."""
+    """Fetch what a job has made so far, and write the manifest; the output line of each of its items, in input order.
+
+    Args:
+        only: items with a motion of which this was said.
+    """
     from services.cli.fetching import check_folder, download_all, plan
+    from services.cli.manifest import check_manifest, row_of, write_manifest
 
     wanted = [f.value for f in formats] if formats else None
-    planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), folder, wanted, template)
+    said = None if only is None else only.value
+    planned = plan(client.pages(f"/v1/jobs/{job}/items", review=said, limit=1000), folder, wanted, template)
     check_folder(folder)
+    check_manifest(folder, overwrite=overwrite)
     downloads = [download for _, files in planned for download in files]
     with console.bar() as bar:
         task = bar.add_task("fetching", total=len(downloads))
         download_all(client, downloads, overwrite=overwrite, done=lambda _: bar.advance(task))
+    rows = [row_of(item, {file.path.suffix[1:]: file.path.name for file in files}) for item, files in planned]
+    write_manifest(folder, job, rows, overwrite=overwrite)
     return [output_line(item, files) for item, files in planned]
 
 

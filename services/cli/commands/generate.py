@@ -140,7 +140,7 @@ def _plan(items: list[Item], bundle: Bundle) -> list[Planned]:
         for variant in range(item.variants):
             wanted = Wanted(item.prompt, seed + variant, item.seconds, item.settings)
             name = item.name or slug(item.prompt)
-            naming = Naming(index, name, seed + variant, variant, bundle.manifest.model, "local")
+            naming = Naming(index, name, seed + variant, variant, bundle.manifest.model, "local", item.tags)
             yield Planned(item, variant, wanted, naming)
 
     return [plan for index, item in enumerate(items) for plan in of(index, item)]

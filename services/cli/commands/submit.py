@@ -23,6 +23,9 @@ def submit(
     fail_early: Annotated[
         float | None, typer.Option("--fail-early", help="Cancel the rest once this share (0 to 1) has failed.")
     ] = None,
+    keep_days: Annotated[
+        int | None, typer.Option("--keep-days", min=1, help="Delete the job, motions and all, this long after its end.")
+    ] = None,
     model: options.Model = None,
     bundle: options.Bundle = None,
     seconds: options.Seconds = None,
@@ -54,6 +57,7 @@ def submit(
             name=name,
             priority=priority or None,
             fail_early=fail_early,
+            keep_days=keep_days,
         )
         if dry_run:
             console.say(f"{job['items']} motions would be made; nothing was submitted.")

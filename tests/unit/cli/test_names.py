@@ -27,7 +27,8 @@ def test_any_prompt_makes_a_plain_slug(prompt: str) -> None:
 
 @pytest.mark.parametrize(
     "template", ["../{name}", "/tmp/{name}", "{name}/{seed}", "..", "{name}\\{seed}", ".{name}", "{", "{0}", "{name!x}",
-                 "{home}", "{name.__class__}", "a:b", "con", "{index:z}"],
+                 "{home}", "{name.__class__}", "{tag}", "{tag[a.b]}", "{tag[a].x}", "{tags[0]}", "a:b", "con",
+                 "{index:z}"],
 )  # fmt: skip
 def test_a_template_that_could_leave_the_folder_is_refused(template: str) -> None:
     with pytest.raises(InvalidInput, match="--name-template"):
@@ -52,3 +53,14 @@ def test_a_name_that_passes_stays_in_its_folder(name: str) -> None:
         assert "/" not in made
         assert "\\" not in made
         assert ".." not in made
+
+
+def test_values_of_tags_stand_in_names_and_never_as_paths() -> None:
+    of = Naming(index=7, name="wave", seed=41, variant=0, model="hgm3", job="j", tags=("shot=010", "hero", "take=../x"))
+    assert file_name("{tag[shot]}_{name}", of, "npz") == "010_wave.npz"
+    assert check_template("{tag[shot]}_{tags}") == "{tag[shot]}_{tags}"
+    with pytest.raises(InvalidInput, match="no tag show="):
+        file_name("{tag[show]}", of, "npz")
+    for template in ("{tag[take]}", "a_{tags}"):
+        with pytest.raises(InvalidInput, match="plain file name"):
+            file_name(template, of, "npz")

@@ -1,0 +1,152 @@
+"""`marey motions …`: find motions, and say which are good."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import console
+from shared.errors import InvalidInput
+
+app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
+
+MOST = 1000
+"""Motions of one request."""
+
+Motions = Annotated[list[str], typer.Argument(metavar="ID…", help="Ids of motions; - reads them from stdin.")]
+Comment = Annotated[str | None, typer.Option("--comment", help="Why; stands beside the verdict.")]
+
+
+class Review(StrEnum):
+    """What was said of a motion; new = nothing yet."""
+
+    NEW = "new"
+    KEPT = "kept"
+    REJECTED = "rejected"
+    REROLLED = "rerolled"
+
+
+@app.command("list")
+def list_motions(
+    tags: Annotated[
+        list[str] | None, typer.Option("--tag", help="A tag as it was given, such as shot=010; several: all of them.")
+    ] = None,
+    name: Annotated[str | None, typer.Option("--name", help="How the name begins.")] = None,
+    text: Annotated[
+        str | None, typer.Option("--text", help='Words of the prompt in any form; "a phrase", or, -not.')
+    ] = None,
+    reviews: Annotated[
+        list[Review] | None, typer.Option("--review", help="What was said of it; several: any of them.")
+    ] = None,
+    job: Annotated[str | None, typer.Option("--job", help="Of this job, in the order they were made.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many.")] = 50,
+    as_json: console.Json = False,
+) -> None:
+    """List motions that fit everything given, newest first."""
+    from itertools import islice
+
+    from services.cli.client import Client
+
+    params: dict[str, Any] = {
+        "tag": tags,
+        "name": name,
+        "text": text,
+        "review": [review.value for review in reviews] if reviews else None,
+        "job": job,
+        "limit": min(limit, MOST),
+    }
+    with Client.here() as client:
+        found = list(islice(client.pages("/v1/motions", **params), limit))
+    if as_json:
+        for motion in found:
+            console.result_json(motion)
+        return
+    columns = ("id", "index", "name", "tags", "seed", "review", "seconds", "prompt")
+    console.table(columns, (_cells(motion) for motion in found))
+
+
+@app.command()
+def keep(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
+    """Say that motions are good: `marey fetch --only kept` fetches them."""
+    _say(motions, "kept", comment, as_json)
+
+
+@app.command()
+def reject(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
+    """Say that motions are no good; nothing is deleted."""
+    _say(motions, "rejected", comment, as_json)
+
+
+@app.command()
+def clear(motions: Motions, as_json: console.Json = False) -> None:
+    """Take back what was said of motions."""
+    _say(motions, None, None, as_json)
+
+
+@app.command()
+def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
+    """Make motions again with the next seed, everything else as it was: a new item in the same job, linked to the old.
+
+    Said twice, it is done once; to go on, re-roll the new motion.
+    """
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for some in _ids(motions):
+            for take in client.post("/v1/motions/reroll", {"motions": some, "comment": comment})["items"]:
+                if as_json:
+                    console.result_json(take)
+                else:
+                    when = "" if take["made"] else f" (asked for before; it is {take['state']})"
+                    console.result(f"{take['motion']} item {take['item']} seed {take['seed']} job {take['job']}{when}")
+
+
+def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: bool) -> None:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for some in _ids(motions):
+            body = {"motions": some, "verdict": verdict, "comment": comment}
+            for motion in client.post("/v1/motions/review", body):
+                if as_json:
+                    console.result_json(motion)
+                else:
+                    console.say(f"{motion['id']} {_review(motion) or Review.NEW.value}")
+
+
+def _ids(motions: list[str]) -> Iterator[list[str]]:
+    """The ids, each once, so many as one request takes at a time.
+
+    Raises:
+        InvalidInput: there is none, or one is no id.
+    """
+    from uuid import UUID
+
+    given = sys.stdin.read().split() if motions == ["-"] else motions
+    ids = list(dict.fromkeys(given))
+    for number, each in enumerate(ids, 1):
+        try:
+            UUID(each)
+        except ValueError:
+            where = f"line {number}" if motions == ["-"] else "ID"
+            raise InvalidInput(
+                f"{each[:60]!r} is not the id of a motion", where=where, hint="`marey motions list` shows them."
+            ) from None
+    if not ids:
+        raise InvalidInput("there is no id of a motion", hint="`marey motions list` shows them.")
+    for first in range(0, len(ids), MOST):
+        yield ids[first : first + MOST]
+
+
+def _cells(motion: dict[str, Any]) -> tuple[object, ...]:
+    seconds = round(motion["frames"] / motion["fps"], 2)
+    own = (motion[name] for name in ("id", "index", "name"))
+    return (*own, "; ".join(motion["tags"]), motion["seed"], _review(motion), seconds, motion["prompt"])
+
+
+def _review(motion: dict[str, Any]) -> str | None:
+    return motion["review"] and motion["review"]["verdict"]
