@@ -82,6 +82,15 @@ class Settings(BaseSettings):
     rewriter_seconds: float = Field(default=10.0, gt=0, le=60)
     """For one prompt, with all tries; then it is read as it was written."""
 
+    public_url: str | None = None
+    """Where clients reach the API, as `https://marey.example.com`; stands in webhooks. Unset = `host` and `port`."""
+    webhook_allow: list[str] = ["public"]
+    """Networks that webhooks may tell, as `["public", "10.1.0.0/16"]`; `public` = the internet, by https."""
+    webhook_key: SecretStr | None = None
+    """Fernet keys of webhooks' signing secrets: the first encrypts, all decrypt. `marey serve` brings its own."""
+    webhook_seconds: float = 1.0
+    """The scheduler looks this often whether there is something to tell."""
+
     live_slots: int = 4
     """Live streams of one worker at once."""
     streams_per_key: int = 4
@@ -92,10 +101,24 @@ class Settings(BaseSettings):
     log_level: str = "INFO"
     log_json: bool = False
 
+    @property
+    def api_url(self) -> str:
+        """Where clients reach the API, without a slash at the end."""
+        return self.local_url if self.public_url is None else self.public_url.rstrip("/")
+
+    @property
+    def local_url(self) -> str:
+        """Where clients on this machine reach the API."""
+        name = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)  # noqa: S104
+        return f"http://[{name}]:{self.port}" if ":" in name else f"http://{name}:{self.port}"
+
     @model_validator(mode="before")
     @classmethod
     def _secrets_by_file(cls, values: dict[str, object]) -> dict[str, object]:
-        for name in ("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"):
+        for name in (
+            *("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
+            "webhook_key",
+        ):
             path = os.environ.get(f"MAREY_{name.upper()}_FILE")
             if path and name not in values:
                 values[name] = Path(path).read_text(encoding="utf-8").strip()

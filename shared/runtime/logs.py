@@ -78,8 +78,8 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
     root = logging.getLogger()
     root.handlers[:] = [handler]
     root.setLevel(level)
-    # One INFO line per hint and per connection tells nothing; the loop logs its own.
-    for noisy in ("celery.worker.strategy", "celery.app.trace", "kombu", "amqp", "urllib3"):
+    # One INFO line per hint and per connection tells nothing; the loop logs its own. httpx2 would tell whole URLs.
+    for noisy in ("celery.worker.strategy", "celery.app.trace", "kombu", "amqp", "urllib3", "httpx2"):
         logging.getLogger(noisy).setLevel(max(logging.WARNING, root.level))
 
 

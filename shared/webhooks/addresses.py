@@ -1,0 +1,140 @@
+"""Which addresses may be told: those of the internet, unless `MAREY_WEBHOOK_ALLOW` says otherwise.
+
+A webhook is a request that somebody else chose and this machine sends: without a rule it reaches what only this machine
+may reach. What counts is the address that is connected to, never how it was written or what a name led to earlier.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
+
+import httpx2
+
+from shared.errors import InvalidInput, Refused
+
+Address = IPv4Address | IPv6Address
+
+PUBLIC = "public"
+MAX_URL = 2000  # characters
+INTERNET_6 = IPv6Network("2000::/3")
+NOT_PUBLIC = (
+    ip_network("192.88.99.0/24"),  # 6to4 relays
+    ip_network("168.63.129.16/32"),  # Azure's own services, seen from its machines alone
+    ip_network("2002::/16"),  # 6to4: an IPv4 address inside
+)
+"""What `ipaddress` takes for public."""
+HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """The rule of this installation.
+
+    Attributes:
+        public: addresses of the internet, over https.
+        networks: these too, also over http.
+    """
+
+    public: bool
+    networks: tuple[IPv4Network | IPv6Network, ...]
+
+    @classmethod
+    def of(cls, values: Sequence[str]) -> Allowed:
+        """From `MAREY_WEBHOOK_ALLOW`: networks, and the word `public`.
+
+        Raises:
+            InvalidInput: something else.
+        """
+        try:
+            networks = tuple(ip_network(value) for value in values if value != PUBLIC)
+        except ValueError as error:
+            raise InvalidInput(
+                str(error), where="MAREY_WEBHOOK_ALLOW", hint='Write ["public", "10.1.0.0/16"].'
+            ) from error
+        return cls(PUBLIC in values, networks)
+
+    def named(self, address: Address) -> bool:
+        """Whether the address is in one of the networks."""
+        return any(address in network for network in self.networks)
+
+    def permits(self, address: Address) -> bool:
+        """Whether the address may be told."""
+        return self.named(address) or (self.public and is_public(address))
+
+
+def parse_address(text: str) -> Address:
+    """An address; an IPv4 address that is written as an IPv6 one is that IPv4 address."""
+    address = ip_address(text)
+    return getattr(address, "ipv4_mapped", None) or address
+
+
+def is_public(address: Address) -> bool:
+    """Whether an address belongs to one machine of the internet."""
+    if isinstance(address, IPv6Address) and address not in INTERNET_6:
+        return False
+    if any(address in network for network in NOT_PUBLIC if network.version == address.version):
+        return False
+    return address.is_global and not address.is_multicast
+
+
+def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
+    """The one to connect to, of the addresses that a name has.
+
+    One that may not be told spoils them all: a name that leads inside and outside is a trick or a mistake.
+
+    Raises:
+        Refused: none, or one of them may not be told, or not over plain http.
+    """
+    addresses = [parse_address(each) for each in found]
+    if not addresses:
+        raise Refused("the host leads nowhere")
+    if not all(allowed.permits(address) for address in addresses):
+        raise Refused("the host leads to an address that may not be told", hint=HINT)
+    if scheme != "https" and not all(allowed.named(address) for address in addresses):
+        raise Refused("http is only for networks that are named", hint=f"Use https. {HINT}")
+    return str(addresses[0])
+
+
+def check_url(text: str, allowed: Allowed) -> str:
+    """The address of a receiver, in its normal form. Names are looked up only when there is something to tell.
+
+    Raises:
+        InvalidInput: it is none, or one that may not be told.
+    """
+    try:
+        url = httpx2.URL(text)
+    except (httpx2.InvalidURL, ValueError) as error:
+        raise _wrong(f"is no URL: {error}") from error
+    if url.scheme not in ("https", "http") or not url.host:
+        raise _wrong("is no https URL", hint="Write it as https://studio.example/marey.")
+    if url.userinfo or url.fragment:
+        raise _wrong("holds a user, a password or a fragment", hint="Leave them out: messages are signed.")
+    if len(str(url)) > MAX_URL or (url.port is not None and not 0 < url.port < 2**16):
+        raise _wrong(f"is over {MAX_URL} characters, or its port is none")
+    literal = _literal(url.host)
+    if literal is not None:
+        try:
+            choose_address([literal], url.scheme, allowed)
+        except Refused as error:
+            raise _wrong(error.message, hint=error.hint) from error
+    elif url.scheme == "http" and not allowed.networks:
+        raise _wrong("is not https", hint=HINT)
+    return str(url)
+
+
+def _literal(host: str) -> str | None:
+    """The address that a host is, however it is written (`2130706433`, `0x7f.1`); None for a name."""
+    if host == "localhost" or host.endswith(".localhost"):
+        return "127.0.0.1"
+    try:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST)
+    except (OSError, UnicodeError):
+        return None
+    return str(found[0][4][0])
+
+
+def _wrong(message: str, hint: str | None = None) -> InvalidInput:
+    return InvalidInput(message, where="url", hint=hint)

@@ -1,0 +1,41 @@
+"""A message as it is sent: JSON with `type`, `timestamp` and `data`, signed as Standard Webhooks say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+from standardwebhooks.webhooks import Webhook
+
+from shared.jobs.webhook_types import DueDelivery
+
+NOUNS = {
+    "job": "/v1/jobs/{}",
+    "stream": "/v1/streams/{}",
+    "evaluation": "/v1/evaluations/{}",
+    "schedule": "/v1/schedules/{}",
+    "webhook": "/v1/webhooks/{}",
+}
+"""Where the API shows what an event names."""
+
+
+def message_of(due: DueDelivery, api: str) -> bytes:
+    """The body, the same in every try; `api` is the address of the API."""
+    urls = {noun: api + path.format(due.data[noun]) for noun, path in NOUNS.items() if due.data.get(noun) is not None}
+    document = {"type": due.kind, "timestamp": due.at.isoformat(), "data": {**due.data, "urls": urls}}
+    return json.dumps(document, separators=(",", ":"), sort_keys=True).encode()
+
+
+def headers_of(due: DueDelivery, body: bytes, secret: str, now: datetime | None = None) -> Mapping[str, str]:
+    """The headers of one try: the id of the event, the time of the try, the signature over both and the body."""
+    at = now or datetime.now(UTC)
+    identifier = str(due.event)
+    return {
+        "content-type": "application/json",
+        "user-agent": f"Marey/{version('marey')}",
+        "webhook-id": identifier,
+        "webhook-timestamp": str(int(at.timestamp())),
+        "webhook-signature": Webhook(secret).sign(identifier, at, body.decode()),
+    }

@@ -1,0 +1,90 @@
+"""Signing secrets at rest: encrypted under a key that is not in the database, so that a copy of the one without the
+other signs nothing.
+
+`MAREY_WEBHOOK_KEY` may hold several keys: the first encrypts, all decrypt, so that keys can be changed. `marey serve`
+draws one into a file of its home.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import secrets
+from pathlib import Path
+
+from cryptography.fernet import Fernet, InvalidToken, MultiFernet
+
+from shared.errors import InvalidInput, Refused
+from shared.settings import Settings
+
+KEY_FILE = "webhook.key"
+WHERE = "MAREY_WEBHOOK_KEY"
+SECRET_BYTES = 32
+PREFIX = "whsec_"
+
+
+class Vault:
+    """Encrypts and decrypts signing secrets."""
+
+    def __init__(self, keys: str) -> None:
+        """
+        Args:
+            keys: Fernet keys, separated by white space or commas.
+
+        Raises:
+            InvalidInput: none, or no such keys.
+        """
+        try:
+            self._fernet = MultiFernet([Fernet(key) for key in keys.replace(",", " ").split()])
+        except ValueError as error:
+            hint = "A key is 32 random bytes in URL-safe base64: `openssl rand -base64 32 | tr +/ -_`."
+            raise InvalidInput("is not a list of keys", where=WHERE, hint=hint) from error
+
+    @classmethod
+    def of(cls, config: Settings) -> Vault:
+        """The vault of this installation.
+
+        Raises:
+            Refused: it has no key.
+            InvalidInput: its key is none.
+        """
+        if config.webhook_key is None:
+            raise Refused(
+                "this server has no key for the secrets of webhooks", where=WHERE, hint="Its operator sets one."
+            )
+        return cls(config.webhook_key.get_secret_value())
+
+    def encrypt(self, secret: str) -> bytes:
+        """What the database keeps of a secret."""
+        return self._fernet.encrypt(secret.encode())
+
+    def decrypt(self, stored: bytes) -> str:
+        """The secret.
+
+        Raises:
+            InvalidInput: it was encrypted under another key.
+        """
+        try:
+            return self._fernet.decrypt(stored).decode()
+        except InvalidToken as error:
+            hint = "Give the key that was in force then as well, behind the new one."
+            raise InvalidInput("does not open this webhook's secret", where=WHERE, hint=hint) from error
+
+
+def new_signing_secret() -> str:
+    """A secret in the form of Standard Webhooks: `whsec_` and base64."""
+    return PREFIX + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
+
+
+def key_file(folder: Path) -> Path:
+    """The file with this folder's key, readable by its owner alone; drawn if it is not there."""
+    path = folder / KEY_FILE
+    temporary = path.with_suffix(".key.part")
+    if not path.exists():
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(Fernet.generate_key() + b"\n")
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(path)
+    return path
