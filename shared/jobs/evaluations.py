@@ -28,6 +28,7 @@ from shared.jobs.evaluation_types import (
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, among
 from shared.jobs.operate import cancel
+from shared.jobs.outbox import tell_of_evaluation
 from shared.jobs.pages import cut_page, page_limit, read_cursor
 from shared.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
 from shared.jobs.submit import check_text
@@ -189,6 +190,10 @@ def move_evaluation(
     changed = {"state": state, "reason": reason, **times, **values}
     conn.execute(sa.update(table).where(table.c.id == row.id).values(changed))
     _note(conn, row.id, state, reason)
+    if state not in OPEN_EVALUATIONS:
+        regressed = values.get("regressed")
+        told = None if regressed is None else bool(regressed)
+        tell_of_evaluation(conn, row.tenant, row.id, state, schedule=row.schedule, regressed=told)
 
 
 def cancel_evaluation(

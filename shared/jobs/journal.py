@@ -14,6 +14,7 @@ from sqlalchemy.dialects.postgresql import ARRAY, insert
 from shared.errors import NotFound
 from shared.jobs import schema
 from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from shared.jobs.outbox import tell_of_job
 from shared.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
 
 CLOCK = sa.func.clock_timestamp()
@@ -133,7 +134,8 @@ def record(
     added: int = 0,
     control: JobControl | None = None,
 ) -> LockedJob:
-    """Write what happened to a job under lock: counters, control, times, events with their numbers, notification.
+    """Write what happened to a job under lock: counters, control, times, events with their numbers, notification, and
+    what webhooks are told.
 
     Args:
         moved: how many items went from one state to another.
@@ -164,6 +166,7 @@ def record(
         conn.execute(sa.delete(schema.lane).where(schema.lane.c.job_id == job.id))  # all empty; a retry makes them anew
     if events:
         _write_events(conn, after, events, first=last - len(events) + 1)
+    tell_of_job(conn, job.tenant, job.id, job.state, after.state, after.counters())
     return after
 
 

@@ -1,7 +1,6 @@
-"""The tables. `migrations/` makes them; a test compares the two.
+"""The tables. `migrations/` makes them; a test compares the two. Those of webhooks stand in `webhook_schema.py`.
 
-Rooms left, without tables yet: a webhook outbox (written by `record` in the transaction of the event), quotas and
-rates (columns of `tenant`).
+Rooms left, without tables yet: quotas and rates (columns of `tenant`).
 
 The rows of `job` and `lane` change with every claim and commit. No index names what changes in them, and their pages
 are half empty, so that Postgres cleans up behind each update by itself (heap-only tuples) and a claim costs the same

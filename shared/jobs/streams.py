@@ -19,6 +19,7 @@ from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
 from shared.jobs.listings import cut_page, page_limit, read_cursor
+from shared.jobs.outbox import tell_of_stream
 from shared.jobs.states import OPEN_STREAMS, StreamState
 from shared.jobs.submit import check_text, submit
 from shared.jobs.types import (
@@ -190,7 +191,8 @@ def end_stream(
     ours = (table.c.id == stream) & table.c.state.in_(OPEN)
     if fence is not None:
         ours &= table.c.fence == fence
-    row = conn.execute(sa.select(table.c.tenant_id, table.c.name).where(ours).with_for_update()).one_or_none()
+    asked = sa.select(table.c.tenant_id, table.c.name, table.c.frames).where(ours)
+    row = conn.execute(asked.with_for_update()).one_or_none()
     if row is None:
         return False
     job = None
@@ -199,8 +201,9 @@ def end_stream(
         texts = insert(schema.text_features).values(key=item.text_key, blob=blob)
         conn.execute(texts.on_conflict_do_nothing())
         job = submit(conn, NewJob([item], tenant=row.tenant_id, name=row.name, comment=f"clip of stream {stream}")).id
+    state = StreamState.ENDED if problem is None else StreamState.FAILED
     values = {
-        "state": StreamState.ENDED if problem is None else StreamState.FAILED,
+        "state": state,
         "reason": reason,
         "problem": None if problem is None else asdict(problem),
         "job_id": job,
@@ -208,6 +211,7 @@ def end_stream(
         "seen_at": CLOCK,
     }
     conn.execute(sa.update(table).where(table.c.id == stream).values(values))
+    tell_of_stream(conn, row.tenant_id, stream, state, frames=row.frames, job=job)
     return True
 
 

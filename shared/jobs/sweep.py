@@ -9,6 +9,7 @@ import sqlalchemy as sa
 
 from shared.jobs import schema
 from shared.jobs.database import transaction
+from shared.jobs.deliveries import forget_events
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
 from shared.jobs.policy import Policy, policy
 from shared.jobs.results import drop_empty_lease, end_dead, give_back, held_items
@@ -17,7 +18,7 @@ from shared.jobs.types import Problem, SweepReport
 
 
 def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
-    """Take back expired leases, make due items ready, forget old idempotency rows and workers.
+    """Take back expired leases, make due items ready, forget old idempotency rows, workers and events of webhooks.
 
     An item of a lost lease is marked `solo`: it is claimed alone next time, and only the loss of a lease it was alone
     in (as such) counts as an attempt. Safe to run in several processes at once; each job is a transaction of its own.
@@ -104,6 +105,7 @@ def _tidy(conn: sa.Connection, rules: Policy) -> int:
     keys, workers, assets = schema.idempotency, schema.worker, schema.asset
     conn.execute(sa.delete(keys).where(keys.c.created_at < CLOCK - interval(rules.idempotency)))
     conn.execute(sa.delete(workers).where(workers.c.seen_at < CLOCK - interval(rules.worker_kept)))
+    forget_events(conn)
     return conn.execute(
         sa.select(sa.func.count())
         .select_from(assets)

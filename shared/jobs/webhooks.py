@@ -1,0 +1,142 @@
+"""Webhooks: who wants to be told of what. Their signing secrets come here encrypted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.errors import Conflict, InvalidInput, NotFound
+from shared.jobs import schema
+from shared.jobs.ids import new_id
+from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.submit import check_text
+from shared.jobs.types import Page
+from shared.jobs.webhook_schema import webhook, webhook_delivery
+from shared.jobs.webhook_types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
+
+MAX_WEBHOOKS = 20
+"""Of a tenant: each of its events is written once for each that wants it."""
+
+
+def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
+    """A new webhook; it is told of what happens from now on.
+
+    Raises:
+        InvalidInput: no events, or text that the database cannot hold.
+        Conflict: the tenant has as many as it may.
+    """
+    check_text(new.name, "name")
+    check_text(new.url, "url")
+    # The tenant's row is the lock: two requests at once count one after the other.
+    tenant = schema.tenant.c
+    conn.execute(sa.select(tenant.id).where(tenant.id == new.tenant).with_for_update(key_share=True))
+    mine = sa.select(sa.func.count()).select_from(webhook).where(webhook.c.tenant_id == new.tenant)
+    if conn.execute(mine).scalar_one() >= MAX_WEBHOOKS:
+        raise Conflict(f"there are {MAX_WEBHOOKS} webhooks, as many as there may be", hint="Remove one first.")
+    identifier = new_id()
+    conn.execute(
+        sa.insert(webhook).values(
+            id=identifier,
+            tenant_id=new.tenant,
+            name=new.name,
+            url=new.url,
+            events=_kinds(new.events),
+            secret=new.secret,
+        )
+    )
+    return identifier
+
+
+def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRow:
+    """One webhook.
+
+    Raises:
+        NotFound: the tenant has no such webhook.
+    """
+    table = webhook.c
+    row = conn.execute(_webhooks().where(table.tenant_id == tenant, table.id == identifier)).mappings().one_or_none()
+    if row is None:
+        raise no_such_webhook(identifier)
+    return _row(row)
+
+
+def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[WebhookRow]:
+    """Webhooks, newest first."""
+    table = webhook.c
+    query = _webhooks().where(table.tenant_id == tenant)
+    if cursor is not None:
+        query = query.where(table.id < read_cursor(cursor, UUID))
+    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_row(row) for row in rows], limit, lambda row: str(row.id))
+
+
+def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: WebhookChange) -> WebhookRow:
+    """Change a webhook. While it is paused its deliveries wait; afterwards they go on, to the address it has then.
+
+    Raises:
+        NotFound: the tenant has no such webhook.
+        InvalidInput: no events, or text that the database cannot hold.
+    """
+    check_text(change.name, "name")
+    check_text(change.url, "url")
+    values: dict[str, Any] = {
+        name: value
+        for name, value in (("url", change.url), ("name", change.name), ("paused", change.paused))
+        if value is not None
+    }
+    if change.events is not None:
+        values["events"] = _kinds(change.events)
+    table = webhook.c
+    if values:
+        ours = sa.update(webhook).where(table.tenant_id == tenant, table.id == identifier)
+        conn.execute(ours.values(values))
+    return get_webhook(conn, tenant, identifier)
+
+
+def delete_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> None:
+    """Remove a webhook, with its deliveries and their log.
+
+    Raises:
+        NotFound: the tenant has no such webhook.
+    """
+    table = webhook.c
+    gone = conn.execute(sa.delete(webhook).where(table.tenant_id == tenant, table.id == identifier))
+    if gone.rowcount == 0:
+        raise no_such_webhook(identifier)
+
+
+def no_such_webhook(identifier: UUID) -> NotFound:
+    """The error for a webhook that is not there, or somebody else's."""
+    return NotFound(
+        "there is no such webhook", where=f"webhook {identifier}", hint="`marey webhooks list` shows yours."
+    )
+
+
+def _kinds(events: Sequence[EventKind]) -> list[str]:
+    if not events:
+        raise InvalidInput("is empty", where="events", hint=f"There are {', '.join(EventKind)}.")
+    return sorted({str(kind) for kind in events})
+
+
+def _webhooks() -> sa.Select[*tuple[Any, ...]]:
+    c, delivery = webhook.c, webhook_delivery.c
+
+    def count(state: DeliveryState) -> sa.ScalarSelect[int]:
+        query = sa.select(sa.func.count()).select_from(webhook_delivery)
+        return query.where(delivery.webhook_id == c.id, delivery.state == state).scalar_subquery()
+
+    return sa.select(
+        *(c.id, c.tenant_id.label("tenant"), c.name, c.url, c.events, c.paused),
+        count(DeliveryState.PENDING).label("pending"),
+        count(DeliveryState.FAILED).label("failed"),
+        c.created_at.label("created"),
+    )
+
+
+def _row(row: sa.RowMapping) -> WebhookRow:
+    values: dict[str, Any] = dict(row)
+    values["events"] = tuple(EventKind(kind) for kind in row["events"])
+    return WebhookRow(**values)
