@@ -25,6 +25,7 @@ from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
 from shared.settings import Settings
 from shared.storage import open_store
+from shared.webhooks.vault import key_file
 
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "operate", "read", "submit")
@@ -93,7 +94,7 @@ class Supervisor:
                     revoke_key(conn, DEFAULT_TENANT, old.id)
             key = create_key(conn, KEY_NAME, KEY_SCOPES).secret
         engine.dispose()
-        self._server = Server(f"http://{_reachable(self.config.host)}:{self.config.port}", key, os.getpid())
+        self._server = Server(self.config.local_url, key, os.getpid())
         environment = self._environment(database_url, queue_url)
         self._children = [
             self._child("api", ["api"], environment),
@@ -126,9 +127,11 @@ class Supervisor:
         return [model for model in SHOWS if self.config.live_slots and any(model in role for role in self.roles)]
 
     def _environment(self, database_url: str, queue_url: str) -> dict[str, str]:
+        keys = {} if self.config.webhook_key else {"MAREY_WEBHOOK_KEY_FILE": str(key_file(self.home))}
         computing = sum(any(queue in GENERATORS for queue in role) for role in self.roles)
         return {
             **os.environ,
+            **keys,
             "MAREY_HOME": str(self.home),
             "MAREY_DATABASE_URL": database_url,
             "MAREY_QUEUE_URL": queue_url,
@@ -230,12 +233,6 @@ def any_port(host: str) -> int:
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.bind((host, 0))
         return probe.getsockname()[1]
-
-
-def _reachable(host: str) -> str:
-    """The name clients on this machine use for an address to listen on."""
-    name = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104
-    return f"[{name}]" if ":" in name else name
 
 
 def _answers(url: str) -> bool:

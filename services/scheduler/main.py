@@ -1,5 +1,5 @@
-"""`marey scheduler`: relay, sweeper, evaluations and schedules in one process. A second one beside it is harmless, and
-so is its death."""
+"""`marey scheduler`: relay, sweeper, evaluations, schedules and webhooks in one process. A second one beside it is
+harmless, and so is its death."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import sqlalchemy as sa
 from services.scheduler.evaluations import Evaluations
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
+from services.scheduler.sending import Sender
+from services.scheduler.webhooks import Deliverer
 from shared.errors import InvalidInput
 from shared.jobs import (
     Problem,
@@ -26,6 +28,8 @@ from shared.runtime.queue import redis_client
 from shared.runtime.signals import stop_on_signals
 from shared.settings import Settings
 from shared.storage import open_store
+from shared.webhooks.addresses import Allowed
+from shared.webhooks.vault import Vault
 
 log = logger(__name__)
 
@@ -44,7 +48,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     Neither database, queue nor store has to be there at the start: every part waits for what it needs.
 
     Raises:
-        InvalidInput: a setting is missing.
+        InvalidInput: a setting is missing, or one of webhooks makes no sense.
     """
     if chosen.database_url is None or chosen.queue_url is None:
         raise InvalidInput(
@@ -64,6 +68,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     threads = [
         Relay(engine, database_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping),
         *_periodic(engine, chosen, stopping),
+        *_webhooks(engine, chosen, stopping),
     ]
     for thread in threads:
         thread.start()
@@ -75,6 +80,17 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     lists.close()
     engine.dispose()
     return 0
+
+
+def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Deliverer]:
+    """None without a key: then the API makes no webhooks."""
+    sender = Sender(Allowed.of(chosen.webhook_allow))
+    if chosen.webhook_key is None:
+        log.warning("webhooks_off", reason="MAREY_WEBHOOK_KEY is not set")
+        return []
+    vault = Vault.of(chosen)
+    seconds = chosen.webhook_seconds
+    return [Deliverer(engine, vault, sender, api=chosen.api_url, interval=seconds, stopping=stopping)]
 
 
 def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:

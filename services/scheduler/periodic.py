@@ -1,4 +1,4 @@
-"""A thread that does one thing every so often, and outlives whatever that does. Webhooks go here too."""
+"""A thread that does one thing every so often, and outlives whatever that does."""
 
 from __future__ import annotations
 

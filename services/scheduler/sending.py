@@ -1,0 +1,122 @@
+"""One request to a receiver: to the address that was checked, bounded in time and in bytes, followed nowhere."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+import ssl
+import time
+from collections.abc import Mapping
+
+import httpx2
+
+from shared.errors import MareyError, Refused
+from shared.jobs import Attempt
+from shared.webhooks.addresses import Allowed, choose_address
+
+CONNECT_SECONDS = 5.0
+ATTEMPT_SECONDS = 15.0
+"""For the whole of a try: name, connection, request, answer."""
+DRAIN_SECONDS = 2.0
+MAX_ANSWER = 16 * 2**10
+"""Bytes of an answer that are read, and thrown away: only its status tells."""
+
+
+class Sender:
+    """Sends messages. Nothing is shared between two of them: no connection, no cookie."""
+
+    def __init__(
+        self, allowed: Allowed, *, tls: ssl.SSLContext | None = None, seconds: float = ATTEMPT_SECONDS
+    ) -> None:
+        """
+        Args:
+            tls: whom to trust; None = what the machine trusts, or SSL_CERT_FILE.
+            seconds: of a try.
+        """
+        self._allowed = allowed
+        self._tls = tls or httpx2.create_ssl_context()
+        self._seconds = seconds
+
+    async def send(self, url: str, headers: Mapping[str, str], body: bytes) -> Attempt:
+        """POST; how it went. Never raises for what a receiver or the network does."""
+        began = time.monotonic()
+        status: int | None = None
+        try:
+            status = await self._post(httpx2.URL(url), headers, body)
+            error = None if 200 <= status < 300 else _refusal(status)
+        except TimeoutError:
+            error = f"no answer within {self._seconds:g} s"
+        except MareyError as refused:
+            error = refused.message
+        except (httpx2.HTTPError, httpx2.InvalidURL, ssl.SSLError, OSError) as failure:
+            error = _told(failure)
+        return Attempt(status, time.monotonic() - began, error)
+
+    async def _post(self, url: httpx2.URL, headers: Mapping[str, str], body: bytes) -> int:
+        """The status of the answer."""
+        client = httpx2.AsyncClient(
+            verify=self._tls,
+            trust_env=False,  # a proxy would look the name up once more
+            follow_redirects=False,
+            timeout=httpx2.Timeout(self._seconds, connect=CONNECT_SECONDS),
+        )
+        async with client:
+            async with asyncio.timeout(self._seconds):  # the client's own limits are for each read
+                response = await self._ask(client, url, headers, body)
+            async with contextlib.aclosing(response):
+                await _drain(response)
+            return response.status_code
+
+    async def _ask(
+        self, client: httpx2.AsyncClient, url: httpx2.URL, headers: Mapping[str, str], body: bytes
+    ) -> httpx2.Response:
+        """The answer, up to its body. The connection goes to the address that was checked; Host, SNI and certificate
+        are those of the name."""
+        name = url.raw_host.decode("ascii")
+        address = await self._resolve(name, url)
+        host = f"[{name}]" if ":" in name else name
+        named = {**headers, "host": host if url.port is None else f"{host}:{url.port}"}
+        request = client.build_request(
+            "POST", url.copy_with(host=address), headers=named, content=body, extensions={"sni_hostname": name}
+        )
+        return await client.send(request, stream=True)
+
+    async def _resolve(self, name: str, url: httpx2.URL) -> str:
+        loop = asyncio.get_running_loop()
+        try:
+            found = await loop.getaddrinfo(name, url.port, type=socket.SOCK_STREAM)
+        except (socket.gaierror, UnicodeError) as error:
+            raise Refused("the host is not known") from error
+        return choose_address([str(each[4][0]) for each in found], url.scheme, self._allowed)
+
+
+async def _drain(response: httpx2.Response) -> None:
+    """Read a short answer, so that the receiver sees an orderly end; leave a long or slow one. Not decompressed."""
+    read = 0
+    try:
+        async with asyncio.timeout(DRAIN_SECONDS):
+            async for part in response.aiter_raw():
+                read += len(part)
+                if read > MAX_ANSWER:
+                    return
+    except (TimeoutError, httpx2.HTTPError):
+        return  # its status is here already
+
+
+def _refusal(status: int) -> str:
+    return f"answered {status}" + (", and redirects are not followed" if 300 <= status < 400 else "")
+
+
+def _told(error: Exception) -> str:
+    """A failure in a line, without addresses: the log is the tenant's, the network is not."""
+    what = type(error).__name__
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, ssl.SSLCertVerificationError):
+            return f"its certificate is not valid: {cause.verify_message}"
+        if isinstance(cause, OSError) and not isinstance(cause, ssl.SSLError) and cause.errno is not None:
+            what = os.strerror(cause.errno)
+        cause = cause.__cause__ or cause.__context__
+    return f"it cannot be reached: {what}"

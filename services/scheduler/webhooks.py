@@ -1,0 +1,158 @@
+"""Tells webhooks what the outbox holds, in a thread and an event loop of its own: a receiver that is slow, hangs or is
+away keeps a slot, and nothing else, waiting. A second scheduler skips what the first has claimed."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from services.scheduler.sending import Sender
+from shared.errors import InvalidInput, Unreachable
+from shared.jobs import (
+    Attempt,
+    DeliveryState,
+    DueDelivery,
+    claim_deliveries,
+    give_back_deliveries,
+    record_attempt,
+    transaction,
+)
+from shared.runtime.logs import logger
+from shared.webhooks.message import headers_of, message_of
+from shared.webhooks.vault import Vault
+
+log = logger(__name__)
+
+SLOTS = 64
+"""Tries at the same time; they wait for others, and compute nothing."""
+EACH = 4
+"""Tries of one webhook at the same time."""
+LOOKUPS = 16
+"""Names looked up at the same time."""
+STOP_SECONDS = 5.0
+"""For tries under way at the end; then they are given back."""
+
+Given = TypeVar("Given")
+
+
+class Deliverer(threading.Thread):
+    """Looks every `interval` seconds, and whenever a try has ended, until `stopping`."""
+
+    def __init__(
+        self,
+        engine: sa.Engine,
+        vault: Vault,
+        sender: Sender,
+        *,
+        api: str,
+        interval: float,
+        stopping: threading.Event,
+    ) -> None:
+        super().__init__(name="webhooks", daemon=True)
+        self._engine = engine
+        self._vault = vault
+        self._sender = sender
+        self._api = api
+        self._interval = interval
+        self._stopping = stopping
+        self._database = ThreadPoolExecutor(2, "webhooks-database")  # apart from look-ups, which may hang
+        self._under_way: dict[asyncio.Task[None], DueDelivery] = {}
+        self._away = False
+
+    def run(self) -> None:
+        asyncio.run(self._loop())
+        self._database.shutdown()
+
+    async def _loop(self) -> None:
+        asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(LOOKUPS, "webhooks-names"))
+        while not self._stopping.is_set():
+            try:
+                for due in await self._blocking(self._claim):
+                    self._under_way[asyncio.create_task(self._deliver(due))] = due
+                self._away = False
+            except Unreachable as error:
+                if not self._away:
+                    log.warning("webhooks_wait", error=error.message)
+                self._away = True
+            except Exception:
+                log.exception("webhooks_failed")
+            await self._pause()
+        await self._end()
+
+    async def _pause(self) -> None:
+        """Until a try has ended, or the next look is due."""
+        if self._under_way and not self._away:
+            await asyncio.wait(self._under_way, timeout=self._interval, return_when=asyncio.FIRST_COMPLETED)
+        else:
+            await asyncio.sleep(self._interval)
+        self._forget_ended()
+
+    async def _end(self) -> None:
+        if self._under_way:
+            await asyncio.wait(self._under_way, timeout=STOP_SECONDS)
+        self._forget_ended()
+        left = dict(self._under_way)
+        for task in left:
+            task.cancel()
+        if left:
+            await asyncio.wait(left)
+            try:
+                await self._blocking(lambda: self._give_back(list(left.values())))
+            except Unreachable as error:
+                log.warning("webhooks_not_given_back", error=error.message)  # their claims run out
+
+    def _forget_ended(self) -> None:
+        for task in [task for task in self._under_way if task.done()]:
+            del self._under_way[task]
+
+    async def _deliver(self, due: DueDelivery) -> None:
+        try:
+            body = message_of(due, self._api)
+            try:
+                headers = headers_of(due, body, self._vault.decrypt(due.secret))
+            except InvalidInput as error:
+                attempt = Attempt(None, 0.0, str(error).splitlines()[0])
+            else:
+                attempt = await self._sender.send(due.url, headers, body)
+            state = await self._blocking(lambda: self._record(due, attempt))
+        except Unreachable as error:
+            log.warning("webhook_not_recorded", event_id=str(due.event), error=error.message)  # told again, later
+        except Exception:
+            log.exception("webhook_failed", event_id=str(due.event))
+        else:
+            _note(due, attempt, state)
+
+    # --- in threads: the database is synchronous ---
+
+    async def _blocking(self, act: Callable[[], Given]) -> Given:
+        return await asyncio.get_running_loop().run_in_executor(self._database, act)
+
+    def _claim(self) -> list[DueDelivery]:
+        free = SLOTS - len(self._under_way)
+        if free <= 0:
+            return []
+        busy: set[UUID] = {due.webhook for due in self._under_way.values()}
+        with transaction(self._engine) as conn:
+            return claim_deliveries(conn, free, each=EACH, busy=busy)
+
+    def _record(self, due: DueDelivery, attempt: Attempt) -> DeliveryState | None:
+        with transaction(self._engine) as conn:
+            return record_attempt(conn, due, attempt)
+
+    def _give_back(self, left: Sequence[DueDelivery]) -> None:
+        with transaction(self._engine) as conn:
+            give_back_deliveries(conn, left)
+
+
+def _note(due: DueDelivery, attempt: Attempt, state: DeliveryState | None) -> None:
+    values = {"webhook": str(due.webhook), "event_id": str(due.event), "kind": due.kind, "status": attempt.status}
+    if state is DeliveryState.DELIVERED:
+        log.info("webhook_delivered", **values)
+    else:
+        log.warning("webhook_not_delivered", **values, error=attempt.error, state=state)
