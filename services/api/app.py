@@ -33,12 +33,15 @@ from services.api.streams.hub import Hub
 from services.api.streams.routes import router as streams_router
 from services.api.streams.wire import StreamProtocol
 from services.api.tailer import Tailer
+from services.api.webhooks.routes import router as webhooks_router
 from services.text.routes import router as texts_router
 from shared.errors import InvalidInput
 from shared.jobs import create_engine
 from shared.runtime.logs import configure_logging
 from shared.settings import Settings, settings
 from shared.storage import open_store
+from shared.webhooks.addresses import Allowed
+from shared.webhooks.vault import Vault
 
 CONNECTIONS = 10
 """Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
@@ -52,7 +55,7 @@ SOCKETS: dict[str, Any] = {
 """What uvicorn must know of WebSockets."""
 ROUTERS = (
     *(health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router),
-    *(evaluations_router, schedules_router),
+    *(evaluations_router, schedules_router, webhooks_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)
 TEXT_ROUTERS = (health_router, texts_router)
@@ -89,6 +92,9 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
             where="MAREY_DATABASE_URL",
             hint="Set it, or use `marey serve`, which brings one.",
         )
+    Allowed.of(config.webhook_allow)  # what is wrong with it is said at the start
+    if config.webhook_key is not None:
+        Vault.of(config)
     url = config.database_url.get_secret_value()
     engine = create_engine(url, pool_size=CONNECTIONS, max_overflow=CONNECTIONS)
     tailer = Tailer(engine, url)

@@ -24,6 +24,7 @@ from services.cli.commands import (
     submit,
     text,
     train,
+    webhooks,
 )
 from shared.errors import MareyError
 
@@ -93,6 +94,7 @@ app.add_typer(models.app, name="models")
 app.add_typer(data.app, name="data")
 app.add_typer(train.app, name="train")
 app.add_typer(evaluate.app, name="eval")
+app.add_typer(webhooks.app, name="webhooks")
 app.command("convert")(convert.convert)
 app.command("render")(convert.render)
 app.command("doctor")(admin.doctor)

@@ -1,0 +1,100 @@
+"""`/v1/webhooks`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+from uuid import UUID
+
+from fastapi import APIRouter, Query, Response
+
+from services.api.auth import Operator, Reader
+from services.api.context import Connection, Shared
+from services.api.problems import RESPONSES
+from services.api.schemas import Cursor, Limit, PageView
+from services.api.webhooks.schemas import (
+    DeliveryDetailView,
+    DeliveryView,
+    MadeWebhookView,
+    NewWebhookBody,
+    WebhookPatch,
+    WebhookView,
+)
+from shared import jobs
+from shared.webhooks.addresses import Allowed, check_url
+from shared.webhooks.vault import Vault, new_signing_secret
+
+router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES)
+
+
+@router.post("", status_code=201)
+def create_webhook(
+    body: NewWebhookBody, response: Response, shared: Shared, conn: Connection, key: Operator
+) -> MadeWebhookView:
+    """Be told of what happens from now on. The answer has the signing secret, which is shown only here."""
+    url = check_url(body.url, Allowed.of(shared.config.webhook_allow))
+    secret = new_signing_secret()
+    sealed = Vault.of(shared.config).encrypt(secret)
+    made = jobs.create_webhook(conn, jobs.NewWebhook(key.tenant, url, body.events, sealed, body.name))
+    response.headers["Location"] = f"/v1/webhooks/{made}"
+    return MadeWebhookView.made(jobs.get_webhook(conn, key.tenant, made), secret)
+
+
+@router.get("")
+def list_webhooks(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[WebhookView]:
+    """Webhooks, newest first."""
+    page = jobs.list_webhooks(conn, key.tenant, cursor=cursor, limit=limit)
+    return PageView[WebhookView](items=[WebhookView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{webhook}")
+def get_webhook(webhook: UUID, conn: Connection, key: Reader) -> WebhookView:
+    """One webhook."""
+    return WebhookView.of(jobs.get_webhook(conn, key.tenant, webhook))
+
+
+@router.patch("/{webhook}")
+def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Connection, key: Operator) -> WebhookView:
+    """Change what is given. While it is paused its messages wait; then they go to the address it has then."""
+    fields = patch.model_dump()
+    if patch.url is not None:
+        fields["url"] = check_url(patch.url, Allowed.of(shared.config.webhook_allow))
+    return WebhookView.of(jobs.change_webhook(conn, key.tenant, webhook, jobs.WebhookChange(**fields)))
+
+
+@router.delete("/{webhook}", status_code=204, response_class=Response)
+def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
+    """Remove a webhook, with its deliveries and their log."""
+    jobs.delete_webhook(conn, key.tenant, webhook)
+
+
+@router.post("/{webhook}/test", status_code=202)
+def send_test(webhook: UUID, conn: Connection, key: Operator) -> DeliveryView:
+    """Send it a message of the type `webhook.test`, which is tried once."""
+    return DeliveryView.of(jobs.send_test(conn, key.tenant, webhook))
+
+
+@router.get("/{webhook}/deliveries")
+def list_deliveries(
+    webhook: UUID,
+    conn: Connection,
+    key: Reader,
+    state: Annotated[list[jobs.DeliveryState] | None, Query()] = None,
+    cursor: Cursor = None,
+    limit: Limit = 50,
+) -> PageView[DeliveryView]:
+    """What it was told in the last 30 days, newest first."""
+    page = jobs.list_deliveries(conn, key.tenant, webhook, states=state or (), cursor=cursor, limit=limit)
+    return PageView[DeliveryView](items=[DeliveryView.of(row) for row in page.rows], next=page.cursor)
+
+
+@router.get("/{webhook}/deliveries/{event}")
+def get_delivery(webhook: UUID, event: UUID, conn: Connection, key: Reader) -> DeliveryDetailView:
+    """One delivery with its tries."""
+    row = jobs.get_delivery(conn, key.tenant, webhook, event)
+    return DeliveryDetailView.detail(row, jobs.delivery_attempts(conn, webhook, event))
+
+
+@router.post("/{webhook}/deliveries/{event}/replay", status_code=202)
+def replay_delivery(webhook: UUID, event: UUID, conn: Connection, key: Operator) -> DeliveryView:
+    """Deliver it once more, now, under the same id and with all tries; also one that waits for its next try."""
+    return DeliveryView.of(jobs.replay_delivery(conn, key.tenant, webhook, event))

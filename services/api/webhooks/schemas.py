@@ -1,0 +1,121 @@
+"""What the routes of webhooks take and give."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from services.api.jobs.schemas import MAX_NAME
+from services.api.schemas import View
+from shared.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
+from shared.webhooks.addresses import MAX_URL
+
+PLAIN = r"^[^\x00-\x1f]*$"
+URL = "Where messages are sent: https, at an address that MAREY_WEBHOOK_ALLOW permits."
+PAUSED = "While it is paused its messages wait."
+
+
+class NewWebhookBody(BaseModel):
+    """A webhook to make."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    url: str = Field(min_length=1, max_length=MAX_URL, pattern=PLAIN, description=URL)
+    events: list[EventKind] = Field(
+        default_factory=lambda: list(EventKind), min_length=1, description="What it is told of; none given = all."
+    )
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+
+
+class WebhookPatch(BaseModel):
+    """Changes to a webhook; what is not given stays."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    url: str | None = Field(None, min_length=1, max_length=MAX_URL, pattern=PLAIN, description=URL)
+    events: list[EventKind] | None = Field(None, min_length=1)
+    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    paused: bool | None = Field(None, description=PAUSED)
+
+
+class WebhookView(View):
+    """A webhook."""
+
+    id: UUID
+    name: str | None
+    url: str
+    events: list[EventKind]
+    paused: bool = Field(description=PAUSED)
+    pending: int = Field(description="Deliveries that wait for their next try.")
+    failed: int = Field(description="Deliveries of the last 30 days whose tries are used up.")
+    created: datetime
+
+    @classmethod
+    def of(cls, row: WebhookRow) -> WebhookView:
+        """From a row."""
+        return cls(**_fields(row, WebhookView))
+
+
+class MadeWebhookView(WebhookView):
+    """A webhook that was just made, with its signing secret: it is shown only now."""
+
+    secret: str = Field(description="`whsec_…`, for the library of Standard Webhooks on the receiver's side.")
+
+    @classmethod
+    def made(cls, row: WebhookRow, secret: str) -> MadeWebhookView:
+        """From a row and its secret."""
+        return cls(secret=secret, **_fields(row, WebhookView))
+
+
+class DeliveryView(View):
+    """A message on its way to a webhook, or at the end of it."""
+
+    webhook: UUID
+    event: UUID = Field(description="The message's id, which the receiver finds in `webhook-id`.")
+    kind: str = Field(description="Of the event, as `job.ended`.")
+    data: dict[str, Any] = Field(description="Of the event: ids, states, counters.")
+    state: DeliveryState
+    attempts: int
+    next: datetime | None = Field(description="When it is tried; null once it has ended.")
+    created: datetime
+    ended: datetime | None
+    status: int | None = Field(description="Of the last try; null = there was no answer.")
+    error: str | None = Field(description="Of the last try; null = none.")
+
+    @classmethod
+    def of(cls, row: DeliveryRow) -> DeliveryView:
+        """From a row."""
+        return cls(**_fields(row, DeliveryView))
+
+
+class AttemptView(View):
+    """One try."""
+
+    number: int
+    at: datetime
+    status: int | None
+    seconds: float
+    error: str | None = Field(description="Null = delivered.")
+
+    @classmethod
+    def of(cls, row: AttemptRow) -> AttemptView:
+        """From a row."""
+        return cls(**_fields(row, AttemptView))
+
+
+class DeliveryDetailView(DeliveryView):
+    """A delivery with its tries."""
+
+    log: list[AttemptView]
+
+    @classmethod
+    def detail(cls, row: DeliveryRow, log: list[AttemptRow]) -> DeliveryDetailView:
+        """From rows."""
+        return cls(log=[AttemptView.of(each) for each in log], **_fields(row, DeliveryView))
+
+
+def _fields(row: object, view: type[View]) -> dict[str, Any]:
+    return {name: getattr(row, name) for name in view.model_fields}

@@ -1,0 +1,234 @@
+"""`marey webhooks …`."""
+
+from __future__ import annotations
+
+import time
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console
+from shared.errors import ItemsFailed, TimedOut
+
+if TYPE_CHECKING:
+    from services.cli.client import Client
+
+app = typer.Typer(
+    help="Signed messages to your own server when jobs, streams and evaluations end.", no_args_is_help=True
+)
+
+COLUMNS = ("id", "name", "url", "events", "paused", "pending", "failed")
+DELIVERY_COLUMNS = ("event", "kind", "state", "attempts", "status", "created", "next", "error")
+LOOK_SECONDS = 0.25
+
+Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help="The webhook's id.")]
+Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help="Ids of webhooks.")]
+
+
+class State(StrEnum):
+    """Where a delivery stands."""
+
+    PENDING = "pending"
+    DELIVERED = "delivered"
+    FAILED = "failed"
+
+
+@app.command()
+def add(
+    url: Annotated[str, typer.Argument(metavar="URL", help="Where messages are sent: https.")],
+    events: Annotated[
+        list[str] | None, typer.Option("--event", help="As job.ended; may be repeated. None given = all.")
+    ] = None,
+    name: Annotated[str | None, typer.Option("--name", help="A name for it.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Be told of what happens from now on; prints the webhook's id and its signing secret, this once."""
+    body = {"url": url, **({"events": events} if events else {}), **({"name": name} if name else {})}
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        made = client.post_once("/v1/webhooks", body)
+    if as_json:
+        console.result_json(made)
+    else:
+        console.result(f"{made['id']}\t{made['secret']}")
+        console.say("The secret is shown only now; the receiver checks signatures with it.")
+
+
+@app.command("list")
+def list_webhooks(as_json: console.Json = False) -> None:
+    """List webhooks, newest first."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = list(client.pages("/v1/webhooks", limit=1000))
+    if as_json:
+        for each in found:
+            console.result_json(each)
+        return
+    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+
+
+@app.command()
+def show(webhook: Id, as_json: console.Json = False) -> None:
+    """Show a webhook."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.get(f"/v1/webhooks/{webhook}")
+    if as_json:
+        console.result_json(found)
+        return
+    for column in (*COLUMNS, "created"):
+        console.result(f"{column:<10}{_cell(found, column) or ''}")
+
+
+@app.command()
+def pause(webhooks: Ids, as_json: console.Json = False) -> None:
+    """Stop telling; what happens meanwhile waits."""
+    _change(webhooks, as_json, paused=True)
+
+
+@app.command()
+def resume(webhooks: Ids, as_json: console.Json = False) -> None:
+    """Go on telling, with what waited first."""
+    _change(webhooks, as_json, paused=False)
+
+
+@app.command()
+def remove(webhooks: Ids, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+    """Remove webhooks, with their deliveries and log."""
+    from services.cli.client import Client
+
+    if not yes:
+        typer.confirm(f"Remove {len(webhooks)} webhooks?", abort=True, err=True)
+    with Client.here() as client:
+        for each in webhooks:
+            client.delete(f"/v1/webhooks/{each}")
+            console.say(f"{each} removed")
+
+
+@app.command()
+def deliveries(
+    webhook: Id,
+    event: Annotated[
+        str | None, typer.Argument(metavar="[EVENT]", help="Of one delivery: every try of it.", show_default=False)
+    ] = None,
+    state: Annotated[State | None, typer.Option("--state", help="Only those.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 50,
+    as_json: console.Json = False,
+) -> None:
+    """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
+    from itertools import islice
+
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        if event is not None:
+            _show_tries(client.get(f"/v1/webhooks/{webhook}/deliveries/{event}"), as_json)
+            return
+        wanted = {"state": state.value} if state else {}
+        pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=min(limit, 1000), **wanted)
+        found = list(islice(pages, limit))
+    if as_json:
+        for each in found:
+            console.result_json(each)
+        return
+    console.table(DELIVERY_COLUMNS, ([each[column] for column in DELIVERY_COLUMNS] for each in found))
+
+
+@app.command()
+def replay(
+    webhook: Id,
+    events: Annotated[
+        list[str] | None, typer.Argument(metavar="EVENT…", help="Ids of events.", show_default=False)
+    ] = None,
+    failed: Annotated[bool, typer.Option("--failed", help="All whose tries are used up.")] = False,
+    as_json: console.Json = False,
+) -> None:
+    """Deliver once more, under the same ids and with all tries."""
+    if bool(events) == failed:
+        raise typer.BadParameter("give ids of events, or --failed")
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        path = f"/v1/webhooks/{webhook}/deliveries"
+        wanted = events or [each["event"] for each in client.pages(path, limit=1000, state="failed")]
+        for event in wanted:
+            found = client.post(f"{path}/{event}/replay")
+            if as_json:
+                console.result_json(found)
+    if not as_json:
+        console.say(f"{len(wanted)} deliveries are made again")
+
+
+@app.command("test")
+def send_test(
+    webhook: Id,
+    wait: Annotated[bool, typer.Option("--wait", help="Until it was tried; exit code 6 if it did not arrive.")] = False,
+    timeout: Annotated[float, typer.Option("--timeout", min=0, help="Seconds to wait; then exit code 7.")] = 60.0,
+    as_json: console.Json = False,
+) -> None:
+    """Send a message of the type `webhook.test`, once; prints its id."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.post_once(f"/v1/webhooks/{webhook}/test", None)
+        if wait:
+            found = _tried(client, found, timeout)
+    if as_json:
+        console.result_json(found)
+    else:
+        console.result(found["event"])
+    if found["state"] == State.FAILED:
+        raise ItemsFailed(f"it did not arrive: {found['error']}", where=f"webhook {webhook}")
+    if found["state"] == State.DELIVERED:
+        console.say(f"it arrived: {found['status']}")
+
+
+def _tried(client: Client, found: dict[str, Any], timeout: float) -> dict[str, Any]:
+    """A delivery once it has ended.
+
+    Raises:
+        TimedOut: it has not.
+    """
+    ends = time.monotonic() + timeout
+    while found["state"] == State.PENDING:
+        if time.monotonic() > ends:
+            raise TimedOut(
+                "it was not tried in the time allowed",
+                where=f"webhook {found['webhook']}",
+                hint=f"Does a scheduler run? Later: `marey webhooks deliveries {found['webhook']}`.",
+            )
+        time.sleep(LOOK_SECONDS)
+        found = client.get(f"/v1/webhooks/{found['webhook']}/deliveries/{found['event']}")
+    return found
+
+
+def _show_tries(found: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        console.result_json(found)
+        return
+    columns = ("number", "at", "status", "seconds", "error")
+    console.table(columns, ([each[column] for column in columns] for each in found["log"]))
+    following = f", next try at {found['next']}" if found["next"] else ""
+    console.say(f"{found['kind']} is {found['state']}{following}")
+
+
+def _change(webhooks: list[str], as_json: bool, *, paused: bool) -> None:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        for each in webhooks:
+            found = client.patch(f"/v1/webhooks/{each}", {"paused": paused})
+            if as_json:
+                console.result_json(found)
+            else:
+                console.say(f"{each} is paused" if found["paused"] else f"{each} goes on")
+
+
+def _cell(webhook: dict[str, Any], column: str) -> object:
+    if column == "events":
+        return ", ".join(webhook[column])
+    return {True: "paused", False: None}[webhook[column]] if column == "paused" else webhook[column]
