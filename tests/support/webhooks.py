@@ -1,0 +1,65 @@
+"""Webhooks for tests, what they were told, and time that passes for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+from cryptography.fernet import Fernet
+from pydantic import SecretStr
+
+from shared.jobs import (
+    DEFAULT_TENANT,
+    DeliveryRow,
+    EventKind,
+    NewWebhook,
+    create_webhook,
+    delivery_attempts,
+    list_deliveries,
+    transaction,
+)
+from shared.webhooks.vault import Vault, new_signing_secret
+
+KEY = Fernet.generate_key().decode()
+VAULT = Vault(KEY)
+SECRET_KEY = SecretStr(KEY)
+SECRET = new_signing_secret()
+
+
+def new_webhook(
+    engine: sa.Engine, url: str = "https://studio.example/", *events: EventKind, tenant: str = DEFAULT_TENANT
+) -> UUID:
+    """A webhook signed with `SECRET`; of all events, if none are given."""
+    with transaction(engine) as conn:
+        return create_webhook(conn, NewWebhook(tenant, url, events or list(EventKind), VAULT.encrypt(SECRET)))
+
+
+def deliveries(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -> list[DeliveryRow]:
+    """What it is told, the oldest first."""
+    with transaction(engine) as conn:
+        return list(reversed(list_deliveries(conn, tenant, webhook, limit=1000).rows))
+
+
+def told(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -> list[tuple[str, Any]]:
+    """Kinds and states of the events for it, the oldest first."""
+    return [(row.kind, row.data.get("state")) for row in deliveries(engine, webhook, tenant)]
+
+
+def errors(engine: sa.Engine, webhook: UUID, event: UUID) -> Sequence[str | None]:
+    """Of every try of a delivery; None = it arrived."""
+    with transaction(engine) as conn:
+        return [attempt.error for attempt in delivery_attempts(conn, webhook, event)]
+
+
+def events_written(engine: sa.Engine) -> int:
+    """Rows of the outbox."""
+    with transaction(engine) as conn:
+        return conn.execute(sa.text("SELECT count(*) FROM webhook_event")).scalar_one()
+
+
+def time_passes(engine: sa.Engine) -> None:
+    """As if every delivery that waits, for its next try or behind a claim, had waited long enough."""
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE webhook_delivery SET next_at = now() WHERE state = 'pending'"))

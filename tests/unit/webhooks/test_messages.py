@@ -1,0 +1,104 @@
+"""Messages as receivers check them, secrets as the database keeps them, and when the next try comes."""
+
+from __future__ import annotations
+
+import json
+import stat
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from uuid import UUID, uuid4
+
+import pytest
+from cryptography.fernet import Fernet
+from pydantic import SecretStr
+from standardwebhooks.webhooks import Webhook, WebhookVerificationError
+
+from shared.errors import InvalidInput, Refused
+from shared.jobs import DueDelivery
+from shared.jobs.deliveries import DELAYS, HOLD, JITTER, delay_after
+from shared.settings import Settings
+from shared.webhooks.message import headers_of, message_of
+from shared.webhooks.vault import Vault, key_file, new_signing_secret
+
+JOB = UUID(int=7)
+AT = datetime(2026, 11, 22, 3, 0, tzinfo=UTC)
+API = "https://marey.example"
+
+
+def due(**data: object) -> DueDelivery:
+    return DueDelivery(uuid4(), uuid4(), uuid4(), "job.ended", AT, data, "https://studio.example", b"", 0)
+
+
+def test_the_library_of_standard_webhooks_verifies_a_message_and_no_changed_one() -> None:
+    secret, each = new_signing_secret(), due(job=str(JOB), state="succeeded")
+    body = message_of(each, API)
+    headers = dict(headers_of(each, body, secret))
+    assert headers["webhook-id"] == str(each.event)
+    assert Webhook(secret).verify(body, headers) == json.loads(body)
+    for changed, told in (
+        (body + b" ", headers),
+        (body, {**headers, "webhook-id": str(uuid4())}),
+        (body, {**headers, "webhook-timestamp": str(int(headers["webhook-timestamp"]) + 1)}),
+        (body, dict(headers_of(each, body, secret, datetime.now(UTC) - timedelta(minutes=6)))),
+        (body, dict(headers_of(each, body, new_signing_secret()))),
+    ):
+        with pytest.raises(WebhookVerificationError):
+            Webhook(secret).verify(changed, told)
+
+
+def test_a_message_says_what_happened_and_where_the_api_shows_it() -> None:
+    each = due(job=str(JOB), state="succeeded", counters={"total": 2}, schedule=None)
+    assert json.loads(message_of(each, API)) == {
+        "type": "job.ended",
+        "timestamp": "2026-11-22T03:00:00+00:00",
+        "data": {
+            "job": str(JOB),
+            "state": "succeeded",
+            "counters": {"total": 2},
+            "schedule": None,
+            "urls": {"job": f"{API}/v1/jobs/{JOB}"},
+        },
+    }
+
+
+def test_the_address_of_the_api_is_the_public_one_if_it_is_named() -> None:
+    assert Settings(host="::", port=81).api_url == "http://[::1]:81"
+    assert Settings(host="0.0.0.0", port=81, public_url=f"{API}/").api_url == API
+    assert Settings(host="0.0.0.0", port=81, public_url=API).local_url == "http://127.0.0.1:81"
+
+
+def test_eight_tries_span_a_day_and_no_try_can_outlast_its_claim() -> None:
+    assert len(DELAYS) + 1 == 8
+    assert 23 * 3600 < sum(DELAYS) < 24 * 3600
+    for number, delay in enumerate(DELAYS, 1):
+        drawn = [delay_after(number) for _ in range(200)]
+        assert (1 - JITTER) * delay <= min(drawn) < max(drawn) <= (1 + JITTER) * delay
+        assert max(drawn) - min(drawn) > JITTER * delay / 2
+    assert HOLD >= 60
+
+
+def test_a_sealed_secret_opens_with_its_key_also_behind_a_newer_one() -> None:
+    old, new = Fernet.generate_key().decode(), Fernet.generate_key().decode()
+    sealed = Vault(old).encrypt("whsec_abc")
+    assert b"whsec" not in sealed
+    assert Vault(f"{new}\n{old}").decrypt(sealed) == "whsec_abc"
+    assert Vault(new).decrypt(Vault(f"{new},{old}").encrypt("whsec_abc")) == "whsec_abc"
+    with pytest.raises(InvalidInput, match="does not open"):
+        Vault(new).decrypt(sealed)
+
+
+def test_no_key_or_a_broken_one_names_the_setting() -> None:
+    with pytest.raises(Refused, match="has no key") as refused:
+        Vault.of(Settings(webhook_key=None))
+    assert refused.value.where == "MAREY_WEBHOOK_KEY"
+    for broken in ("", "abc", Fernet.generate_key().decode()[:-4]):
+        with pytest.raises(InvalidInput, match="not a list of keys"):
+            Vault.of(Settings(webhook_key=SecretStr(broken)))
+
+
+def test_a_home_draws_its_key_once_for_its_owner_alone(tmp_path: Path) -> None:
+    path = key_file(tmp_path)
+    drawn = path.read_text()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert key_file(tmp_path).read_text() == drawn
+    assert Vault(drawn).decrypt(Vault(drawn).encrypt("x")) == "x"
