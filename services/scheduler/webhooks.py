@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -137,7 +138,7 @@ class Deliverer(threading.Thread):
         free = SLOTS - len(self._under_way)
         if free <= 0:
             return []
-        busy: set[UUID] = {due.webhook for due in self._under_way.values()}
+        busy: Counter[UUID] = Counter(due.webhook for due in self._under_way.values())
         with transaction(self._engine) as conn:
             return claim_deliveries(conn, free, each=EACH, busy=busy)
 

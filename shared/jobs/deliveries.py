@@ -7,7 +7,7 @@ the record of the try, so that of two who both tried one writes.
 from __future__ import annotations
 
 import random
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 from uuid import UUID
 
@@ -44,12 +44,15 @@ KEPT = 30 * 86_400.0
 # From each webhook a few, so that one with thousands does not stand before all others.
 CLAIM = sa.text("""
     WITH picked AS MATERIALIZED (
-        SELECT due.webhook_id, due.event_id FROM webhook CROSS JOIN LATERAL (
+        SELECT due.webhook_id, due.event_id
+        FROM webhook
+        LEFT JOIN unnest(CAST(:busy AS uuid[]), CAST(:counts AS int[])) AS busy (id, count) ON busy.id = webhook.id
+        CROSS JOIN LATERAL (
             SELECT webhook_id, event_id, next_at FROM webhook_delivery
             WHERE webhook_id = webhook.id AND state = 'pending' AND next_at <= now()
-            ORDER BY next_at LIMIT :each FOR UPDATE SKIP LOCKED
+            ORDER BY next_at LIMIT greatest(0, :each - coalesce(busy.count, 0)) FOR UPDATE SKIP LOCKED
         ) AS due
-        WHERE NOT webhook.paused AND webhook.id <> ALL(:busy)
+        WHERE NOT webhook.paused
         ORDER BY due.next_at LIMIT :limit
     ), claimed AS (
         UPDATE webhook_delivery AS delivery
@@ -66,12 +69,13 @@ CLAIM = sa.text("""
 
 
 def claim_deliveries(
-    conn: sa.Connection, limit: int, *, each: int, busy: Collection[UUID] = (), hold: float = HOLD
+    conn: sa.Connection, limit: int, *, each: int, busy: Mapping[UUID, int] | None = None, hold: float = HOLD
 ) -> list[DueDelivery]:
-    """Take deliveries that are due: at most `limit`, `each` of one webhook, none of those that are `busy`."""
-    token = new_id()
-    values = {"claim": token, "limit": limit, "each": each, "busy": list(busy), "hold": hold}
-    return [DueDelivery(token, *row) for row in conn.execute(CLAIM, values)]
+    """Take deliveries that are due: at most `limit`, and of one webhook no more than `each` with those that are under
+    way already (`busy`)."""
+    token, busy = new_id(), busy or {}
+    values = {"claim": token, "limit": limit, "each": each, "busy": list(busy), "counts": list(busy.values())}
+    return [DueDelivery(token, *row) for row in conn.execute(CLAIM, {**values, "hold": hold})]
 
 
 def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> DeliveryState | None:
