@@ -39,6 +39,8 @@ from shared.jobs import (
 )
 from shared.settings import Settings
 from shared.storage import AssetStore, open_store
+from tests.servers.receiver import LOOPBACK
+from tests.support.webhooks import KEY
 
 BUNDLE = "hgm3-paperclip"
 
@@ -128,7 +130,15 @@ def settings_of(home: Path, database_url: str, queue_url: str) -> Settings:
     if not models.exists():
         write_bundle(models)
     return Settings.model_validate(
-        {"home": home, "models": models, "database_url": database_url, "queue_url": queue_url, "port": _free_port()}
+        {
+            "home": home,
+            "models": models,
+            "database_url": database_url,
+            "queue_url": queue_url,
+            "port": _free_port(),
+            "webhook_key": KEY,
+            "webhook_allow": ["public", *LOOPBACK],
+        }
     )
 
 

@@ -68,12 +68,12 @@ def next_in(engine: sa.Engine, due: DueDelivery) -> float | None:
 
 
 def test_what_one_has_claimed_no_other_gets_until_the_claim_runs_out(engine: sa.Engine) -> None:
-    webhook = new_webhook(engine, "https://studio.example/hook")
+    webhook = new_webhook(engine, "https://a.example/")
     happen(engine)
     (first,) = claim(engine)
     assert (first.webhook, first.url, first.kind, first.tries) == (
         webhook,
-        "https://studio.example/hook",
+        "https://a.example/",
         "job.ended",
         0,
     )
@@ -162,7 +162,7 @@ def test_a_webhook_with_many_deliveries_does_not_stand_before_the_others(engine:
     assert claim(engine, each=2, busy={loud: 2, quiet: 1}) == []
     assert len(claim(engine, each=2, busy={loud: 1})) == 1
     assert len(claim(engine, 1, each=2)) == 1
-    assert len(claim(engine, 3, each=10)) == 2
+    assert len(claim(engine, each=10)) == 3
 
 
 def test_claims_that_are_given_back_cost_no_try(engine: sa.Engine) -> None:
