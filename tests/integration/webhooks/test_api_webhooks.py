@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 from uuid import uuid4
@@ -12,9 +12,7 @@ import httpx2
 import pytest
 from standardwebhooks.webhooks import Webhook
 from structlog.testing import capture_logs
-from typer.testing import CliRunner
 
-from services.cli.main import app
 from services.cli.supervisor import any_port
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import Deliverer
@@ -22,6 +20,7 @@ from shared.jobs import EventKind, transaction
 from shared.runtime.embedded import EmbeddedServer
 from shared.webhooks.addresses import Allowed
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
+from tests.support.command import Command
 from tests.support.evaluations import GENERATOR, wait
 from tests.support.live_api import ApiThread
 from tests.support.live_evaluations import Studio, studio
@@ -29,6 +28,8 @@ from tests.support.marey import Ran
 from tests.support.webhooks import VAULT
 
 HOOK = "https://studio.example/marey"
+Marey = Callable[..., Ran]
+"""`marey webhooks`, in this process."""
 
 
 @pytest.fixture(scope="module")
@@ -82,23 +83,10 @@ def refused(response: httpx2.Response, code: int, kind: str) -> dict[str, Any]:
     return response.json()
 
 
-class Marey:
-    """The command line with a server."""
-
-    def __init__(self, place: Studio) -> None:
-        self.environment = {"MAREY_SERVER": place.api.url, "MAREY_KEY": place.api.key}
-
-    def __call__(self, *arguments: object) -> Ran:
-        """Run a command to its end."""
-        done = CliRunner().invoke(app, ["webhooks", *map(str, arguments)], env=self.environment)
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return Ran(done.exit_code, done.stdout, done.stderr)
-
-
 @pytest.fixture
 def marey(place: Studio) -> Marey:
-    return Marey(place)
+    command = Command({"MAREY_SERVER": place.api.url, "MAREY_KEY": place.api.key})
+    return lambda *arguments: command("webhooks", *arguments)
 
 
 # --- the routes ---
