@@ -19,6 +19,7 @@ from services.cli.commands import (
     jobs,
     models,
     motions,
+    review,
     serve,
     stream,
     submit,
@@ -83,6 +84,7 @@ app.command("generate")(generate.generate)
 app.command("submit")(submit.submit)
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(motions.app, name="motions")
+app.command("review")(review.review)
 app.command("fetch")(fetch.fetch)
 app.command("stream")(stream.stream)
 app.command("serve")(serve.serve)

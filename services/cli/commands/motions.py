@@ -115,7 +115,7 @@ def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: 
                 if as_json:
                     console.result_json(motion)
                 else:
-                    console.say(f"{motion['id']} {_review(motion) or Review.NEW.value}")
+                    console.say(f"{motion['id']} {review_of(motion) or Review.NEW.value}")
 
 
 def _ids(motions: list[str]) -> Iterator[list[str]]:
@@ -145,8 +145,9 @@ def _ids(motions: list[str]) -> Iterator[list[str]]:
 def _cells(motion: dict[str, Any]) -> tuple[object, ...]:
     seconds = round(motion["frames"] / motion["fps"], 2)
     own = (motion[name] for name in ("id", "index", "name"))
-    return (*own, "; ".join(motion["tags"]), motion["seed"], _review(motion), seconds, motion["prompt"])
+    return (*own, "; ".join(motion["tags"]), motion["seed"], review_of(motion), seconds, motion["prompt"])
 
 
-def _review(motion: dict[str, Any]) -> str | None:
+def review_of(motion: dict[str, Any]) -> str | None:
+    """What was said of a motion of the API."""
     return motion["review"] and motion["review"]["verdict"]

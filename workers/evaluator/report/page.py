@@ -28,7 +28,7 @@ def to_html(report: Report) -> bytes:
         asset("report.html", PACKAGE),
         {
             "%TITLE%": text(f"{report.title} · Marey"),
-            "%STYLE%": asset("page.css") + asset("report.css", PACKAGE),
+            "%STYLE%": asset("page.css") + asset("small_players.css") + asset("report.css", PACKAGE),
             "%REPORT%": main,
             "%SCRIPTS%": _scripts(report),
         },
@@ -47,8 +47,7 @@ def _scripts(report: Report) -> Markup:
         return theme
     document = motion_document(clips, [""] * len(clips))
     code = [f"<script>{asset('three.min.js')}</script>"]
-    code += [f"<script>\n{asset(name)}</script>" for name in ("scene.js", "clip.js")]
-    code.append(f"<script>\n{asset('report_clips.js', PACKAGE)}</script>")
+    code += [f"<script>\n{asset(name)}</script>" for name in ("scene.js", "clip.js", "small_players.js")]
     motion = element("script", Markup(script_json(document)), type="application/json", id="motion")
     licence = Markup(f"<!--\n{asset('three.LICENSE.txt')}\n-->")
     return join(theme, motion, licence, *(Markup(each) for each in code))

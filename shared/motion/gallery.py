@@ -1,0 +1,107 @@
+"""The gallery: one HTML file with many motions as small 3D players, to say of each whether to keep it.
+
+As in the player everything is inside, every text is escaped, and the page may fetch nothing. It changes nothing by
+itself: it shows the commands that do.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from shared.errors import InvalidInput
+from shared.motion.clip import MotionClip
+from shared.motion.files import write_atomically
+from shared.motion.pages import asset, code_hashes, fill, script_json
+from shared.motion.paper import one_line
+from shared.motion.player import motion_document
+
+MOST_CARDS = 100
+"""Motions of a page: a clip of 10 s takes 50 kB."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A motion with what is told of it.
+
+    Args:
+        id: what the commands name it by.
+        facts: one line: number, name, seed, length.
+        said: what was thought of it before; empty = nothing.
+    """
+
+    id: str
+    clip: MotionClip
+    prompt: str
+    facts: str
+    tags: Sequence[str] = ()
+    said: str = ""
+
+
+def html_gallery(
+    cards: Sequence[Card],
+    path: str | Path,
+    *,
+    title: str,
+    count: str = "",
+    earlier: str | None = None,
+    later: str | None = None,
+) -> Path:
+    """Write a page of motions.
+
+    Args:
+        path: the `.html` to write.
+        count: which of how many these are.
+        earlier, later: names of the pages beside it.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InvalidInput: no motion, more than `MOST_CARDS`, or a path that is not a writable HTML file.
+    """
+    path = Path(path)
+    if not 1 <= len(cards) <= MOST_CARDS:
+        raise InvalidInput(f"{len(cards)} motions; a page takes 1 to {MOST_CARDS}")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InvalidInput(f"a gallery is an .html, not {path.suffix or 'a name without ending'}", where=str(path))
+    document = {
+        "title": one_line(title),
+        "count": count,
+        "earlier": None if earlier is None else f"./{quote(earlier)}",
+        "later": None if later is None else f"./{quote(later)}",
+        "cards": [
+            {
+                "id": card.id,
+                "prompt": one_line(card.prompt),
+                "facts": one_line(card.facts),
+                "tags": list(card.tags),
+                "said": one_line(card.said),
+            }
+            for card in cards
+        ],
+    }
+    page = fill(
+        asset("gallery.html"),
+        {
+            "%TITLE%": html.escape(f"{one_line(title)} · Marey"),
+            "%STYLE%": asset("page.css") + asset("small_players.css") + asset("gallery.css"),
+            "%CARDS%": script_json(document),
+            "%MOTION%": script_json(motion_document([card.clip for card in cards], [""] * len(cards))),
+            "%LICENCE%": asset("three.LICENSE.txt"),
+            "%THREE%": asset("three.min.js"),
+            "%SCENE%": asset("scene.js"),
+            "%CLIP%": asset("clip.js"),
+            "%GALLERY%": asset("gallery.js"),
+            "%PLAYERS%": asset("small_players.js"),
+        },
+    )
+    # The marks of the policy are filled last, for the policy holds hashes of the rest.
+    policy = "; ".join(
+        ("default-src 'none'", *code_hashes(page), "img-src data:", "base-uri 'none'", "form-action 'none'")
+    )
+    write_atomically(path, fill(page, {"%POLICY%": policy}).encode())
+    return path
