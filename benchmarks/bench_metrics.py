@@ -15,9 +15,10 @@ import numpy as np
 from scipy.linalg import sqrtm
 
 from benchmarks.harness import measure, table
+from shared.measures.bootstrap import paired_bootstrap
+from shared.measures.inputs import Array
 from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
-from workers.evaluator.metrics.inputs import Array
-from workers.evaluator.metrics.intervals import paired_bootstrap, redraw
+from workers.evaluator.metrics.intervals import redraw
 from workers.evaluator.metrics.retrieval import all_ranks, matching_score, r_precision
 
 CLIPS = 4000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 OPEN = frozenset({"planned", "generating", "scoring"})
 TEST = "test"
+COMPARISON = ("metric", "before", "after", "change", "95 % interval", "verdict")
 POLL = 1.0
 """Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
 PATIENCE = 60.0
@@ -127,6 +128,39 @@ def check_evaluation(found: dict[str, Any], *, fail_on_regression: bool) -> None
         raise ItemsFailed(f"{found['state']}: {found['reason']}", where=where)
     if fail_on_regression and found["regressed"]:
         raise Regressed(found["reason"], where=where, hint=f"`marey eval report {found['id']}` says what is worse.")
+
+
+def comparison_rows(found: dict[str, Any]) -> Iterator[tuple[object, ...]]:
+    """A comparison as the rows of a table, what could be paired first."""
+    for each in found["changes"]:
+        change, interval = each["after"] - each["before"], f"{each['low']:+.2f} to {each['high']:+.2f}"
+        numbers = (f"{each[when]:.2f}" for when in ("before", "after"))
+        yield each["metric"], *numbers, f"{change:+.2f}", interval, each["verdict"]
+    for each in found["others"]:
+        yield (
+            each["metric"],
+            each["before"],
+            each["after"],
+            f"{each['after'] - each['before']:+.4g}",
+            None,
+            "not paired",
+        )
+
+
+def check_comparison(found: dict[str, Any], *, fail_on_regression: bool) -> None:
+    """Nothing, if the later run is no worse, or that is not asked.
+
+    Raises:
+        Regressed: it is worse.
+    """
+    worse = [each for each in found["changes"] if each["verdict"] == "worse"]
+    if fail_on_regression and worse:
+        told = ", ".join(f"{each['metric']} fell from {each['before']:.1f} to {each['after']:.1f} %" for each in worse)
+        raise Regressed(
+            f"{told} against evaluation {found['before']['id']}",
+            where=f"evaluation {found['after']['id']}",
+            hint=f"`marey eval report {found['after']['id']}` shows the worst clips.",
+        )
 
 
 def _settings(given: Sequence[str]) -> dict[str, float]:

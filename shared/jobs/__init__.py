@@ -49,6 +49,7 @@ from shared.jobs.evaluation_types import (
 from shared.jobs.evaluations import (
     cancel_evaluation,
     check_baseline,
+    check_comparable,
     create_evaluation,
     evaluation_events,
     get_evaluation,
@@ -232,6 +233,7 @@ __all__ = [
     "change_schedule",
     "change_webhook",
     "check_baseline",
+    "check_comparable",
     "check_revision",
     "claim",
     "claim_deliveries",

@@ -141,15 +141,25 @@ def check_baseline(conn: sa.Connection, tenant: str, request: EvaluationRequest,
         baseline = get_evaluation(conn, tenant, request.baseline)
     except NotFound as error:
         raise InvalidInput(error.message, where="baseline", hint=error.hint) from error
+    check_comparable(baseline, prompts=prompts, evaluator=request.evaluator, where="baseline")
+
+
+def check_comparable(run: EvaluationRow, *, prompts: str | None, evaluator: str | None, where: str) -> None:
+    """Nothing, if a run can be compared with one of these prompts (their digest) and this exact evaluator: done, of the
+    same prompts, measured by the same evaluator.
+
+    Raises:
+        InvalidInput: it cannot; `where` is what names the run in the request.
+    """
     other = None
-    if baseline.state is not EvaluationState.DONE:
-        other = f"is {baseline.state}, not done"
-    elif baseline.prompts != prompts:
-        other = f"was made with other prompts ({baseline.request.source})"
-    elif baseline.request.evaluator != request.evaluator:
-        other = f"was measured by {baseline.request.evaluator}, not by {request.evaluator}"
+    if run.state is not EvaluationState.DONE:
+        other = f"is {run.state}, not done"
+    elif run.prompts != prompts:
+        other = f"was made with other prompts ({run.request.source})"
+    elif run.request.evaluator != evaluator:
+        other = f"was measured by {run.request.evaluator}, not by {evaluator}"
     if other is not None:
-        raise InvalidInput(f"evaluation {request.baseline} {other}", where="baseline", hint="Choose another.")
+        raise InvalidInput(f"evaluation {run.id} {other}", where=where, hint="Choose another.")
 
 
 # --- changes of state ---

@@ -78,6 +78,10 @@ def test_the_same_run_again_is_compared_with_the_first_and_did_not_regress(
     assert {change["verdict"] for change in report["changes"]} == {"no difference found"}
     assert all(change["before"] == change["after"] for change in report["changes"])  # the same seeds, the same motions
     assert len(report["trend"]) == 2
+    (compared,) = judged("eval", "compare", first, second, "--json").ok().lines
+    told = {change["metric"]: change["verdict"] for change in compared["changes"]}
+    assert told == {change["metric"]: change["verdict"] for change in report["changes"]}
+    assert {each["metric"] for each in compared["others"]} >= {"fid", "skate"}
 
 
 def test_a_file_without_prompts_is_refused_and_leaves_no_run(judged: Marey, tmp_path: Path) -> None:

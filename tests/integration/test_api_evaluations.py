@@ -117,6 +117,49 @@ def test_a_report_that_is_not_there_says_how_the_evaluation_stands(http: httpx2.
     http.delete(f"/v1/evaluations/{made['id']}")
 
 
+def test_two_runs_of_the_same_prompts_are_compared_motion_by_motion(
+    place: Studio, done: dict[str, Any], http: httpx2.Client
+) -> None:
+    place.judge.forget = 3
+    try:
+        other = begin(http, repeats=2, settings={"steps": 4})
+        place.work()
+    finally:
+        place.judge.forget = 0
+    path = f"/v1/evaluations/{other['id']}/comparison"
+    found = http.get(path, params={"before": done["id"]}).json()
+    assert (found["before"]["id"], found["after"]["id"], found["after"]["motions"]) == (done["id"], other["id"], 4)
+    (change,) = found["changes"]
+    assert change == {
+        "metric": "obeyed", "before": 100.0, "after": 25.0, "low": -100.0, "high": -50.0, "prompts": 2, "motions": 4,
+        "verdict": "worse",
+    }  # fmt: skip
+    assert found["regressed"] is True
+    assert {"metric": "made", "before": 4.0, "after": 1.0} in found["others"]
+    assert "fid" not in {each["metric"] for each in found["others"]}  # it was not measured
+    back = http.get(f"/v1/evaluations/{done['id']}/comparison", params={"before": other["id"]}).json()
+    assert (back["changes"][0]["verdict"], back["regressed"]) == ("better", False)
+
+
+def test_runs_that_cannot_be_compared_are_refused_with_the_reason(
+    place: Studio, done: dict[str, Any], http: httpx2.Client
+) -> None:
+    waiting, foreign = begin(http), begin(http, prompts=[*PROMPTS, {"prompt": "walk home"}], source="other.csv")
+    place.work()
+    unlike = http.post("/v1/evaluations", json={**BODY, "repeats": 3})
+    open_run = unlike.json()["id"]
+    for before, after, status, kind, said in (
+        (foreign["id"], waiting["id"], 422, "invalid-input", "was made with other prompts (other.csv)"),
+        (done["id"], open_run, 422, "invalid-input", "is planned, not done"),
+        (open_run, done["id"], 422, "invalid-input", "is planned, not done"),
+        (str(uuid4()), done["id"], 404, "not-found", "there is no such evaluation"),
+        ("nonsense", done["id"], 422, "invalid-input", "before"),
+    ):
+        answer = http.get(f"/v1/evaluations/{after}/comparison", params={"before": before})
+        assert said in refused(answer, status, kind)["detail"] + answer.text
+    http.delete(f"/v1/evaluations/{open_run}")
+
+
 def test_the_captions_of_the_evaluator_need_no_prompts(http: httpx2.Client) -> None:
     response = http.post("/v1/evaluations", json={"bundle": GENERATOR, "split": "test"})
     assert response.status_code == 202
@@ -242,6 +285,7 @@ def test_a_foreign_tenants_key_sees_and_changes_nothing(
             ("GET", f"/v1/evaluations/{done['id']}"),
             ("DELETE", f"/v1/evaluations/{done['id']}"),
             ("GET", f"/v1/evaluations/{done['id']}/report/html"),
+            ("GET", f"/v1/evaluations/{done['id']}/comparison?before={done['id']}"),
             ("GET", f"/v1/schedules/{mine}"),
             ("DELETE", f"/v1/schedules/{mine}"),
             ("POST", f"/v1/schedules/{mine}/run"),

@@ -88,7 +88,7 @@ def test_waiting_exits_by_how_it_ended_and_8_when_it_is_worse(place: Studio, mar
     first = marey("eval", "run", "--bundle", GENERATOR, "--split", many).ok().out.strip()
     place.work()
     marey("eval", "wait", first, "--fail-on-regression").ok()
-    place.judge.forget = 1
+    place.judge.forget = 10
     try:
         asked = [*COMMAND, "eval", "run", "--bundle", GENERATOR, "--split", str(many), "--fail-on-regression", "--json"]
         running = subprocess.Popen(
@@ -114,7 +114,22 @@ def test_waiting_exits_by_how_it_ended_and_8_when_it_is_worse(place: Studio, mar
     assert (line["state"], line["regressed"]) == ("done", True)
     assert f"marey eval report {line['id']}" in err
     marey("eval", "wait", line["id"]).ok()  # 8 only where it is asked for
+    _compare(marey, first, line["id"])
     assert "regressed" in marey("eval", "list", "--state", "done").ok().out
+
+
+def _compare(marey: Marey, better: str, worse: str) -> None:
+    """The same of `eval compare`: a table, or a line of JSON; 8 only where it is asked for."""
+    table = [line.split("\t") for line in marey("eval", "compare", better, worse).ok().out.splitlines()]
+    assert table[0][:4] == ["obeyed", "100.00", "90.00", "-10.00"]
+    assert table[0][5] == "worse"
+    assert ["made", "100", "90", "-10", "", "not paired"] in table
+    (line,) = marey("eval", "compare", better, worse, "--json").ok().lines
+    assert (line["changes"][0]["verdict"], line["regressed"]) == ("worse", True)
+    command = ("eval", "compare", better, worse, "--fail-on-regression")
+    marey(*command).refused(8, "obeyed fell from 100.0 to 90.0 %", f"marey eval report {worse}")
+    marey("eval", "compare", worse, better, "--fail-on-regression").ok()
+    marey("eval", "compare", worse, uuid4()).refused(3, "there is no such evaluation")
 
 
 def _work_until(place: Studio, done: threading.Event) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import threading
 import time
@@ -24,6 +25,7 @@ from shared.jobs import (
     EvaluationRequest,
     EvaluationRow,
     EvaluationState,
+    MadeItem,
     NewEvaluation,
     create_evaluation,
     evaluation_events,
@@ -32,6 +34,7 @@ from shared.jobs import (
     store_prompts,
     transaction,
 )
+from shared.measures.scores import SCHEMA, VERSION, MotionScore
 from shared.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
 from shared.runtime.scoring import ScoreInput
 from shared.settings import Settings
@@ -156,11 +159,18 @@ class ToyEvaluator:
             ExportedFile(name, content, media)
             for name, content, media in (
                 ("html", f"<p>{len(made)} motions of {score.evaluation}</p>".encode(), "text/html; charset=utf-8"),
-                ("json", json.dumps(summary).encode(), "application/json"),
+                ("json", self._scores(summary, made), "application/json"),
                 ("md", f"# {len(made)} motions of {score.evaluation}\n".encode(), "text/markdown; charset=utf-8"),
             )
         )
         yield Scored(item.id, files, summary, regressed, f"{len(made)} motions measured")
+
+    def _scores(self, summary: dict[str, float | None], made: Sequence[MadeItem]) -> bytes:
+        """What a comparison reads of a report: the motions that are left out obeyed nothing."""
+        obeyed = [float(number >= self.forget) for number in range(len(made))]
+        scores = [MotionScore(i.index, i.variant, each, None) for i, each in zip(made, obeyed, strict=True)]
+        rows = [dataclasses.asdict(score) for score in scores]
+        return json.dumps({"schema": SCHEMA, "version": VERSION, **summary, "scores": rows}).encode()
 
 
 def new_evaluation(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shared.expected import JOIN
 from shared.jobs import TEST_SPLIT, EarlierRun
+from shared.measures.comparing import OBEYED, RETRIEVED
 from shared.motion.clip import parse_npz
 from shared.runtime.scoring import ScoreInput
 from workers.evaluator.comparing import Earlier, alarms, changes
@@ -33,7 +34,7 @@ from workers.evaluator.report import (
     from_json,
 )
 from workers.evaluator.report.model import GROUND_TRUTH, MOST_EXHIBITS, RECONSTRUCTION, Against
-from workers.evaluator.scoring import OBEYED, REPEATS, RETRIEVED, Side, embedded, generated_rows, metrics_of, retrieved
+from workers.evaluator.scoring import REPEATS, Side, embedded, generated_rows, metrics_of, retrieved
 
 ANY = "any"
 TRENDS = (OBEYED, RETRIEVED, "fid", "kid", "skate", "jerk")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
+from shared.measures.comparing import OBEYED
 from workers.evaluator.measuring import Measured
 from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 from workers.evaluator.metrics.intervals import redraw, repeated
@@ -24,7 +25,6 @@ REPEATS = 20
 POOLS = (32, 100)
 """T2M's pool, and SnapMoGen's."""
 TOP = (1, 2, 3)
-OBEYED, RETRIEVED = "obeyed", "r_precision_3_of_32"
 KID_SUBSETS, KID_SIZE = 50, 100
 PAIRS_OF_A_PROMPT = 10
 JOINTS = "joints, without a network"

@@ -11,6 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from services.api.auth import Operator, Reader, Submitter
 from services.api.context import Connection, Shared
 from services.api.evaluations import service
+from services.api.evaluations.comparison import ComparisonView, compare_runs
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
 from services.api.guards import limit_of_submit, read_body
@@ -80,6 +81,17 @@ def get_report(
         message = f"there is no such report: the evaluation is {row.state}"
         raise NotFound(message, where=str(evaluation), hint=row.reason)
     return file_response(shared, key.tenant, row.id, file, part)
+
+
+@router.get("/{evaluation}/comparison")
+def get_comparison(
+    evaluation: UUID,
+    before: Annotated[UUID, Query(description="The earlier run, of the same prompts and the same exact evaluator.")],
+    shared: Shared,
+    key: Reader,
+) -> ComparisonView:
+    """What changed from another evaluation to this one, motion against motion, by paired bootstrap."""
+    return compare_runs(shared, key.tenant, before, evaluation)
 
 
 SCHEMAS = (NewEvaluationBody,)

@@ -155,6 +155,27 @@ def report(
 
 
 @app.command()
+def compare(
+    before: Annotated[str, typer.Argument(metavar="A", help="The earlier run's id.")],
+    after: Annotated[str, typer.Argument(metavar="B", help="The later run's id.")],
+    fail_on_regression: Annotated[
+        bool, typer.Option("--fail-on-regression", help="Exit 8 when B is worse than A.")
+    ] = False,
+    as_json: console.Json = False,
+) -> None:
+    """Compare two runs of the same prompts and evaluator, motion against motion, by paired bootstrap."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.get(f"/v1/evaluations/{after}/comparison", before=before)
+    if as_json:
+        console.result_json(found)
+    else:
+        console.table(evaluating.COMPARISON, evaluating.comparison_rows(found))
+    evaluating.check_comparison(found, fail_on_regression=fail_on_regression)
+
+
+@app.command()
 def cancel(runs: Runs, as_json: console.Json = False) -> None:
     """Cancel runs and the jobs that work for them; what was made stays."""
     from services.cli.client import Client

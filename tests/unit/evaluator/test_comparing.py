@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from shared.errors import InvalidInput
+from shared.measures.comparing import OBEYED, RETRIEVED
 from workers.evaluator.comparing import Earlier, alarms, changes
 from workers.evaluator.report import Baseline, Metric, MotionScore
-from workers.evaluator.scoring import OBEYED, RETRIEVED
 
 METRICS = {
     OBEYED: Metric(OBEYED, "Prompts obeyed", "%", "higher", 1),

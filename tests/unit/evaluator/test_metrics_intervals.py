@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shared.errors import InvalidInput
-from workers.evaluator.metrics.intervals import paired_bootstrap, redraw, repeated
+from shared.measures.bootstrap import paired_bootstrap
+from workers.evaluator.metrics.intervals import redraw, repeated
 
 # -- repeats ---------------------------------------------------------------------------------------------------------
 

@@ -22,6 +22,7 @@ from shared.jobs import (
     MadeItem,
     Problem,
 )
+from shared.measures.comparing import OBEYED, RETRIEVED
 from shared.motion.features import HUMANML3D_263
 from shared.motion.finish import finish_motion
 from shared.runtime.scoring import ScoreInput
@@ -32,7 +33,6 @@ from workers.evaluator.measuring import Measured, encoded, measure
 from workers.evaluator.reference import Reference
 from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from workers.evaluator.reporting import report_of, summary_of
-from workers.evaluator.scoring import OBEYED, RETRIEVED
 from workers.evaluator.tmr import TMREvaluator
 from workers.evaluator.train import train_stage
 from workers.training.budget import Budget

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shared.errors import InvalidInput
-from workers.evaluator.metrics.inputs import Array, Integers, Numbers, at_least, embeddings
+from shared.measures.inputs import Array, Integers, Numbers, at_least, embeddings
 
 SAMPLES_PER_DIMENSION = 5
 _FEW_PAIRS = 100  # of `diversity` where there are not more motions than pairs asked for

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from workers.evaluator.metrics.inputs import Integers, Numbers, at_least, integers
+from shared.measures.inputs import Integers, Numbers, at_least, integers
 
 _LONE = "a match alone in its pool is always found"
 

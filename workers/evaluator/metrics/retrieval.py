@@ -20,7 +20,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from shared.errors import InvalidInput
-from workers.evaluator.metrics.inputs import Array, Integers, Numbers, integers, pairs
+from shared.measures.inputs import Array, Integers, Numbers, integers, pairs
 from workers.evaluator.metrics.pools import draw_distinct_pools, draw_pools
 
 Distance = Literal["euclidean", "cosine"]

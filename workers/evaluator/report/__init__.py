@@ -1,5 +1,6 @@
 """The report of an evaluation: one HTML page, the same as JSON and as Markdown."""
 
+from shared.measures.scores import MotionScore
 from workers.evaluator.report.document import from_json, to_json
 from workers.evaluator.report.markdown import to_markdown
 from workers.evaluator.report.model import Baseline, Change, Report
@@ -8,7 +9,6 @@ from workers.evaluator.report.parts import (
     Exhibit,
     HeatCell,
     Metric,
-    MotionScore,
     Reference,
     Repeats,
     Row,

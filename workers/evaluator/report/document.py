@@ -19,10 +19,10 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from shared.errors import InvalidFile
+from shared.measures.scores import SCHEMA, VERSION, check_document
 from workers.evaluator.report.model import Report
 from workers.evaluator.report.parts import Exhibit
 
-SCHEMA, VERSION = "marey.evaluation-report", 1
 DIGITS = 6  # significant; intervals are a hundred times wider
 
 
@@ -48,13 +48,9 @@ def from_json(data: bytes, where: str = "report") -> Report:
         document = json.loads(data, parse_constant=_no_number)
     except ValueError as error:
         raise InvalidFile(f"is no JSON: {error}", where=where) from None
-    if not isinstance(document, dict) or document.pop("schema", None) != SCHEMA:
-        raise InvalidFile("is no report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
-    version = document.pop("version", None)
-    if version != VERSION:
-        raise InvalidFile(f"has version {version}; this reads version {VERSION}", where=where)
+    fields = check_document(document, where)
     try:
-        return _reader().validate_json(json.dumps(document), strict=True)
+        return _reader().validate_json(json.dumps(fields), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])

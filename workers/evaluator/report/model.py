@@ -12,11 +12,12 @@ from datetime import datetime
 from typing import Any, Literal
 
 from shared.errors import InvalidInput
+from shared.measures.comparing import Verdict
+from shared.measures.scores import MotionScore
 from workers.evaluator.report.parts import (
     Exhibit,
     HeatCell,
     Metric,
-    MotionScore,
     Reference,
     Repeats,
     Row,
@@ -28,7 +29,6 @@ from workers.evaluator.report.parts import (
 )
 
 Against = Literal["last run", "pinned baseline"]
-Verdict = Literal["better", "worse", "no difference found"]
 
 GROUND_TRUTH, RECONSTRUCTION = "ground_truth", "reconstruction"
 ALWAYS = (GROUND_TRUTH, RECONSTRUCTION)

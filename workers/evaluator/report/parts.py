@@ -152,28 +152,6 @@ class Exhibit:
 
 
 @dataclass(frozen=True)
-class MotionScore:
-    """What later runs are paired with, motion by motion; None where it was not measured.
-
-    Attributes:
-        index: of the prompt.
-        variant: of the prompt's motions.
-        obeyed: whether the motion passed its prompt check, 0 or 1.
-        retrieved: R-precision of this motion, the share of its pools in which its prompt was found, 0 to 1.
-    """
-
-    index: int
-    variant: int
-    obeyed: float | None
-    retrieved: float | None
-
-    def __post_init__(self) -> None:
-        for score in (self.obeyed, self.retrieved):
-            if score is not None and not 0 <= score <= 1:
-                raise InvalidInput(f"a score of {score}", where=f"prompt {self.index}, variant {self.variant}")
-
-
-@dataclass(frozen=True)
 class Speed:
     """How fast motions came; `note` says on what (workers, device, batch)."""
 

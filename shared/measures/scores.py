@@ -1,0 +1,75 @@
+"""What was measured on each motion of an evaluation: the part of a report that later runs are paired with.
+
+Standard library only. The rest of a report is the evaluator's own (`workers.evaluator.report`).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, cast
+
+from shared.errors import InvalidFile, InvalidInput
+
+SCHEMA, VERSION = "marey.evaluation-report", 1
+
+
+@dataclass(frozen=True)
+class MotionScore:
+    """What later runs are paired with, motion by motion; None where it was not measured.
+
+    Attributes:
+        index: of the prompt.
+        variant: of the prompt's motions.
+        obeyed: whether the motion passed its prompt check, 0 or 1.
+        retrieved: R-precision of this motion, the share of its pools in which its prompt was found, 0 to 1.
+    """
+
+    index: int
+    variant: int
+    obeyed: float | None
+    retrieved: float | None
+
+    def __post_init__(self) -> None:
+        for score in (self.obeyed, self.retrieved):
+            if score is not None and not 0 <= score <= 1:
+                raise InvalidInput(f"a score of {score}", where=f"prompt {self.index}, variant {self.variant}")
+
+
+def check_document(document: object, where: str) -> dict[str, Any]:
+    """The fields of a report that was read as JSON.
+
+    Raises:
+        InvalidFile: it is no report, or of another version.
+    """
+    if not isinstance(document, dict) or cast("dict[str, Any]", document).get("schema") != SCHEMA:
+        raise InvalidFile("is no report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
+    fields = dict(cast("dict[str, Any]", document))
+    if fields.get("version") != VERSION:
+        raise InvalidFile(f"has version {fields.get('version')}; this reads version {VERSION}", where=where)
+    return {name: value for name, value in fields.items() if name not in ("schema", "version")}
+
+
+def read_scores(data: bytes, where: str) -> tuple[MotionScore, ...]:
+    """The scores of a report as JSON; nothing else of it is looked at.
+
+    Raises:
+        InvalidFile: no such JSON, of another version, or scores that are none.
+    """
+    try:
+        document = json.loads(data)
+    except ValueError as error:
+        raise InvalidFile(f"is no JSON: {error}", where=where) from None
+    rows: Any = check_document(document, where).get("scores")
+    try:
+        return tuple(MotionScore(**_numbers(row)) for row in rows)
+    except (TypeError, InvalidInput) as error:
+        raise InvalidFile(f"`scores`: {error}", where=where) from None
+
+
+def _numbers(row: dict[str, Any]) -> dict[str, Any]:
+    for name, value in row.items():
+        kinds = int if name in ("index", "variant") else int | float | None
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            raise TypeError(f"{name} is {value!r}")
+    return row
