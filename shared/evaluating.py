@@ -16,7 +16,6 @@ from shared.jobs import (
     EVALUATOR_QUEUE,
     NO_TEXT,
     PRIORITY_LIMIT,
-    TEST_SPLIT,
     EvaluationRequest,
     EvaluationRow,
     NewItem,
@@ -53,7 +52,7 @@ class Plan:
         low, high = self.offer.min_seconds, self.offer.max_seconds
         for number, prompt in enumerate(self.prompts):
             seconds = prompt.seconds
-            if seconds is not None and request.source == TEST_SPLIT:
+            if seconds is not None and request.splits:
                 seconds = min(max(seconds, low), high)  # real clips are as long as they are
             yield Item(
                 prompt.prompt,
@@ -78,10 +77,10 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
     evaluator = choose_evaluator(request.evaluator, config=config)
     offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
     if prompts is None:
-        prompts = reference_prompts(evaluator, TEST_SPLIT)
+        prompts = tuple(p for split in request.splits for p in reference_prompts(evaluator, split))
     _check_skeleton(offer.bundle, evaluator)
     offer.check_settings(request.settings)
-    if request.source != TEST_SPLIT:
+    if not request.splits:
         _check_seconds(prompts, offer)
     _check_size(request, len(prompts))
     exact = replace(

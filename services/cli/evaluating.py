@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 OPEN = frozenset({"planned", "generating", "scoring"})
 TEST = "test"
+SPLITS = (TEST, "compositional", "test+compositional")
+ANEW = 20
+"""Repeats that a report's intervals are over: with as many motions of a prompt, each of them generates anew."""
 COMPARISON = ("metric", "before", "after", "change", "95 % interval", "verdict")
 POLL = 1.0
 """Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
@@ -30,12 +33,22 @@ Evaluator = Annotated[
 ]
 Split = Annotated[
     str,
-    typer.Option("--split", metavar="test|FILE", help="The evaluator's own captions, or a CSV or JSONL file."),
+    typer.Option(
+        "--split",
+        metavar="SPLIT|FILE",
+        help=f"The evaluator's own captions ({', '.join(SPLITS)}), or a CSV or JSONL file.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of sampling; may be repeated.")
 ]
-Repeats = Annotated[int | None, typer.Option("--repeats", help="Motions of each prompt; none given = 1.")]
+Repeats = Annotated[
+    int | None,
+    typer.Option("--repeats", help="Motions of each prompt; none given = 1, and repeats draw pools out of the same."),
+]
+Regenerate = Annotated[
+    bool, typer.Option("--regenerate", help=f"Generate anew in all {ANEW} repeats: as --repeats {ANEW}, and as long.")
+]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first motion; none given = 0.")]
 Baseline = Annotated[str | None, typer.Option("--baseline", metavar="RUN", help="An evaluation to compare with.")]
 Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
@@ -75,8 +88,8 @@ class Asked:
         return {name: value for name, value in given.items() if value is not None}
 
     def _prompts(self) -> dict[str, Any]:
-        if self.split == TEST:
-            return {"split": TEST}
+        if self.split in SPLITS:
+            return {"split": self.split}
         from services.cli.rows import evaluation_prompts_from_file
 
         prompts = evaluation_prompts_from_file(self.split)
@@ -128,6 +141,17 @@ def check_evaluation(found: dict[str, Any], *, fail_on_regression: bool) -> None
         raise ItemsFailed(f"{found['state']}: {found['reason']}", where=where)
     if fail_on_regression and found["regressed"]:
         raise Regressed(found["reason"], where=where, hint=f"`marey eval report {found['id']}` says what is worse.")
+
+
+def repeats_of(repeats: int | None, *, regenerate: bool) -> int | None:
+    """Motions of each prompt.
+
+    Raises:
+        InvalidInput: both were chosen.
+    """
+    if regenerate and repeats is not None:
+        raise InvalidInput(f"means --repeats {ANEW}", where="--regenerate", hint="Give one of the two.")
+    return ANEW if regenerate else repeats
 
 
 def comparison_rows(found: dict[str, Any]) -> Iterator[tuple[object, ...]]:

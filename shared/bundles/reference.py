@@ -3,7 +3,7 @@ motions, which stand beside them, are for whoever loads the network."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from shared.bundles.bundle import Bundle
@@ -42,12 +42,12 @@ def _row(clip: Mapping[str, Any], number: int, fps: float) -> dict[str, Any]:
     return {
         "prompt": captions[number % len(captions)],
         "seconds": int(clip["frames"]) / fps,
-        "expected": _expected(clip["acts"], clip["sides"]),
+        "expected": expected_of(clip["acts"], clip["sides"]),
     }
 
 
-def _expected(acts: list[str], sides: list[str]) -> str | None:
-    """What the clip shows, where it is among the acts that can be expected of a motion; a dance step is not."""
+def expected_of(acts: Sequence[str], sides: Sequence[str]) -> str | None:
+    """What a clip shows, where it is among the acts that can be expected of a motion; a dance step is not."""
     text = " then ".join(" ".join(filter(None, pair)) for pair in zip(acts, sides, strict=True))
     try:
         read_expected(text)

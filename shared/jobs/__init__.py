@@ -29,6 +29,8 @@ from shared.jobs.deliveries import (
 )
 from shared.jobs.errors import IdempotencyMismatch
 from shared.jobs.evaluation_types import (
+    BUNDLE_SOURCES,
+    COMPOSITIONAL,
     EVALUATOR_QUEUE,
     REPORT_FORMATS,
     TEST_SPLIT,
@@ -146,6 +148,8 @@ from shared.jobs.webhooks import change_webhook, create_webhook, delete_webhook,
 from shared.jobs.workers import beat, list_workers, live_workers, retire
 
 __all__ = [
+    "BUNDLE_SOURCES",
+    "COMPOSITIONAL",
     "DEFAULT_TENANT",
     "EVALUATOR_QUEUE",
     "EVENT_CHANNEL",

@@ -14,8 +14,11 @@ from shared.jobs.types import AssetDigest, Problem
 EVALUATOR_QUEUE = "evaluator"
 """The queue of score items."""
 REPORT_FORMATS = ("html", "json", "md")
-TEST_SPLIT = "test"
-"""The source of prompts that an evaluator's bundle carries."""
+TEST_SPLIT, COMPOSITIONAL = "test", "compositional"
+"""What an evaluator's bundle carries prompts of: clips that no model was trained on, and clips whose pairs of act and
+style none was."""
+BUNDLE_SOURCES = (TEST_SPLIT, COMPOSITIONAL, f"{TEST_SPLIT}+{COMPOSITIONAL}")
+"""Sources of prompts that are not their owner's: one of the splits, or both, in this order."""
 
 Summary = Mapping[str, float | None]
 """What was measured, by name; None = it could not be."""
@@ -29,7 +32,7 @@ class EvaluationRequest:
         bundle: the generator: an exact bundle; in a schedule whatever was given, as `hgm3-starter` or `hgm3`.
         evaluator: the evaluator's bundle, likewise; None = the one that is here.
         model: the model of the generator; None while its bundle was not looked up.
-        source: where the prompts are from: `test` (the evaluator's bundle), or the name that their owner gave them.
+        source: where the prompts are from: one of `BUNDLE_SOURCES`, or the name that their owner gave them.
         settings: of sampling, the same for all motions.
         repeats: motions of each prompt.
         seed: of the first motion; motion k, in input order and repeats within prompt, uses seed + k.
@@ -44,6 +47,11 @@ class EvaluationRequest:
     repeats: int = 1
     seed: int = 0
     baseline: UUID | None = None
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """The splits of the evaluator's bundle that the prompts are captions of; none = they are somebody's own."""
+        return tuple(self.source.split("+")) if self.source in BUNDLE_SOURCES else ()
 
     def as_json(self) -> dict[str, Any]:
         """As it stands in its row."""

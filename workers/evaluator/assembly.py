@@ -9,7 +9,8 @@ import numpy as np
 from torch import Tensor
 
 from shared.bundles import Bundle
-from workers.evaluator.bundle import write_bundle
+from shared.errors import InvalidInput
+from workers.evaluator.bundle import load_networks, write_bundle
 from workers.evaluator.card import card_of
 from workers.evaluator.config import EvaluatorConfig
 from workers.evaluator.model import TMR, MotionEncoder
@@ -47,7 +48,9 @@ def assemble(
     gathered = gather(prepared, run, RECIPE, config)
     networks = TMR(config)
     networks.load_state_dict(_as_stored(gathered.parts["tmr"].state))
-    reference = _reference(PreparedData.open(prepared, verify=False), networks.motion, config)  # `gather` has verified
+    reference = reference_of(
+        PreparedData.open(prepared, verify=False), networks.motion, config
+    )  # `gather` has verified
     text = spec_of(open_encoder(gathered.text))
     motion = networks.motion
     return write_bundle(
@@ -63,6 +66,38 @@ def assemble(
     )
 
 
+def renew_reference(bundle: Bundle, prepared: Path, output: Path, *, overwrite: bool = False) -> Bundle:
+    """Write a bundle's networks again with a reference of these data: your own test clips, or what newer versions
+    measure on the old ones. It is another exact bundle, and its numbers are compared with its own alone.
+
+    The card is written anew; metrics stay those of the training.
+
+    Raises:
+        InvalidBundle: not this kind of evaluator, or damaged.
+        InvalidInput: data of another layout.
+        NotFound, InvalidFile: there are no such data, or they are damaged.
+    """
+    config, motion, text = load_networks(bundle)
+    data = PreparedData.open(prepared)
+    if (data.manifest.layout, data.manifest.fps) != (config.layout, config.fps):
+        raise InvalidInput(f"holds {data.manifest.layout}, this evaluator reads {config.layout}", where=str(prepared))
+    known = bundle.manifest
+    assert known.text is not None  # `write_bundle` puts it in
+    reference = reference_of(data, motion, config)
+    manifest = {"licence": known.licence, "data": known.data, "metrics": known.metrics, "training": known.training}
+    return write_bundle(
+        output,
+        config,
+        {"motion": motion.state_dict(), "text": text.state_dict()},
+        bundle.statistics(),
+        reference,
+        text=known.text,
+        card=card_of(output.name, config, known.text, manifest, reference),
+        overwrite=overwrite,
+        **manifest,
+    )
+
+
 def _as_stored(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Weights rounded as a bundle rounds them: the reference is embedded by what will be loaded."""
     return {
@@ -70,13 +105,21 @@ def _as_stored(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-def _reference(data: PreparedData, motion: MotionEncoder, config: EvaluatorConfig) -> Reference:
+def reference_of(data: PreparedData, motion: MotionEncoder, config: EvaluatorConfig) -> Reference:
+    """What a bundle with these networks keeps of the captioned clips of prepared data.
+
+    Joints are decoded from the features, as those of generated motions are.
+    """
     motion.eval().requires_grad_(False)
     splits: dict[str, ReferenceSplit] = {}
     for name in SPLITS:
         clips = [c for c in data.split(name) if c.captions and c.length >= config.min_frames]
         if clips:
             features = [np.array(data.features(c)[: config.max_frames]) for c in clips]
-            rows = tuple(ReferenceClip.of(c, config.max_frames) for c in clips)
-            splits[name] = ReferenceSplit(rows, embed_motions(motion, features))
+            joints = (data.layout.decode(each) for each in features)
+            rows = [
+                ReferenceClip.of(clip, each, config.fps, config.max_frames)
+                for clip, each in zip(clips, joints, strict=True)
+            ]
+            splits[name] = ReferenceSplit.of(rows, embed_motions(motion, features))
     return Reference(splits)

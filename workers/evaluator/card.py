@@ -39,8 +39,9 @@ text to motion and back. Captions and pools are drawn 20 times. A label is acts,
 
 {reference}
 
-Each with captions, label, length and the embedding of its motion, so that a server without the data can evaluate.
-Neither joints nor features of captured motion are in here.
+Each with captions, label, length, the embedding of its motion, and what its joints say: whether the checker of prompts
+sees what the captions ask for, foot skate, jerk, bone drift, floor penetration. So a server without the data can
+evaluate. Neither joints nor features of captured motion are in here.
 
 ## Limits
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from shared.bundles import find_bundle
+from shared.bundles import Bundle, find_bundle
 from shared.errors import MareyError, NotFound, Unreachable
 from shared.jobs import EVALUATOR_QUEUE, ClaimedItem
 from shared.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Handler, Outcome, Scored
@@ -13,9 +14,17 @@ from shared.settings import settings
 from workers.evaluator.loading import load_evaluator
 from workers.evaluator.measuring import measure
 from workers.evaluator.port import Evaluator
+from workers.evaluator.reconstruction import find_reconstruction
 from workers.evaluator.reference import Reference
 from workers.evaluator.report import headline, to_html, to_json, to_markdown
 from workers.evaluator.reporting import report_of, summary_of
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    bundle: Bundle
+    evaluator: Evaluator
+    real: Reference
 
 
 class EvaluatorHandler:
@@ -27,7 +36,7 @@ class EvaluatorHandler:
     def __init__(self, device: str) -> None:
         """Nothing is loaded yet; `device` as in the settings."""
         self._device = device
-        self._loaded: tuple[Evaluator, Reference] | None = None
+        self._loaded: _Loaded | None = None
 
     def load(self, bundle: str) -> None:
         """Load an evaluator with the real clips that it knows.
@@ -37,7 +46,7 @@ class EvaluatorHandler:
             InvalidInput: there is no such device.
         """
         found = find_bundle(bundle)
-        self._loaded = load_evaluator(found, device=self._device), Reference.of(found)
+        self._loaded = _Loaded(found, load_evaluator(found, device=self._device), Reference.of(found))
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
         """One item at a time."""
@@ -46,24 +55,22 @@ class EvaluatorHandler:
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
         """Measure the motions of one evaluation and write its report."""
         assert self._loaded is not None  # the loop loads before it runs
-        evaluator, real = self._loaded
         item, source = batch.items[0], batch.scoring
         if source is None:
             yield Failed(item.id, NotFound("this item scores no evaluation", where=f"item {item.id}"))
             return
         try:
-            yield _scored(item, source, evaluator, real, control)
+            yield _scored(item, source, self._loaded, control)
         except Unreachable:
             raise
         except MareyError as error:
             yield Failed(item.id, error)
 
 
-def _scored(
-    item: ClaimedItem, source: ScoreInput, evaluator: Evaluator, real: Reference, control: BatchControl
-) -> Scored:
-    measured = measure(source.items, source.npz, evaluator, progress=control.progress)
-    report = report_of(source, measured, evaluator, real)
+def _scored(item: ClaimedItem, source: ScoreInput, loaded: _Loaded, control: BatchControl) -> Scored:
+    measured = measure(source.items, source.npz, loaded.evaluator, progress=control.progress)
+    reconstruction = find_reconstruction(loaded.bundle, source.request.bundle)
+    report = report_of(source, measured, loaded.evaluator, loaded.real, reconstruction)
     files = (
         ExportedFile("html", to_html(report), "text/html; charset=utf-8"),
         ExportedFile("json", to_json(report), "application/json"),

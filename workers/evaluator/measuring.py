@@ -29,12 +29,25 @@ TOGETHER = 64
 
 
 @dataclass(frozen=True)
-class Motion:
-    """One motion and what was found on it; `verdict` is None where nothing is expected of it."""
+class Checked:
+    """What the joints of a motion say; `verdict` is None where nothing is expected of it."""
 
-    item: MadeItem
     verdict: Verdict | None
     quality: Quality
+
+    @property
+    def obeyed(self) -> bool | None:
+        """Whether it does what is expected."""
+        return None if self.verdict is None else self.verdict.passed
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One motion and what was found on it, as the network made it and as users get it."""
+
+    item: MadeItem
+    raw: Checked
+    exported: Checked
 
 
 @dataclass(frozen=True)
@@ -99,7 +112,14 @@ def measure(
                 broken.append(clip)
                 continue
             clips.append(clip)
-            found.append(Motion(item, _verdict(item, clip), quality(clip.joints, clip.fps)))
+            raw_joints = space.decode(clip.features)
+            found.append(
+                Motion(
+                    item,
+                    raw=check(raw_joints, space.fps, item.expected),
+                    exported=check(clip.joints, clip.fps, item.expected),
+                )
+            )
         raw.append(evaluator.embed_motion([clip.features for clip in clips]))
         exported.append(evaluator.embed_motion([encoded(space, clip) for clip in clips]))
         done += len(some)
@@ -111,6 +131,16 @@ def measure(
         _texts([motion.item.prompt for motion in found], evaluator),
         tuple(broken),
     )
+
+
+def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Checked:
+    """Judge a motion (T, 22, 3) in metres by what is expected of it, as `shared.expected` reads it, and measure it."""
+    verdict = None
+    if expected is not None:
+        acts = read_expected(expected)
+        wanted = [Expectation(cast("Act", each.act), cast("Side", each.side), each.straight) for each in acts]
+        verdict = judge(joints, fps, wanted)
+    return Checked(verdict, quality(joints, fps))
 
 
 def encoded(space: FeatureLayout, clip: MotionClip) -> NDArray[np.float32]:
@@ -138,14 +168,6 @@ def _read(
             hint="Take an evaluator of the generator's feature layout.",
         )
     return clip if clip.fps == space.fps else resample(clip, space.fps)
-
-
-def _verdict(item: MadeItem, clip: MotionClip) -> Verdict | None:
-    if item.expected is None:
-        return None
-    acts = read_expected(item.expected)
-    expected = [Expectation(cast("Act", each.act), cast("Side", each.side), each.straight) for each in acts]
-    return judge(clip.joints, clip.fps, expected)
 
 
 def _texts(prompts: Sequence[str], evaluator: Evaluator) -> Embeddings:

@@ -1,19 +1,22 @@
 """What an evaluator's bundle knows of real clips, so that a server without capture data can evaluate: captions to
-generate from, the label and length of each, and the embedding of the motion that was captured. Neither joints nor
-features."""
+generate from, the label and length of each, the embedding of the motion that was captured, and what its joints say: the
+checker's verdict and its quality. Neither joints nor features."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from shared.bundles import Bundle, BundleWriter
+from shared.bundles.reference import expected_of
 from shared.errors import InvalidBundle, NotFound
 from workers.evaluator.labels import label_ids, label_of
+from workers.evaluator.measuring import check
+from workers.training.checks.quality import Quality
 from workers.training.data.manifest import Clip
 
 SPLITS = ("val", "test", "compositional")
@@ -36,15 +39,23 @@ class ReferenceClip(BaseModel):
     captured: bool
     """Neither a mirror image nor looped or spliced."""
     captions: tuple[str, ...]
+    obeyed: bool | None = None
+    """Whether the checker sees in the clip what its captions ask for; None = it checks no such act."""
+    quality: Quality | None = None
+    """None in bundles that were made before it was measured."""
 
     @classmethod
-    def of(cls, clip: Clip, max_frames: int) -> ReferenceClip:
-        """What is kept of a prepared clip."""
+    def of(cls, clip: Clip, joints: NDArray[np.float32], fps: float, max_frames: int) -> ReferenceClip:
+        """What is kept of a prepared clip whose joints are (T, J, 3)."""
+        sides = clip.sides or ("",) * len(clip.acts)
+        checked = check(joints, fps, expected_of(clip.acts, sides))
         return cls(
+            obeyed=checked.obeyed,
+            quality=Quality(*(float(f"{value:.4g}") for value in astuple(checked.quality))),
             id=clip.id,
             label=label_of(clip),
             acts=clip.acts,
-            sides=clip.sides or ("",) * len(clip.acts),
+            sides=sides,
             frames=min(clip.length, max_frames),
             captured=not clip.mirrored and not clip.spliced,
             captions=clip.captions,
@@ -60,11 +71,19 @@ class ReferenceSplit:
 
     clips: tuple[ReferenceClip, ...]
     motion: NDArray[np.float32]  # (N, E), stored in half precision
+    prompts: tuple[str, ...]
+    """The caption of each clip that evaluations generate from, as `shared.bundles.reference` chooses it."""
 
     @property
     def labels(self) -> NDArray[np.int64]:
         """(N,) one number a different label, as the metrics take them."""
         return label_ids([clip.label for clip in self.clips])
+
+    @classmethod
+    def of(cls, clips: Sequence[ReferenceClip], motion: NDArray[np.float32]) -> ReferenceSplit:
+        """Clips with the embeddings (N, E) of their motions."""
+        prompts = (clip.captions[number % len(clip.captions)] for number, clip in enumerate(clips))
+        return cls(tuple(clips), motion, tuple(prompts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +102,25 @@ class Reference:
             raise NotFound(f"no split {name!r}", where="reference", hint=f"There are {', '.join(self.splits)}.")
         return self.splits[name]
 
+    def joined(self, names: Sequence[str]) -> ReferenceSplit:
+        """Several splits as one, in this order.
+
+        Raises:
+            NotFound: see `split`.
+        """
+        splits = [self.split(name) for name in names]
+        return ReferenceSplit(
+            tuple(clip for split in splits for clip in split.clips),
+            np.concatenate([split.motion for split in splits]),
+            tuple(prompt for split in splits for prompt in split.prompts),
+        )
+
     def add_to(self, writer: BundleWriter) -> None:
         """Put it into a bundle that is being written."""
         rows = {name: list(split.clips) for name, split in self.splits.items()}
-        writer.add_json(FILE, {name: [c.model_dump(mode="json") for c in clips] for name, clips in rows.items()})
+        writer.add_json(
+            FILE, {name: [c.model_dump(mode="json", exclude_none=True) for c in clips] for name, clips in rows.items()}
+        )
         writer.add_part(PART, {name: split.motion for name, split in self.splits.items()})
 
     @classmethod
@@ -104,4 +138,4 @@ class Reference:
         motion = bundle.tensors(PART)
         if {name: len(rows) for name, rows in clips.items()} != {name: len(rows) for name, rows in motion.items()}:
             raise InvalidBundle("embeddings do not fit the clips", where=str(bundle.path / FILE))
-        return cls({name: ReferenceSplit(rows, motion[name].astype(np.float32)) for name, rows in clips.items()})
+        return cls({name: ReferenceSplit.of(rows, motion[name].astype(np.float32)) for name, rows in clips.items()})

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import statistics
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.expected import JOIN
 from shared.jobs import TEST_SPLIT, EarlierRun
 from shared.measures.comparing import OBEYED, RETRIEVED
 from shared.motion.clip import parse_npz
 from shared.runtime.scoring import ScoreInput
 from workers.evaluator.comparing import Earlier, alarms, changes
+from workers.evaluator.heat import heat_of, style_of
 from workers.evaluator.measuring import Measured, Motion
 from workers.evaluator.port import Evaluator
+from workers.evaluator.reconstruction import Reconstruction
 from workers.evaluator.reference import Reference as RealClips
 from workers.evaluator.report import (
     Baseline,
     Exhibit,
     HeatCell,
+    Metric,
     MotionScore,
     Reference,
     Repeats,
@@ -30,35 +32,44 @@ from workers.evaluator.report import (
     Row,
     Speed,
     TrendPoint,
-    Value,
     from_json,
 )
-from workers.evaluator.report.model import GROUND_TRUTH, MOST_EXHIBITS, RECONSTRUCTION, Against
-from workers.evaluator.scoring import REPEATS, Side, embedded, generated_rows, metrics_of, retrieved
+from workers.evaluator.report.model import MOST_EXHIBITS, Against
+from workers.evaluator.rows import Ruler, generated_rows, reconstruction_row, sides_of, truth_row
+from workers.evaluator.scoring import REPEATS, Side, metrics_of, retrieved
 
 ANY = "any"
 TRENDS = (OBEYED, RETRIEVED, "fid", "kid", "skate", "jerk")
 
 
-def report_of(source: ScoreInput, measured: Measured, evaluator: Evaluator, real: RealClips) -> Report:
+def report_of(
+    source: ScoreInput,
+    measured: Measured,
+    evaluator: Evaluator,
+    real: RealClips,
+    reconstruction: Reconstruction | None = None,
+) -> Report:
     """The report of an evaluation.
 
     Args:
         source: what was asked for, and the runs to compare with.
         measured: its motions.
         evaluator: what embedded them.
-        real: the clips that the evaluator's bundle knows; their split `test` is the ground truth.
+        real: the clips that the evaluator's bundle knows. Those that the prompts describe are the ground truth; of own
+            prompts, the split `test`.
+        reconstruction: what was measured of the generator's tokenizer.
 
     Raises:
         InvalidInput: a run to compare with is of other prompts.
+        NotFound: the reference lacks a split.
         Unreachable: the store does not answer.
     """
     seed = source.request.seed
-    metrics = metrics_of(evaluator)
-    labels = _labels(source, measured, real)
-    truth = real.split(TEST_SPLIT)
-    raw, exported = generated_rows(measured, labels, truth.motion, evaluator, seed)
-    scores = _scores(measured, labels, evaluator, seed)
+    ruler = Ruler(evaluator, real, source.request.splits or (TEST_SPLIT,), seed)
+    metrics = metrics_of(evaluator, ruler.splits)
+    sides = sides_of(measured, _labels(source, measured, real))
+    raw, exported = generated_rows(measured, sides, ruler)
+    scores = _scores(measured, sides[1], evaluator, seed)
     earlier = _earlier(source)
     found = tuple(change for run in earlier for change in changes(run, scores, seed=seed))
     why = alarms(found, {metric.key: metric for metric in metrics})
@@ -68,16 +79,16 @@ def report_of(source: ScoreInput, measured: Measured, evaluator: Evaluator, real
         title=f"Evaluation {source.name or str(source.evaluation)[-8:]}",
         evaluation=str(source.evaluation),
         created=now,
-        generator=_bundle(source.request.bundle),
+        generator=bundle_of(source.request.bundle),
         licence=next((motion.item.licence or "" for motion in measured.motions), ""),
-        evaluator=_bundle(evaluator.name),
+        evaluator=bundle_of(evaluator.name),
         source=Reference(source.request.source, source.prompts),
         prompts=len({item.index for item in source.items}),
         motions=len(measured.motions),
         failed=len(source.items) - len(measured.motions),
         repeats=Repeats(REPEATS, min(source.request.repeats, REPEATS)),
         metrics=metrics,
-        rows=(_truth(real, evaluator, seed), _reconstruction(), raw, exported),
+        rows=(truth_row(ruler), _reconstruction(reconstruction, ruler, metrics), raw, exported),
         baselines=tuple(run.baseline for run in earlier),
         changes=found,
         regressed=bool(why) if earlier else None,
@@ -104,40 +115,33 @@ def summary_of(report: Report) -> dict[str, float | None]:
 
 def _labels(source: ScoreInput, measured: Measured, real: RealClips) -> NDArray[np.int64]:
     """(N,) of each motion's prompt: the real clip's label, or, of own prompts, the prompt itself."""
-    if source.request.source == TEST_SPLIT:
-        return real.split(TEST_SPLIT).labels[measured.indices]
+    if source.request.splits:
+        return real.joined(source.request.splits).labels[measured.indices]
     numbers: dict[str, int] = {}
     return np.array([numbers.setdefault(m.item.prompt, len(numbers)) for m in measured.motions], np.int64)
 
 
-def _scores(measured: Measured, labels: NDArray[np.int64], evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
+def _scores(measured: Measured, side: Side, evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
     """What later runs are paired with."""
-    side = Side(measured.exported, measured.text, labels, measured.variants)
     found = retrieved(side, evaluator, seed)
     return tuple(
         MotionScore(
             motion.item.index,
             motion.item.variant,
-            None if motion.verdict is None else float(motion.verdict.passed),
+            None if motion.exported.obeyed is None else float(motion.exported.obeyed),
             None if np.isnan(share) else round(float(share), 4),
         )
         for motion, share in zip(measured.motions, found, strict=True)
     )
 
 
-def _truth(real: RealClips, evaluator: Evaluator, seed: int) -> Row:
-    """Real motion with its own captions, by the same network."""
-    split = real.split(TEST_SPLIT)
-    captions = [clip.captions[number % len(clip.captions)] for number, clip in enumerate(split.clips)]
-    side = Side(split.motion, evaluator.embed_text(captions), split.labels, np.zeros(len(captions), np.int64))
-    joints = Value.missing("the evaluator's bundle carries no joints of real clips")
-    values = embedded(side, None, evaluator, seed) | dict.fromkeys((OBEYED, "skate", "jerk"), joints)
-    return Row(GROUND_TRUTH, "Real motion", f"{len(captions)} clips of the test split with their captions", values)
-
-
-def _reconstruction() -> Row:
-    why = Value.missing("real motion is not on this server, so no tokenizer could be asked to give it back")
-    return Row(RECONSTRUCTION, "Reconstruction", "real motion through the tokenizer", {RETRIEVED: why, "fid": why})
+def _reconstruction(found: Reconstruction | None, ruler: Ruler, metrics: Sequence[Metric]) -> Row:
+    source = "+".join(ruler.splits)
+    if found is None or source not in found.values:
+        return reconstruction_row(None, "real motion through the tokenizer")
+    known = {metric.key for metric in metrics}  # of whoever measured it, which may be another version
+    values = {key: value for key, value in found.values[source].items() if key in known}
+    return reconstruction_row(values, found.note(source))
 
 
 def _earlier(source: ScoreInput) -> tuple[Earlier, ...]:
@@ -165,22 +169,13 @@ def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...
 
 
 def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[HeatCell, ...]:
-    """Prompt checks by what was expected and, of the test split, by style; sequences by how many acts they have."""
-    styles = _styles(source, real)
-    cells: dict[tuple[str, str], list[bool]] = defaultdict(list)
-    for motion in measured.motions:
-        if motion.verdict is not None and motion.item.expected is not None:
-            acts = motion.item.expected.split(f" {JOIN} ")
-            what = acts[0] if len(acts) == 1 else f"{len(acts)} acts in order"
-            cells[what, styles(motion.item.index)].append(motion.verdict.passed)
-    return tuple(HeatCell(act, style, len(found), sum(found)) for (act, style), found in sorted(cells.items()))
-
-
-def _styles(source: ScoreInput, real: RealClips) -> Callable[[int], str]:
-    if source.request.source != TEST_SPLIT:
-        return lambda index: ANY
-    clips = real.split(TEST_SPLIT).clips
-    return lambda index: clips[index].label.rpartition(", ")[2]
+    """By style only where the prompts are captions of clips whose style is known."""
+    splits = source.request.splits
+    styles = [style_of(clip.label) for clip in real.joined(splits).clips] if splits else []
+    return heat_of(
+        (motion.item.expected, styles[motion.item.index] if splits else ANY, motion.exported.obeyed)
+        for motion in measured.motions
+    )
 
 
 def _exhibits(
@@ -211,7 +206,7 @@ def _distinct(order: Sequence[int], measured: Measured) -> list[int]:
 
 
 def _exhibit(source: ScoreInput, motion: Motion, score: float) -> Exhibit:
-    verdict = motion.verdict
+    verdict = motion.exported.verdict
     return Exhibit(
         prompt=motion.item.prompt,
         seed=motion.item.seed,
@@ -233,7 +228,8 @@ def _speed(source: ScoreInput, measured: Measured) -> Speed | None:
     return Speed(len(measured.motions) / max(seconds, 1e-3), statistics.median(elapsed), note)
 
 
-def _bundle(reference: str) -> Reference:
+def bundle_of(reference: str) -> Reference:
+    """An exact bundle, as a report names it."""
     name, _, sha256 = reference.partition("@")
     return Reference(name, sha256)
 

@@ -6,20 +6,22 @@ from the evaluation's seed: where R is 1 an interval tells what the draws do, an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
+from shared.jobs import COMPOSITIONAL
 from shared.measures.comparing import OBEYED
 from workers.evaluator.measuring import Measured
 from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 from workers.evaluator.metrics.intervals import redraw, repeated
 from workers.evaluator.metrics.retrieval import RPrecision, clip_score, matching_score, r_precision
 from workers.evaluator.port import Embeddings, Evaluator
-from workers.evaluator.report import Metric, Row, Value
+from workers.evaluator.report import Metric, Value
+from workers.training.checks.quality import Quality
 
 REPEATS = 20
 POOLS = (32, 100)
@@ -27,6 +29,8 @@ POOLS = (32, 100)
 TOP = (1, 2, 3)
 KID_SUBSETS, KID_SIZE = 50, 100
 PAIRS_OF_A_PROMPT = 10
+APART = (OBEYED, *(f"r_precision_{k}_of_{POOLS[0]}" for k in TOP), "clip_score", "kid")
+"""What the compositional split has columns of its own for: what 342 motions can tell."""
 JOINTS = "joints, without a network"
 QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 1000.0}
 """Numbers of `Quality`, and what makes them the unit they are printed in: per cent, m/s³, mm, mm."""
@@ -40,48 +44,63 @@ class Side:
     text: Embeddings  # (N, E)
     labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
     variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
+    _pools: dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]] = field(
+        default_factory=dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]], repr=False
+    )
 
-    @property
-    def generated(self) -> int:
-        """R."""
-        return int(self.variants.max(initial=0)) + 1
+    def only(self, rows: NDArray[np.bool_]) -> Side:
+        """Some of the motions."""
+        return Side(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows])
 
     def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
         """For each of the 20 repeats the rows that it takes, and its random numbers."""
+        generated = repeats_of(self.variants)
         for number, rng in enumerate(redraw(lambda rng: rng, repeats=REPEATS, seed=seed)):
-            yield np.flatnonzero(self.variants == number % self.generated), rng
+            yield np.flatnonzero(self.variants == number % generated), rng
 
     def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
-        """For each repeat its rows, and retrieval among them.
+        """For each repeat its rows, and retrieval among them; drawn once, however often it is asked for.
 
         Raises:
             InvalidInput: fewer motions than a pool.
         """
-        return [
-            (rows, r_precision(
-                self.text[rows], self.motion[rows], pool=pool, top=TOP, distance=evaluator.distance,
-                labels=self.labels[rows], rng=rng,
-            ))
-            for rows, rng in self.repeats(seed)
-        ]  # fmt: skip
+        if (pool, seed) not in self._pools:
+            self._pools[pool, seed] = [
+                (rows, r_precision(
+                    self.text[rows], self.motion[rows], pool=pool, top=TOP, distance=evaluator.distance,
+                    labels=self.labels[rows], rng=rng,
+                ))
+                for rows, rng in self.repeats(seed)
+            ]  # fmt: skip
+        return self._pools[pool, seed]
 
 
-def metrics_of(evaluator: Evaluator) -> tuple[Metric, ...]:
-    """The columns, in order."""
-    by = evaluator.name
+def repeats_of(variants: NDArray[np.int64]) -> int:
+    """How many repeats were generated, of motions whose repeats are `variants` (N,)."""
+    return int(variants.max(initial=0)) + 1
+
+
+def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...]:
+    """The columns, in order: of all motions, then again of the compositional split alone where it is one of several.
+
+    Args:
+        evaluator: what embeds.
+        splits: that distances are taken to the real motions of.
+    """
+    by, those = evaluator.name, f"the real motions of the split {' and '.join(splits)}"
     nearest = "How often a motion of what the prompt asked for is among the {} nearest of {}."
     pools = [
         Metric(_key(pool, k), f"R-precision {k} of {pool}", "%", "higher", 1, nearest.format(k, pool), by)
         for pool in POOLS
         for k in TOP
     ]
-    return (
+    whole = (
         Metric(OBEYED, "Prompts obeyed", "%", "higher", 1, "Motions that do what their prompt says, in order.", JOINTS),
         *pools,
         Metric("clip_score", "CLIP score", "", "higher", 3, "Mean cosine of prompt and motion.", by),
         Metric("mm_dist", "MM-Dist", "", "lower", 3, "Mean Euclidean distance of prompt and motion.", by),
-        Metric("fid", "FID", "", "lower", 4, "Fréchet distance to the real motions of the test split.", by),
-        Metric("kid", "KID", "", "lower", 5, "Kernel distance to the real motions, unbiased where there are few.", by),
+        Metric("fid", "FID", "", "lower", 4, f"Fréchet distance to {those}.", by),
+        Metric("kid", "KID", "", "lower", 5, f"Kernel distance to {those}, unbiased where there are few.", by),
         Metric("diversity", "Diversity", "", "", 3, "Mean distance of random pairs; best as the real motions'.", by),
         Metric("multimodality", "MultiModality", "", "", 3, "Mean distance of motions of one prompt.", by),
         Metric("skate", "Foot skate", "%", "lower", 2, "Frames with a toe on the floor that slides.", JOINTS),
@@ -89,40 +108,22 @@ def metrics_of(evaluator: Evaluator) -> tuple[Metric, ...]:
         Metric("bone_drift", "Bone drift", "mm", "lower", 3, "How far bones leave their median length.", JOINTS),
         Metric("penetration", "Floor penetration", "mm", "lower", 1, "Deepest joint under the floor.", JOINTS),
     )
+    if len(splits) < 2 or COMPOSITIONAL not in splits:
+        return whole
+    columns = (metric for metric in whole if metric.key in APART)
+    return (*whole, *(replace(m, key=_apart(m.key), measured_on="the compositional split") for m in columns))
 
 
-def generated_rows(
-    measured: Measured, labels: NDArray[np.int64], real: Embeddings, evaluator: Evaluator, seed: int
-) -> tuple[Row, Row]:
-    """The rows `raw` and `exported`.
-
-    Args:
-        measured: N motions.
-        labels: (N,) of each motion's prompt.
-        real: (M, E) motions to compare distributions with.
-        evaluator: whose embeddings they are.
-        seed: of the draws.
-    """
-    raw, exported = (
-        embedded(Side(motion, measured.text, labels, measured.variants), real, evaluator, seed)
-        for motion in (measured.raw, measured.exported)
-    )
-    return (
-        Row("raw", "Generated", "features as the network made them", raw),
-        Row(
-            "exported",
-            "Exported",
-            "as users get them: feet locked, rotations solved",
-            exported | {"multimodality": several(measured, seed)} | on_joints(measured),
-        ),
-    )
+def apart(values: Mapping[str, Value]) -> dict[str, Value]:
+    """Values of the compositional split alone, under the keys of its own columns."""
+    return {_apart(key): value for key, value in values.items() if key in APART}
 
 
 def embedded(side: Side, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
     """All values that come from embeddings; `real` (M, E) None leaves distances to real motions out."""
     found: dict[str, Value] = {}
     for pool in POOLS:
-        found |= _retrieval(side, evaluator, pool, seed)
+        found |= retrieval(side, evaluator, pool, seed)
     pairs = {"clip_score": clip_score, "mm_dist": matching_score}
     for name, metric in pairs.items():
         found[name] = _drawn(side, seed, lambda rows, rng, metric=metric: metric(side.text[rows], side.motion[rows]))
@@ -134,7 +135,7 @@ def embedded(side: Side, real: Embeddings | None, evaluator: Evaluator, seed: in
 
 def several(measured: Measured, seed: int) -> Value:
     """MultiModality of the exported motions: prompts whose repeats were all made, against each other."""
-    repeats = int(measured.variants.max(initial=0)) + 1
+    repeats = repeats_of(measured.variants)
     if repeats <= PAIRS_OF_A_PROMPT:
         return Value.missing(f"needs more than {PAIRS_OF_A_PROMPT} motions of each prompt, there are {repeats}")
     _, counts = np.unique(measured.indices, return_counts=True)
@@ -145,16 +146,20 @@ def several(measured: Measured, seed: int) -> Value:
     return _interval(drawn, len(whole) * repeats)
 
 
-def on_joints(measured: Measured) -> dict[str, Value]:
-    """All values that come from joints alone; their intervals are over the repeats that were generated."""
-    verdicts = [motion.verdict for motion in measured.motions]
-    checked = np.array([verdict is not None for verdict in verdicts], bool)
-    passed = np.array([100.0 * (verdict is not None and verdict.passed) for verdict in verdicts])
-    found = {OBEYED: _over_repeats(measured, passed, checked, "no prompt says what is expected of its motion")}
+def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np.int64]) -> dict[str, Value]:
+    """All values that come from joints alone; their intervals are over the repeats that were generated.
+
+    Args:
+        found: of N motions whether each obeys its prompt (None = nothing is expected), and how it moves.
+        variants: (N,) the repeat that each was generated in.
+    """
+    checked = np.array([obeyed is not None for obeyed, _ in found], bool)
+    passed = np.array([100.0 * bool(obeyed) for obeyed, _ in found])
+    values = {OBEYED: _over_repeats(variants, passed, checked, "no prompt says what is expected of its motion")}
     for name, factor in QUALITY.items():
-        numbers = np.array([factor * getattr(motion.quality, name) for motion in measured.motions])
-        found[name] = _over_repeats(measured, numbers, np.ones(len(numbers), bool), "there is no motion")
-    return found
+        numbers = np.array([factor * getattr(quality, name) for _, quality in found])
+        values[name] = _over_repeats(variants, numbers, np.ones(len(numbers), bool), "there is no motion")
+    return values
 
 
 def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
@@ -174,13 +179,25 @@ def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64
     return np.divide(hits, drawn, out=np.full(len(hits), np.nan), where=drawn > 0)
 
 
-def _retrieval(side: Side, evaluator: Evaluator, pool: int, seed: int) -> dict[str, Value]:
+def retrieval(
+    side: Side, evaluator: Evaluator, pool: int, seed: int, *, of: NDArray[np.bool_] | None = None
+) -> dict[str, Value]:
+    """R-precision in pools of so many; with `of` (N,) that of some of the motions in pools of all.
+
+    A split of few labels has to be judged in pools of others: by itself any motion finds its label there.
+    """
     try:
-        found = [result for _, result in side.pools(evaluator, pool, seed)]
+        pools = side.pools(evaluator, pool, seed)
     except InvalidInput as error:
         return {_key(pool, k): Value.missing(error.message) for k in TOP}
-    count = min(len(result.clips) for result in found)
-    return {_key(pool, k): _interval([100 * result.at(k) for result in found], count) for k in TOP}
+    hits = [found.hits if of is None else found.hits[of[rows[found.clips]]] for rows, found in pools]
+    count = min(len(each) for each in hits)
+    if count == 0:
+        return {_key(pool, k): Value.missing("no such motion was drawn into a pool") for k in TOP}
+    return {
+        _key(pool, k): _interval([100 * float(each[:, column].mean()) for each in hits], count)
+        for column, k in enumerate(TOP)
+    }
 
 
 def _distances(side: Side, real: Embeddings, seed: int) -> dict[str, Value]:
@@ -188,7 +205,7 @@ def _distances(side: Side, real: Embeddings, seed: int) -> dict[str, Value]:
     statistics, sizes = GaussianStatistics.of(real, name="real"), np.bincount(side.variants, minlength=1)
     size = min(KID_SIZE, len(real), int(sizes.min()))
     try:
-        rows = [np.flatnonzero(side.variants == number) for number in range(side.generated)]
+        rows = [np.flatnonzero(side.variants == number) for number in range(len(sizes))]
         frechet = [fid(statistics, side.motion[some]).value for some in rows]
     except InvalidInput as error:
         return {name: Value.missing(error.message) for name in ("fid", "kid")}
@@ -210,9 +227,11 @@ def _drawn(side: Side, seed: int, metric: Callable[[NDArray[np.int64], np.random
     return _interval(found, int(np.bincount(side.variants).min()))
 
 
-def _over_repeats(measured: Measured, numbers: NDArray[np.float64], which: NDArray[np.bool_], why: str) -> Value:
+def _over_repeats(
+    variants: NDArray[np.int64], numbers: NDArray[np.float64], which: NDArray[np.bool_], why: str
+) -> Value:
     """Mean of `numbers` (N,) where `which` (N,), in each repeat that was generated."""
-    kinds = [which & (measured.variants == k) for k in range(int(measured.variants.max(initial=0)) + 1)]
+    kinds = [which & (variants == k) for k in range(repeats_of(variants))]
     if not all(kind.any() for kind in kinds):
         return Value.missing(why)
     return _interval([float(numbers[kind].mean()) for kind in kinds], int(min(kind.sum() for kind in kinds)))
@@ -227,3 +246,7 @@ def _interval(found: Sequence[float], count: int, *, dimensions: int | None = No
 
 def _key(pool: int, k: int) -> str:
     return f"r_precision_{k}_of_{pool}"
+
+
+def _apart(key: str) -> str:
+    return f"{key}_{COMPOSITIONAL}"

@@ -14,7 +14,7 @@ from services.api.jobs.schemas import MAX_COMMENT, MAX_NAME
 from services.api.schemas import View
 from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
 from shared.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
-from shared.jobs import TEST_SPLIT, EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
+from shared.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
 from shared.jobs.states import JobState
 
 PLAIN = r"^[^\x00-\x1f]*$"
@@ -40,8 +40,8 @@ class EvaluationFields(BaseModel):
     evaluator: str | None = Field(
         None, pattern=BUNDLE, max_length=200, description="Bundle that measures; none given = the one that is here."
     )
-    split: Literal["test"] | None = Field(
-        None, description="`test`: the captions that the evaluator's bundle carries. Else give `prompts`."
+    split: Literal["test", "compositional", "test+compositional"] | None = Field(
+        None, description="Captions that the evaluator's bundle carries, of a split or of both. Else give `prompts`."
     )
     source: str | None = Field(
         None, min_length=1, max_length=MAX_NAME, pattern=PLAIN, description="What the prompts are called in reports."
@@ -90,7 +90,7 @@ class RequestView(View):
     bundle: str = Field(description="Exact since its motions were asked for; in a schedule, the name that was given.")
     model: str | None
     evaluator: str | None
-    source: str = Field(description=f"`{TEST_SPLIT}`, or what its prompts are called.")
+    source: str = Field(description="A split of the evaluator's bundle, or what its prompts are called.")
     settings: dict[str, float]
     repeats: int
     seed: int

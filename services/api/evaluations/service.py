@@ -98,8 +98,8 @@ def _asked(fields: EvaluationFields, raws: object) -> Asked:
         if not isinstance(raws, list):
             raise InvalidInput("is not a list", where="prompts", hint=HINT)
         prompts = read_prompts(enumerate(raws, 1), where="prompts")
-    source = jobs.TEST_SPLIT if prompts is None else fields.source or OWN_PROMPTS
-    if prompts is not None and source == jobs.TEST_SPLIT:
+    source = (fields.split if prompts is None else fields.source) or OWN_PROMPTS
+    if prompts is not None and source in jobs.BUNDLE_SOURCES:
         raise InvalidInput(f"{source!r} is what the evaluator's own prompts are called", where="source")
     request = jobs.EvaluationRequest(
         bundle=fields.bundle,

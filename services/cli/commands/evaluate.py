@@ -40,6 +40,7 @@ def run(
     evaluator: evaluating.Evaluator = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
+    regenerate: evaluating.Regenerate = False,
     seed: evaluating.Seed = None,
     baseline: evaluating.Baseline = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the run.")] = None,
@@ -53,6 +54,7 @@ def run(
 
     A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
     """
+    repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
     body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
     from services.cli.client import Client

@@ -162,6 +162,48 @@ def evaluator_bundle(
     console.result(roles.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite))
 
 
+@evaluator.command("reference")
+def evaluator_reference(
+    bundle: Annotated[str, typer.Argument(metavar="EVALUATOR", help="Name or path of a bundle.")],
+    data: Data,
+    output: Output,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a bundle's networks again with captions, embeddings and measures of these data's test clips."""
+    from services.cli import roles
+
+    console.result(roles.renew_reference(bundle, data, output, overwrite=overwrite))
+
+
+@evaluator.command("reconstruct")
+def evaluator_reconstruct(
+    bundle: Annotated[str, typer.Argument(metavar="EVALUATOR", help="Name or path of the bundle that measures.")],
+    generator: Annotated[str, typer.Argument(metavar="GENERATOR", help="A bundle, or a run's folder.")],
+    data: Data,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="A report, .html, .json or .md.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Measure a generator's tokenizer alone on real clips; reports of that generator then have the row.
+
+    The row is kept beside the evaluator's bundle, for exactly these two bundles.
+    """
+    from services.cli import roles
+
+    with console.bar() as bar:
+        task = bar.add_task("clips", total=None)
+        found = roles.reconstruct(
+            bundle, generator, data, output, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    if as_json:
+        console.result_json(found)
+        return
+    for source, values in found["values"].items():
+        console.result(f"{source}: {found['clips'][source]} clips, {found['error_mm'][source]:.1f} mm off")
+        for metric, value in values.items():
+            if value["mean"] is not None:
+                console.result(f"{source}/{metric} = {value['mean']:g}")
+
+
 Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
 UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
 

@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from services.cli.commands import schedules
-from services.cli.evaluating import Asked, check_evaluation
+from services.cli.evaluating import Asked, check_evaluation, repeats_of
 from services.cli.roles import default_roles, parse_roles
 from shared.errors import InvalidInput, ItemsFailed, Regressed
 from shared.settings import Settings
@@ -31,6 +31,18 @@ def test_only_what_was_given_is_asked_for() -> None:
     assert asked(settings=["guidance=4.5", "steps = 10"], repeats=3, seed=0).body() == {
         "bundle": "hgm3", "split": "test", "settings": {"guidance": 4.5, "steps": 10.0}, "repeats": 3, "seed": 0,
     }  # fmt: skip
+
+
+def test_both_splits_of_the_evaluator_can_be_asked_for() -> None:
+    assert asked(split="test+compositional").body() == {"bundle": "hgm3", "split": "test+compositional"}
+
+
+def test_to_regenerate_is_to_make_a_motion_for_each_repeat() -> None:
+    assert [repeats_of(given, regenerate=anew) for given, anew in ((None, False), (3, False), (None, True))] == [
+        None, 3, 20,
+    ]  # fmt: skip
+    with pytest.raises(InvalidInput, match="means --repeats 20"):
+        repeats_of(3, regenerate=True)
 
 
 def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:

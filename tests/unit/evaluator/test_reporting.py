@@ -10,7 +10,6 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
 from shared.jobs import (
     AssetDigest,
@@ -26,48 +25,18 @@ from shared.measures.comparing import OBEYED, RETRIEVED
 from shared.motion.features import HUMANML3D_263
 from shared.motion.finish import finish_motion
 from shared.runtime.scoring import ScoreInput
-from tests.support.prepared import write_prepared
-from workers.evaluator.assembly import assemble
-from workers.evaluator.config import TINY
 from workers.evaluator.measuring import Measured, encoded, measure
-from workers.evaluator.reference import Reference
+from workers.evaluator.reference import Reference, ReferenceSplit
 from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from workers.evaluator.reporting import report_of, summary_of
 from workers.evaluator.tmr import TMREvaluator
-from workers.evaluator.train import train_stage
-from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
-from workers.training.staging import TrainOptions
 
-ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
 NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
 
 
 def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
-
-
-@pytest.fixture(scope="module")
-def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
-    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("scored") / "prepared", 240, ACTS))
-
-
-@pytest.fixture(scope="module")
-def bundle(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    run = tmp_path_factory.mktemp("scored") / "run"
-    train_stage("tmr", TrainOptions(prepared.path, run, TINY, Budget(steps=3), device="cpu", bf16=False, quiet=True))
-    assemble(prepared.path, run, run / "judge", TINY)
-    return Bundle.open(run / "judge")
-
-
-@pytest.fixture(scope="module")
-def evaluator(bundle: Bundle) -> TMREvaluator:
-    return TMREvaluator.load(bundle, device="cpu")
-
-
-@pytest.fixture(scope="module")
-def real(bundle: Bundle) -> Reference:
-    return Reference.of(bundle)
 
 
 @pytest.fixture(scope="module")
@@ -181,6 +150,41 @@ def test_all_three_files_are_written_and_the_numbers_can_be_read_back(report: Re
     assert b"Prompts obeyed" in to_markdown(report)
     assert from_json(to_json(report)).scores == report.scores
     assert len(report.scores) == 40
+
+
+def test_real_motion_stands_beside_with_what_its_joints_say(report: Report, real: Reference) -> None:
+    truth = report.row("ground_truth").values
+    qualities = [clip.quality for clip in real.split("test").clips]
+    assert truth["jerk"].mean == pytest.approx(np.mean([q.jerk for q in qualities if q is not None]))
+    assert truth["jerk"].mean == pytest.approx(report.row("raw").values["jerk"].mean, rel=1e-3)  # the same motions
+    assert truth["skate"].n == 40
+    assert "reconstruct" in report.row("reconstruction").values["fid"].note
+
+
+def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference
+) -> None:
+    clips, motion = real.split("test").clips, real.split("test").motion
+    parts = {"test": slice(0, 26), "compositional": slice(26, 40)}
+    two = Reference({name: ReferenceSplit.of(clips[at], motion[at]) for name, at in parts.items()})
+    base = source_of(files, evaluator, real)
+    source = replace(base, request=replace(base.request, source="test+compositional"))
+    items = tuple(replace(item, expected="kick" if item.index < 26 else None) for item in source.items)
+    source = replace(source, items=items)
+    found = report_of(source, measured_of(source, evaluator), evaluator, two)
+    values = found.row("raw").values
+    assert values["clip_score"].n == 40
+    assert values["clip_score_compositional"].n == 14
+    assert values["r_precision_3_of_32_compositional"].n < 14  # those of them that came into pools of all 40
+    assert values["obeyed"].n == 26
+    assert "no prompt says" in values["obeyed_compositional"].note
+    assert found.row("ground_truth").values["clip_score_compositional"].mean == pytest.approx(
+        values["clip_score_compositional"].mean, abs=0.01
+    )
+    assert found.metric("kid_compositional").measured_on == "the compositional split"
+    assert b"on the compositional split" in to_markdown(found)
+    plain = report_of(base, measured_of(base, evaluator), evaluator, real)
+    assert "kid_compositional" not in plain.row("raw").values
 
 
 def test_the_same_evaluation_gives_the_same_numbers(

@@ -1,0 +1,41 @@
+"""A small trained evaluator and the data that it was trained on, for the files that only look at them."""
+
+from __future__ import annotations
+
+import pytest
+
+from shared.bundles import Bundle
+from tests.support.prepared import write_prepared
+from workers.evaluator.assembly import assemble
+from workers.evaluator.config import TINY
+from workers.evaluator.reference import Reference
+from workers.evaluator.tmr import TMREvaluator
+from workers.evaluator.train import train_stage
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+from workers.training.staging import TrainOptions
+
+ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
+
+
+@pytest.fixture(scope="package")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
+    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("scored") / "prepared", 240, ACTS))
+
+
+@pytest.fixture(scope="package")
+def bundle(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
+    run = tmp_path_factory.mktemp("scored") / "run"
+    train_stage("tmr", TrainOptions(prepared.path, run, TINY, Budget(steps=3), device="cpu", bf16=False, quiet=True))
+    assemble(prepared.path, run, run / "judge", TINY)
+    return Bundle.open(run / "judge")
+
+
+@pytest.fixture(scope="package")
+def evaluator(bundle: Bundle) -> TMREvaluator:
+    return TMREvaluator.load(bundle, device="cpu")
+
+
+@pytest.fixture(scope="package")
+def real(bundle: Bundle) -> Reference:
+    return Reference.of(bundle)

@@ -1,0 +1,219 @@
+"""Real clips through a generator's tokenizer alone: the row that says what the transformers behind it start from.
+
+Whoever evaluates has no captured motion. So this is measured where the prepared data are and kept beside the
+evaluator's bundle, in `reconstructions/{exact generator}.json`: outside the bundle's own hash, which is older than the
+generators that it judges, and bound to both by their exact references.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from shared.bundles import Bundle
+from shared.bundles.reference import expected_of
+from shared.errors import InvalidFile, InvalidInput
+from shared.jobs import BUNDLE_SOURCES
+from shared.motion.features import FeatureLayout, layout
+from shared.nn.motion_tokenizer import MotionTokenizer
+from workers.evaluator.heat import heat_of, style_of
+from workers.evaluator.measuring import Checked, check
+from workers.evaluator.port import Embeddings, Evaluator
+from workers.evaluator.reference import Reference, ReferenceSplit
+from workers.evaluator.report import HeatCell, Value
+from workers.evaluator.rows import Ruler, real_side
+from workers.training.data.prepared import PreparedData
+
+FOLDER = "reconstructions"
+BATCH = 32
+SAME = 0.02
+"""How far the embedding of a clip may lie from the stored one, as a share of its length: half precision and other
+machines make .002 of it, another clip over .5."""
+
+Features = NDArray[np.float32]
+
+
+class Reconstruction(BaseModel):
+    """What a tokenizer makes of the real clips of an evaluator's reference."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal["marey-reconstruction-1"] = "marey-reconstruction-1"
+    generator: str
+    evaluator: str
+    clips: Mapping[str, int]
+    """By source of prompts (`shared.jobs.BUNDLE_SOURCES`)."""
+    error_mm: Mapping[str, float]
+    """Mean joint error with the pelvis laid over the true one, by source."""
+    values: Mapping[str, Mapping[str, Value]]
+    """The row by source and metric."""
+
+    def note(self, source: str) -> str:
+        """What the row is, in a few words."""
+        return f"{self.clips[source]} real clips through the tokenizer, {self.error_mm[source]:.1f} mm off"
+
+    def save(self, evaluator: Bundle) -> Path:
+        """Keep it beside the evaluator's bundle; the file."""
+        file = _file(evaluator, self.generator)
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(self.model_dump_json(indent=1, exclude_defaults=True) + "\n", encoding="utf-8")
+        return file
+
+
+def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | None:
+    """What was measured of an exact generator by this exact evaluator; None = nothing.
+
+    Raises:
+        InvalidFile: it is damaged, or was measured by another evaluator.
+    """
+    file = _file(evaluator, generator)
+    if not file.is_file():
+        return None
+    try:
+        found = Reconstruction.model_validate_json(file.read_bytes())
+    except ValidationError as error:
+        raise InvalidFile(f"is no reconstruction: {error.errors()[0]['msg']}", where=str(file)) from error
+    if (found.generator, found.evaluator) != (generator, evaluator.reference):
+        raise InvalidFile(
+            f"was measured of {found.generator} by {found.evaluator}, not of {generator} by {evaluator.reference}",
+            where=str(file),
+            hint="Measure it again: `marey train evaluator reconstruct`.",
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Rebuilt:
+    """A reconstruction, and its prompt checks by act and style, which are for a report of its own."""
+
+    reconstruction: Reconstruction
+    heat: tuple[HeatCell, ...]
+
+
+def reconstruct(
+    data: PreparedData,
+    real: Reference,
+    evaluator: Evaluator,
+    generator: str,
+    tokenizer: MotionTokenizer,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Rebuilt:
+    """Encode and decode the clips of the reference, and measure them as generated motion is.
+
+    Args:
+        data: the prepared folder that the clips of the reference are from.
+        real: the evaluator's reference.
+        evaluator: embeds.
+        generator: exact reference of the bundle that the tokenizer is of.
+        tokenizer: in evaluation mode, on the CPU.
+        progress: called with (clips done, clips in all).
+
+    Raises:
+        InvalidInput: the data lack a clip, or hold other motion under its name; another feature layout.
+    """
+    space = layout(evaluator.layout)
+    if data.manifest.layout != space.name or tokenizer.mean.shape[0] != space.dim:
+        raise InvalidInput(f"{generator} and {data.path} are not both of {space.name}", where=generator)
+    sources = {name: tuple(name.split("+")) for name in BUNDLE_SOURCES if set(name.split("+")) <= set(real.splits)}
+    whole = real.joined([name for name in sources if name in real.splits])
+    features = _features(data, whole, tokenizer.frames_per_token, evaluator)
+    made: list[Features] = []
+    for low in range(0, len(features), BATCH):
+        made += rebuilt(tokenizer, features[low : low + BATCH])
+        progress(len(made), len(features))
+    checked, errors = _joints(space, whole, features, made)
+    motion = evaluator.embed_motion(made)
+    rows = _rows(real, sources)
+    found = {
+        source: _measured(
+            Ruler(evaluator, real, splits, seed=0), motion[rows[source]], [checked[r] for r in rows[source]]
+        )
+        for source, splits in sources.items()
+    }
+    reconstruction = Reconstruction(
+        generator=generator,
+        evaluator=evaluator.name,
+        clips={source: len(at) for source, at in rows.items()},
+        error_mm={source: round(float(1000 * errors[at].mean()), 3) for source, at in rows.items()},
+        values=found,
+    )
+    told = zip(whole.clips, checked, strict=True)
+    heat = heat_of((expected_of(c.acts, c.sides), style_of(c.label), each.obeyed) for c, each in told)
+    return Rebuilt(reconstruction, heat)
+
+
+@torch.inference_mode()
+def rebuilt(tokenizer: MotionTokenizer, clips: Sequence[Features]) -> list[Features]:
+    """Clips (T, D), T a multiple of the frames of a token, encoded and decoded."""
+    rate = tokenizer.frames_per_token
+    lengths = torch.tensor([len(clip) for clip in clips])
+    batch = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(clip) for clip in clips], batch_first=True)
+    tokens = tokenizer.encode(batch, lengths)
+    output = tokenizer.decode(tokens.clamp(min=0), lengths // rate).float().numpy()
+    return [np.array(output[row, : len(clip)]) for row, clip in enumerate(clips)]
+
+
+def _measured(ruler: Ruler, motion: Embeddings, checked: Sequence[Checked]) -> dict[str, Value]:
+    split = ruler.real.joined(ruler.splits)
+    side = real_side(split, motion, ruler.evaluator)
+    found = [(each.obeyed, each.quality) for each in checked]
+    return ruler.values(side, found, np.arange(len(found)), distances=True)
+
+
+def _features(data: PreparedData, split: ReferenceSplit, rate: int, evaluator: Evaluator) -> list[Features]:
+    """Raw features (T, D) of the clips of a reference, T cut to whole tokens."""
+    known = {clip.id: clip for clip in data.clips}
+    if lacking := [clip.id for clip in split.clips if clip.id not in known]:
+        raise InvalidInput(
+            f"lacks {len(lacking)} of {len(split.clips)} clips of the evaluator's reference, {lacking[0]} first",
+            where=str(data.path),
+            hint="Give the prepared folder that the evaluator's bundle was made with.",
+        )
+    whole = [np.array(data.features(known[clip.id])[: clip.frames], np.float32) for clip in split.clips]
+    away = np.linalg.norm(evaluator.embed_motion(whole) - split.motion, axis=1) / np.linalg.norm(split.motion, axis=1)
+    if away.max() > SAME:
+        raise InvalidInput(
+            f"{split.clips[int(away.argmax())].id} is another motion than in the evaluator's reference",
+            where=str(data.path),
+            hint="Give the prepared folder that the evaluator's bundle was made with.",
+        )
+    return [clip[: len(clip) - len(clip) % rate] for clip in whole]
+
+
+def _joints(
+    space: FeatureLayout, split: ReferenceSplit, truth: Sequence[Features], made: Sequence[Features]
+) -> tuple[list[Checked], NDArray[np.float64]]:
+    """What the joints of each clip say, and how far they are off, in metres."""
+    checked: list[Checked] = []
+    errors: list[float] = []
+    for clip, before, after in zip(split.clips, truth, made, strict=True):
+        old, new = space.decode(before), space.decode(after)
+        checked.append(check(new, space.fps, expected_of(clip.acts, clip.sides)))
+        off = (new - new[:, :1]) - (old - old[:, :1])
+        errors.append(float(np.linalg.norm(off, axis=-1).mean()))
+    return checked, np.array(errors)
+
+
+def _rows(real: Reference, sources: Mapping[str, Sequence[str]]) -> dict[str, NDArray[np.int64]]:
+    """Of each source the rows of its clips among those of all splits, joined in the order of the sources."""
+    at, first = {}, 0
+    for name in (name for name in sources if name in real.splits):
+        count = len(real.split(name).clips)
+        at[name] = np.arange(first, first + count)
+        first += count
+    return {source: np.concatenate([at[name] for name in splits]) for source, splits in sources.items()}
+
+
+def _file(evaluator: Bundle, generator: str) -> Path:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*@[0-9a-f]{12,64}", generator):
+        raise InvalidInput(f"{generator!r} is no exact bundle", where="generator", hint="As hgm3-starter@96a91328572d.")
+    return evaluator.path / FOLDER / f"{generator}.json"

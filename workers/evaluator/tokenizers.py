@@ -1,0 +1,57 @@
+"""The report of a tokenizer alone: real motion beside what encoding and decoding leave of it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import torch
+
+from shared.jobs import COMPOSITIONAL, TEST_SPLIT
+from workers.evaluator.port import Evaluator
+from workers.evaluator.reconstruction import Rebuilt
+from workers.evaluator.reference import Reference as RealClips
+from workers.evaluator.report import Reference, Repeats, Report
+from workers.evaluator.report.model import RECONSTRUCTION
+from workers.evaluator.reporting import bundle_of
+from workers.evaluator.rows import Ruler, reconstruction_row, truth_row
+from workers.evaluator.scoring import REPEATS, metrics_of
+from workers.training.data.prepared import PreparedData
+
+
+def tokenizer_report(
+    rebuilt: Rebuilt, evaluator: Evaluator, real: RealClips, data: PreparedData, *, licence: str
+) -> Report:
+    """A report whose judged row is the reconstruction of every test and compositional clip.
+
+    Args:
+        rebuilt: what was measured.
+        evaluator: what measured it.
+        real: the clips.
+        data: the prepared folder that they came from.
+        licence: of the tokenizer's weights.
+    """
+    found = rebuilt.reconstruction
+    splits = tuple(name for name in (TEST_SPLIT, COMPOSITIONAL) if name in real.splits)
+    source = "+".join(splits)
+    ruler = Ruler(evaluator, real, splits, seed=0)
+    clips = found.clips[source]
+    return Report(
+        title=f"The tokenizer of {found.generator.partition('@')[0]} alone",
+        evaluation="reconstruction",
+        created=datetime.now(UTC),
+        generator=bundle_of(found.generator),
+        licence=licence,
+        evaluator=bundle_of(evaluator.name),
+        source=Reference(source, data.manifest.files["features.npy"].sha256),
+        prompts=clips,
+        motions=clips,
+        repeats=Repeats(REPEATS, 0),
+        metrics=metrics_of(evaluator, splits),
+        rows=(truth_row(ruler), reconstruction_row(found.values[source], found.note(source))),
+        judged=RECONSTRUCTION,
+        heat=rebuilt.heat,
+        command=f"marey train evaluator reconstruct {evaluator.name} {found.generator} DATA",
+        software={"marey": version("marey"), "torch": torch.__version__},
+        notes=tuple(f"Mean joint error on {name}: {error:.1f} mm" for name, error in found.error_mm.items()),
+    )
