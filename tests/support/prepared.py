@@ -18,6 +18,7 @@ from shared.text.features import TextFeatures
 from shared.text.graph import Edge, Node, SemanticGraph
 from workers.training.data import manifest as names
 from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured
+from workers.training.data.pack import split_root
 from workers.training.texts import CaptionTexts
 
 WIDTH = 384
@@ -64,7 +65,8 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
     """
     folder.mkdir(parents=True)
     seeds = [i % len(acts) if acts else i for i in range(clips)]
-    features = [HUMANML3D_263.encode(swinging(36 + 9 * (i % 8), seed)) for i, seed in enumerate(seeds)]
+    motions = [HUMANML3D_263.canonicalize(swinging(36 + 9 * (i % 8), seed)) for i, seed in enumerate(seeds)]
+    features = [HUMANML3D_263.encode(joints) for joints in motions]
     starts = np.concatenate([[0], np.cumsum([len(f) for f in features])])
     lines = [
         Clip(
@@ -92,8 +94,9 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
     for group in HUMANML3D_263.slices.values():
         std[group] = max(float(std[group].mean()), 1e-3)
     np.save(folder / names.FEATURES, whole)
-    np.save(folder / names.JOINTS, np.zeros((len(whole) + clips, 21, 3), np.float16))
-    np.save(folder / names.ROOTS, np.zeros((len(whole) + clips, 3), np.float32))
+    local, roots = split_root(np.concatenate(motions))
+    np.save(folder / names.JOINTS, local)
+    np.save(folder / names.ROOTS, roots)
     np.savez(folder / names.STATISTICS, mean=whole.mean(0), std=std)
     files = {n: FileEntry(sha256=sha256_of(folder / n), bytes=(folder / n).stat().st_size) for n in names.FILES}
     source = {"name": "synthetic", "title": "-", "licence": "MIT", "credit": "-", "url": "-"}

@@ -15,7 +15,7 @@ RECIPE = Recipe(
     read=MOGOConfig.from_dict,
     built_from={
         "tokenizer": ("layout", "features", "joints", "tokenizer"),
-        "transformer": ("tokenizer", "condition", "max_frames", "transformer", "depth"),
+        "transformer": ("tokenizer", "condition", "max_frames", "transformer", "depth", "ahead"),
     },
     shares={"tokenizer": 0.4, "transformer": 0.6},
 )

@@ -66,6 +66,7 @@ class ConditionConfig:
 
     text_width: int = 768
     drop: float = 0.1  # share of samples trained without prompt, for guidance
+    every_frame: bool = False  # ours: the prompt in force is told to every frame, beside standing at position 0
     noise: float = 0.0  # ours: std of what training adds to standardised text features
 
 
@@ -94,6 +95,11 @@ class MOGOConfig(ModelConfig):
     max_frames: int = 196  # longest training sequence: no relative distance beyond it is ever learnt
     corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
     first_level: float = 1.0  # weight of level 0 in the loss, to 1 of each other level
+    ahead: tuple[int, ...] = ()
+    """Ours: frames by which training also asks level 0 ahead of the next one (Gloeckle et al. 2024, "Better & Faster Large
+    Language Models via Multi-token Prediction"). The past says the next frame; what comes a second later the prompt does."""
+    ahead_weight: float = 1.0  # of that loss, to 1 of the loss of eq. 11
+    steers: int = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
@@ -115,9 +121,11 @@ STARTER = MOGOConfig(
     name="starter",
     corruption=1.0,  # with .5 a frame tells so much of the next that prompts are hardly read
     first_level=5.0,  # it decides what is done; the others how exactly
+    ahead=(5, 12, 24),
+    steers=4000,
     # 220,000 training frames cannot fill 6 x 8192 codes
     tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
-    condition=ConditionConfig(text_width=384, noise=0.3),
+    condition=ConditionConfig(text_width=384, noise=0.3, every_frame=True),
     transformer=TransformerConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
@@ -131,8 +139,10 @@ STARTER = MOGOConfig(
 TINY = MOGOConfig(
     name="tiny",
     max_frames=24,
+    ahead=(3,),
+    steers=6,
     tokenizer=TokenizerConfig(width=24, depth=2, levels=3, codes=32, code_width=16),
-    condition=ConditionConfig(text_width=384),
+    condition=ConditionConfig(text_width=384, every_frame=True),
     transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
     depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32, share=0.5),
     inference=InferenceConfig(window=16),

@@ -67,6 +67,29 @@ def level_sums(model: RQHCTransformer, states: Tensor, targets: Tensor, share: f
     return sums + LevelSums(F.pad(alone.losses, padding), F.pad(alone.right, padding), F.pad(alone.asked, padding))
 
 
+def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Tensor | None, share: float) -> Tensor:
+    """Cross-entropy of level 0 further ahead (`MOGOConfig.ahead`), a mean over what is asked; 0 where nothing is.
+
+    Args:
+        model: to score with.
+        states: (B, n, L, w) from `RQHCTransformer.states`.
+        targets: (B, V, n) from `next_targets`.
+        seam: (B,) as in `states`: before a steer nobody can tell what comes after it.
+        share: of the frames that are asked, drawn at random.
+    """
+    losses: list[Tensor] = []
+    size, position = states.shape[1], torch.arange(states.shape[1], device=states.device)
+    for distance, project in zip(model.config.ahead, model.ahead, strict=True):
+        wanted = targets[:, 0, distance:]
+        now = position[: max(size - distance, 0)]
+        asked = (wanted != NOT_ASKED) & (wanted != model.end) & (torch.rand(wanted.shape, device=wanted.device) < share)
+        if seam is not None:
+            asked &= (now >= seam[:, None]) | (now + distance < seam[:, None])
+        logits = model.score(project(states[:, : len(now), 0][asked])[:, None])[:, 0]
+        losses.append(F.cross_entropy(logits, wanted[asked], reduction="sum") / asked.sum().clamp(min=1))
+    return torch.stack(losses).mean() if losses else states.new_zeros(())
+
+
 def _sums(logits: Tensor, codes: Tensor) -> LevelSums:
     """Of logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
     losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), reduction="none").view(codes.shape).sum(0)

@@ -15,7 +15,7 @@ clip is steered).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import torch
 import torch.nn.functional as F
@@ -29,6 +29,8 @@ from workers.mogo.depth import DepthHead
 
 NOT_ASKED = -1
 """Target that counts in no loss."""
+STRETCHES = (1, 1, 8, 24)
+"""Frames that are hidden together in training."""
 
 
 def lanes(config: MOGOConfig) -> int:
@@ -37,7 +39,7 @@ def lanes(config: MOGOConfig) -> int:
 
 
 class Prompt(nn.Module):
-    """Sentence features to position 0 of every lane (eq. 7)."""
+    """Sentence features to position 0 of every lane (eq. 7), and to every frame (ours)."""
 
     mean: Tensor  # (W,) of the training captions; standardising them is ours, as in HGM³
     std: Tensor  # (W,)
@@ -50,17 +52,21 @@ class Prompt(nn.Module):
         self.register_buffer("std", torch.ones(config.condition.text_width))
         self.project = nn.Linear(config.condition.text_width, width)
         self.level = nn.Embedding(lanes(config), width)
+        self.tell = nn.Linear(config.condition.text_width, width, bias=False) if config.condition.every_frame else None
         self.null = nn.Parameter(torch.zeros(width))  # in place of the prompt, the same at all levels (ours)
 
-    def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> Tensor:
-        """p + q_emb: (B, W) -> (B, L, w); the null prompt where `dropped` (B,) bool."""
+    def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """p + q_emb: (B, W) -> (B, L, w), the null prompt where `dropped` (B,) bool; and what is added to every frame
+        (B, w), nothing there."""
         x = (sentence.float() - self.mean) / self.std
         if self.training and self.noise > 0:
             x = x + self.noise * torch.randn_like(x)
         prompt = self.project(x)
+        told = torch.zeros_like(prompt) if self.tell is None else self.tell(x)
         if dropped is not None:
             prompt = torch.where(dropped[:, None], self.null.to(prompt.dtype), prompt)
-        return prompt[:, None] + self.level.weight
+            told = told.masked_fill(dropped[:, None], 0)
+        return prompt[:, None] + self.level.weight, told
 
 
 class TrunkBlock(nn.Module):
@@ -145,12 +151,15 @@ class RQHCTransformer(nn.Module):
         self.trunk = Trunk(t, config.max_frames)
         self.depth = DepthHead(config.depth, levels, width) if config.depth.layers else None
         self.head = nn.Linear(width, self.codes + 1)  # one for all levels; the last is END
+        self.ahead = nn.ModuleList(nn.Linear(width, width) for _ in config.ahead)  # asked in training alone
         no_end = torch.zeros(levels, self.codes + 1, dtype=torch.bool)
         no_end[1:, -1] = True
         self.register_buffer("no_end", no_end, persistent=False)
         initialize(self)
         if self.depth is not None:
             nn.init.zeros_(self.depth.leave.weight)  # starts as independent levels
+        if self.prompt.tell is not None:
+            nn.init.zeros_(self.prompt.tell.weight)
 
     @property
     def end(self) -> int:
@@ -184,8 +193,11 @@ class RQHCTransformer(nn.Module):
         training = self.training
         dropped = torch.rand(batch, device=tokens.device) < self.config.condition.drop if training else None
         inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
-        first = torch.stack([self.prompt(p, dropped) for p in prompts.unbind(1)], 2)  # (B, L, P, w)
-        x = torch.cat([first, self.columns(inputs).to(first.dtype)], 2).flatten(0, 1)  # (B · L, P + n, w)
+        read = [self.prompt(p, dropped) for p in prompts.unbind(1)]
+        first = torch.stack([opening for opening, _ in read], 2)  # (B, L, P, w)
+        told = in_force([told for _, told in read], size, seam)
+        frames = self.columns(inputs).to(first.dtype) + told[:, None]
+        x = torch.cat([first, frames], 2).flatten(0, 1)  # (B · L, P + n, w)
         states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
         states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
         return states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)
@@ -228,15 +240,29 @@ class RQHCTransformer(nn.Module):
         return self.embedding(tokens.clamp(min=0)) * (tokens >= 0)[..., None]
 
 
+def in_force(told: Sequence[Tensor], size: int, seam: Tensor | None) -> Tensor:
+    """What each of `size` frames is told, (B, 1 or n, w), of one or two prompts' (B, w): the frame behind which the
+    second prompt replaces the first is told the second, for it predicts the first frame of it."""
+    if seam is None:
+        return told[0][:, None]
+    position = torch.arange(1, size + 1, device=seam.device)
+    return torch.where((position >= seam[:, None])[..., None], told[1][:, None], told[0][:, None])
+
+
 def corrupt(tokens: Tensor, codes: int, most: float) -> Tensor:
     """Replace whole frame columns of (B, n, V) by random codes, at a rate from U(0, `most`) a sample (ours).
 
     The public repository replaces half of the tokens always. What a stream reads are its own slips, and those come as
-    frames: a wrong level 0 takes the levels above along.
+    frames: a wrong level 0 takes the levels above along. Half of the samples lose frames one by one, the others whole
+    stretches, behind which only the prompt says what is going on.
     """
     batch, size = tokens.shape[:2]
-    rate = most * torch.rand(batch, 1, device=tokens.device)
-    hit = torch.rand(batch, size, device=tokens.device) < rate
+    device = tokens.device
+    rate = most * torch.rand(batch, 1, device=device)
+    stretch = torch.tensor(STRETCHES, device=device)[torch.randint(len(STRETCHES), (batch, 1), device=device)]
+    begun = torch.randint(max(STRETCHES), (batch, 1), device=device)
+    block = (torch.arange(size, device=device) + begun) // stretch  # (B, n)
+    hit = torch.rand(batch, size + max(STRETCHES), device=device).gather(1, block) < rate
     return torch.where(hit[..., None] & (tokens >= 0), torch.randint_like(tokens, codes), tokens)
 
 

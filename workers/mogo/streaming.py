@@ -40,6 +40,7 @@ class StreamState:
     ended: Tensor  # (S,) bool: it drew END, and from then on columns of -1
     last: Tensor  # (S, V) int64, the newest column; -1 before the first
     opening: Tensor  # (S, L, w) states of position 0, from which frame 1 is drawn
+    told: Tensor  # (S, L, w) what the prompt in force adds to every frame
     memory: Tensor  # (layers, 2, S, H, L, 1 + W, w / H) keys and values
 
     @classmethod
@@ -56,6 +57,7 @@ class StreamState:
             ended=whole[3].bool(),
             last=torch.full((sessions, model.levels), -1, device=device),
             opening=torch.zeros(sessions, lanes, t.width, device=device),
+            told=torch.zeros(sessions, lanes, t.width, device=device),
             memory=torch.zeros(t.layers, 2, sessions, t.heads, lanes, 1 + window, t.width // t.heads, device=device),
         )
 
@@ -132,7 +134,8 @@ class Streams:
         return self.sessions[row]
 
     def steer(self, session: int, sentence: Tensor) -> None:
-        """Another prompt (W,) from the next frame on: position 0 alone is computed anew, on each level."""
+        """Another prompt (W,) from the next frame on: position 0 alone is computed anew, on each level; what the frames
+        so far were told stays."""
         self._read(self._row(session), sentence, self.state.last.new_zeros(0, self.model.levels))
 
     def stop(self, session: int) -> None:
@@ -159,6 +162,7 @@ class Streams:
         active, state = len(self.sessions), self.state
         slots = self._slots(active)
         x = self.model.columns(state.last[:active, None])[:, :, 0].repeat(1, self.branches, 1)  # (s, L, w)
+        x = x + state.told[:active]
         for layer, step in enumerate(self.packed.steps):
             x = step(x, state.memory[layer, :, :active], self.packed.terms[layer], slots)
         return torch.where((state.made[:active] == 0)[:, None, None], state.opening[:active], self.model.trunk.norm(x))
@@ -192,9 +196,10 @@ class Streams:
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:
         """Write position 0, and behind it frames `past` (n, V), into a row's memory; one pass for all of it."""
         null = torch.arange(self.branches, device=past.device) > 0
-        prompt = self.model.prompt(sentence.expand(self.branches, -1), null)[:, :, None]  # (branches, V, 1, w)
-        frames = self.model.columns(past[None].expand(self.branches, -1, -1))  # (branches, V, n, w)
-        x = torch.cat([prompt, frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
+        prompt, told = self.model.prompt(sentence.expand(self.branches, -1), null)  # (branches, V, w), (branches, w)
+        frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + told[:, None, None]
+        x = torch.cat([prompt[:, :, None], frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
+        self.state.told[row] = told.repeat_interleave(self.model.lanes, 0)
         skipped = self.state.skipped[row]
         reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
         position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import torch
 
 from shared.nn.devices import choose_device
 from workers.mogo.assembly import RECIPE
 from workers.mogo.config import MOGOConfig
 from workers.mogo.losses import scale_penalty
+from workers.mogo.samples import MIN_FRAMES
 from workers.mogo.stage_transformer import TransformerStage
+from workers.mogo.steers import Steers, load_steers
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.loop import start_process_group
 from workers.training.motions import MotionData, load_tokens
+from workers.training.pairs import Pairs
 from workers.training.sentences import SentenceData
 from workers.training.staging import TrainOptions, finish, train_all, use_threads
 from workers.training.texts import CaptionTexts
@@ -55,8 +59,19 @@ def _train_transformer(options: TrainOptions[MOGOConfig], data: MotionData) -> d
     captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
     torch.manual_seed(options.seed)
     clips, sha256 = data.prepared.clips, data.sha256
+    steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES))
     data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
-    stage = TransformerStage(options.config, clips, tokens, captions)
+    stage = TransformerStage(options.config, clips, tokens, captions, steers)
     metrics = RECIPE.train(stage, options)
     finish(stage.module, options, stage.name, metrics, sha256)
     return metrics
+
+
+def _steers(options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs) -> Steers | None:
+    """Steered motions between training clips of one act each."""
+    if not options.config.steers:
+        return None
+    single = np.array([not data.prepared.clips[int(clip)].seams for clip in pairs.train])
+    return load_steers(
+        options.run, options.config, tokenizer, data, pairs.train[single].tolist(), pairs.weights[single].tolist()
+    )  # fmt: skip

@@ -129,7 +129,7 @@ class TokenData:
 def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> TokenData:
     """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
     file = run / TOKENS
-    key = f"{data.sha256}:{_fingerprint(tokenizer)}"
+    key = f"{data.sha256}:{fingerprint(tokenizer)}"
     if file.is_file():
         values = load_file(file, device=str(data.features.device))
         if bytes(values.pop("key").cpu().numpy().tobytes()).decode() == key:
@@ -148,6 +148,7 @@ def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> Toke
     return tokens
 
 
-def _fingerprint(tokenizer: MotionTokenizer) -> str:
+def fingerprint(tokenizer: MotionTokenizer) -> str:
+    """Tells one tokenizer's weights from another's."""
     total = sum(float(value.double().abs().sum()) for value in tokenizer.state_dict().values())
     return f"{total:.6f}"

@@ -9,14 +9,14 @@ import torch
 import torch.nn.functional as F
 
 from workers.mogo.config import TINY
-from workers.mogo.losses import LevelSums, level_sums, scale_penalty
+from workers.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
 from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.tokenizing import tokenizer_loss
 
 from .networks import columns, opened, prompts, transformer
 
-LEVELS = TINY.tokenizer.levels
+LEVELS, CODES = TINY.tokenizer.levels, TINY.tokenizer.codes
 
 
 def test_the_tokenizer_is_held_to_identity_by_gamma() -> None:
@@ -81,12 +81,34 @@ def test_level_0_weighs_as_much_as_it_is_told() -> None:
     assert float(sums.loss(4.0)) == pytest.approx((4 * 1 + 2) / 6)
 
 
+def test_what_is_asked_ahead_lies_so_far_ahead_and_never_behind_a_steer() -> None:
+    model = transformer(replace(TINY, ahead=(3,)))
+    with torch.no_grad():  # a state whose number k is loud says code k
+        model.ahead[0].weight.copy_(torch.eye(TINY.transformer.width))
+        model.ahead[0].bias.zero_()
+        model.head.weight.zero_()
+        model.head.bias.zero_()
+        model.head.weight[: CODES - 1].copy_(60 * torch.eye(TINY.transformer.width)[: CODES - 1])
+    tokens = torch.arange(10)[None, :, None].repeat(1, 1, LEVELS)
+    targets = next_targets(tokens, torch.tensor([10]), model.end)  # of state k: code k
+    knows = torch.eye(TINY.transformer.width)[3:14].view(1, 11, 1, -1)  # state k: code k + 3
+    assert float(ahead_loss(model, knows, targets, None, 1.0)) < 1e-3
+    assert float(ahead_loss(model, knows.roll(1, 1), targets, None, 1.0)) > 10
+    targets[:, :, 5:10] = 30  # behind the seam comes what nobody can know before it
+    assert float(ahead_loss(model, knows, targets, None, 1.0)) > 10
+    before = targets.clone()
+    before[:, :, 8:] = NOT_ASKED  # what states behind the seam are asked
+    assert float(ahead_loss(model, knows, before, torch.tensor([5]), 1.0)) < 1e-3
+    assert float(ahead_loss(model, knows, before, None, 1.0)) > 10
+    assert float(ahead_loss(model, knows[:, :3], targets[..., :3], None, 1.0)) == 0  # too short to ask anything
+
+
 def test_a_trained_network_streams_what_its_prompt_asks_for_and_ends() -> None:
     """Two prompts, two clips of different length, learnt by heart: training forward, cache, targets and END agree."""
     certain = replace(TINY.inference, temperature=0.0, upper_temperature=0.0)
     still = replace(TINY.transformer, dropout=0.0)
     config = replace(
-        TINY, corruption=0.1, inference=certain, transformer=still, condition=replace(TINY.condition, drop=0.0)
+        TINY, corruption=0.0, inference=certain, transformer=still, condition=replace(TINY.condition, drop=0.0)
     )
     torch.manual_seed(0)
     model = RQHCTransformer(config).train()

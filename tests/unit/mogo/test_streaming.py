@@ -218,7 +218,8 @@ def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
     config = InferenceConfig(guidance=2.0, temperature=0, upper_temperature=0, window=WINDOW)
     streams = opened(model, 1, config)
     session = streams.start(said(1), 1)
-    plain = model.prompt(said(1)[None])[:, :, None], model.prompt(said(1)[None], torch.tensor([True]))[:, :, None]
+    read = (model.prompt(said(1)[None]), model.prompt(said(1)[None], torch.tensor([True])))
+    plain = [opening[:, :, None] for opening, _ in read]
     with_prompt, without = (model.score(model.trunk(p.flatten(0, 1), model.reach(0))[:, 0]) for p in plain)
     guided = guide(with_prompt, without, 2.0)
     guided[0, -1] = -torch.inf

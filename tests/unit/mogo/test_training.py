@@ -14,12 +14,15 @@ from tests.support.prepared import farthest_move, write_prepared
 from workers.mogo.assembly import assemble, take_apart
 from workers.mogo.config import TINY, MOGOConfig
 from workers.mogo.model import NOT_ASKED, next_targets
-from workers.mogo.stage_transformer import MIN_FRAMES, TransformerStage
+from workers.mogo.samples import MIN_FRAMES
+from workers.mogo.stage_transformer import TransformerStage
+from workers.mogo.steers import load_steers
 from workers.mogo.tokenizer import Tokenizer
 from workers.mogo.train import train_stage
 from workers.training.budget import Budget
 from workers.training.data.prepared import PreparedData
 from workers.training.motions import MotionData, TokenData
+from workers.training.pairs import Pairs
 from workers.training.parts import load_part
 from workers.training.sentences import SentenceData
 from workers.training.staging import TrainOptions
@@ -34,14 +37,18 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
 
 
 @pytest.fixture(scope="session")
-def stage(prepared: PreparedData) -> TransformerStage:
+def stage(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> TransformerStage:
     torch.manual_seed(0)
     data = MotionData.load(prepared.path, CPU)
     tokenizer = Tokenizer(TINY).eval()
     tokenizer.quantizer.codebooks.normal_()
     tokens = TokenData.encode(tokenizer, data)
     captions = SentenceData.of_sentences(CaptionTexts.load(prepared), prepared.caption_counts, 384, CPU)
-    return TransformerStage(TINY, prepared.clips, tokens, captions)
+    pairs = Pairs(prepared.clips, tokens, captions, MIN_FRAMES)
+    run = tmp_path_factory.mktemp("steers")
+    single = [int(c) for c in pairs.train if not prepared.clips[int(c)].seams]
+    steers = load_steers(run, TINY, tokenizer, data, single, [1.0] * len(single))
+    return TransformerStage(TINY, prepared.clips, tokens, captions, steers)
 
 
 def options(prepared: PreparedData, run: Path, steps: int) -> TrainOptions[MOGOConfig]:
@@ -84,57 +91,90 @@ def test_a_bundle_taken_apart_and_assembled_again_is_the_same_and_trains_on(
 def test_the_transformer_learns_the_clips_it_sees(prepared: PreparedData, tmp_path: Path) -> None:
     train_stage("tokenizer", options(prepared, tmp_path, 3))
     short = train_stage("transformer", options(prepared, tmp_path, 2))
-    long = train_stage("transformer", options(prepared, tmp_path, 60))
+    long = train_stage("transformer", options(prepared, tmp_path, 100))
     assert long["loss"] < short["loss"] - 0.2
 
 
-def test_cuts_lie_within_their_clips_and_around_their_seams(stage: TransformerStage) -> None:
+def rows(stage: TransformerStage, clip: int) -> tuple[int, int]:
+    """First token of a clip, and its frames."""
+    return int(stage.samples._starts[clip]), int(stage.samples.lengths[clip])
+
+
+def test_stretches_are_acts_or_two_that_follow_each_other(stage: TransformerStage) -> None:
+    joined = next(i for i, c in enumerate(stage.samples.clips) if len(c.seams) == 1 and c.split == "train")
+    about = stage.samples.clips[joined]
+    start, length = rows(stage, joined)
+    own = int(stage.samples.captions.first[joined] + stage.samples.captions.count[joined])
+    seam = about.seams[0]
     seen = set()
-    for seed in range(300):
-        rng = np.random.default_rng(seed)
-        clips = stage.pairs.draw(rng, 8)
-        cuts = stage.cut(clips, rng)
-        lengths = stage.lengths[clips]
-        assert (cuts.first >= 0).all()
-        assert (cuts.stop <= lengths).all()
-        assert (cuts.stop - cuts.first <= TINY.max_frames).all()
-        assert (cuts.said <= cuts.first).all()
-        plain = cuts.seam < 0
-        assert (cuts.stop - cuts.first >= np.minimum(MIN_FRAMES, TINY.max_frames))[plain].all()
-        assert (cuts.first < cuts.seam)[~plain].all()
-        for clip, seam, act in zip(clips[~plain], cuts.seam[~plain], cuts.act[~plain], strict=True):
-            assert stage.clips[int(clip)].seams[act] == seam
-        seen |= {(bool(p), bool(f)) for p, f in zip(plain, cuts.first > 0, strict=True)}
-    assert seen == {(True, False), (True, True), (False, False), (False, True)}
+    for seed in range(200):
+        stretch = stage.samples.of_clip(joined, np.random.default_rng(seed))
+        first, stop = stretch.first - start, stretch.first - start + stretch.frames
+        assert 0 <= first < stop <= length
+        if stretch.seam:
+            assert first + stretch.seam == seam
+            assert (stretch.before, stretch.after) == (own, own + 1)
+        else:
+            assert stretch.before == stretch.after == own + (first >= seam)
+            assert stop <= seam or first >= seam
+        assert stretch.ends == (stop in (seam, length))
+        assert (stretch.skipped == 0) == (first == 0)
+        seen.add((stretch.seam > 0, first >= seam, stretch.skipped > 1))
+    assert seen >= {(False, False, False), (False, True, False), (True, False, False)}
 
 
-def test_a_steered_sample_has_the_caption_of_each_act_and_others_the_same_twice(stage: TransformerStage) -> None:
-    joined = next(i for i, c in enumerate(stage.clips) if c.seams and c.split == "train")
-    single = next(i for i, c in enumerate(stage.clips) if not c.seams and c.split == "train")
-    clips = np.array([joined, single])
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        cuts = stage.cut(clips, rng)
-        sample = stage.sample(clips, cuts, rng)
-        own = stage.captions.first[joined] + stage.captions.count[joined]
-        if cuts.seam[0] >= 0:
-            wanted = stage.captions.sentences(torch.tensor([own, own + 1]))
-            assert torch.equal(sample.prompts[0], wanted)
-            assert int(sample.seam[0]) == cuts.seam[0] - cuts.first[0] >= 1
-        assert torch.equal(sample.prompts[1, 0], sample.prompts[1, 1])
-        assert int(sample.seam[1]) > int(sample.lengths[1])
-        start = stage.tokens.starts[single, 0] + cuts.first[1]
-        size = int(sample.lengths[1])
-        assert torch.equal(sample.tokens[1, :size], stage.tokens.tokens[start : start + size])
+def test_a_single_act_has_one_of_its_captions_and_is_sometimes_cut(stage: TransformerStage) -> None:
+    single = next(i for i, c in enumerate(stage.samples.clips) if not c.seams and c.split == "train" and c.length >= 20)
+    start, length = rows(stage, single)
+    found = [stage.samples.of_clip(single, np.random.default_rng(seed)) for seed in range(100)]
+    first = int(stage.samples.captions.first[single])
+    assert {s.before for s in found} <= set(range(first, first + int(stage.samples.captions.count[single])))
+    assert all(s.before == s.after and s.seam == 0 for s in found)
+    assert any(s.skipped for s in found)
+    assert any(not s.skipped for s in found)
+    assert all(s.first == start + s.skipped for s in found)
+    assert all(s.ends == (s.skipped + s.frames == length) for s in found)
 
 
-def test_the_end_is_asked_only_where_a_clip_ends(stage: TransformerStage) -> None:
-    clips = stage.pairs.train[:6]
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        cuts = stage.cut(clips, rng)
-        sample = stage.sample(clips, cuts, rng)
-        targets = next_targets(sample.tokens, sample.lengths, 32, ends=sample.ends, skipped=sample.skipped)
-        asked = (targets[:, 0] == 32).sum(1).bool()
-        assert asked.tolist() == (cuts.stop == stage.lengths[clips]).tolist()
-        assert ((targets[:, 0, 0] == NOT_ASKED) == (sample.skipped > 0)).all()
+def test_what_is_drawn_becomes_tokens_prompts_and_seams(stage: TransformerStage) -> None:
+    rng = np.random.default_rng(0)
+    some = [stage.samples.anytime(rng) for _ in range(4)]
+    some += [stage.samples.of_clip(int(c), rng) for c in stage.pairs.draw(rng, 8)]
+    sample = stage.samples.collate(some)
+    for row, stretch in enumerate(some):
+        assert int(sample.lengths[row]) == stretch.frames
+        wanted = stage.samples.tokens[stretch.first : stretch.first + stretch.frames]
+        assert torch.equal(sample.tokens[row, : stretch.frames], wanted)
+        assert (sample.tokens[row, stretch.frames :] == -1).all()
+        said = torch.tensor([stretch.before, stretch.after])
+        assert torch.equal(sample.prompts[row], stage.samples.captions.sentences(said))
+        assert int(sample.seam[row]) == (stretch.seam or int(sample.lengths.max()) + 1)
+    targets = next_targets(sample.tokens, sample.lengths, 32, ends=sample.ends, skipped=sample.skipped)
+    assert (targets[:, 0] == 32).any(1).tolist() == [s.ends for s in some]
+    assert ((targets[:, 0, 0] == NOT_ASKED) == (sample.skipped > 0)).all()
+
+
+def test_steered_motions_leave_one_clip_for_another_and_are_made_once(prepared: PreparedData, tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    data, tokenizer = MotionData.load(prepared.path, CPU), Tokenizer(TINY).eval()
+    tokenizer.quantizer.codebooks.normal_()
+    clips = [i for i, c in enumerate(prepared.clips) if c.split == "train" and not c.seams]
+    made = load_steers(tmp_path, TINY, tokenizer, data, clips, [1.0] * len(clips))
+    assert len(made.starts) == TINY.steers
+    assert len(made.tokens) == int(made.lengths.sum())
+    assert (made.lengths <= TINY.max_frames).all()
+    assert ((made.seams >= 8) & (made.seams < made.lengths)).all()
+    assert (made.left != made.entered).all()
+    written = (tmp_path / "steers.safetensors").stat().st_mtime_ns
+    again = load_steers(tmp_path, TINY, tokenizer, data, clips, [1.0] * len(clips))
+    assert all(torch.equal(getattr(made, name), getattr(again, name)) for name in vars(made))
+    assert (tmp_path / "steers.safetensors").stat().st_mtime_ns == written
+    # the frames before the seam are those of the clip that was left
+    for row in range(len(made.starts)):
+        seam = int(made.seams[row])
+        clip = prepared.clips[int(made.left[row])]
+        features = data.features[clip.start : clip.start + seam - 1][None]
+        whole = tokenizer.encode(features, torch.tensor([seam - 1]))[0]
+        reach = 4  # frames by which the encoder looks ahead
+        start = int(made.starts[row])
+        assert torch.equal(made.tokens[start : start + max(seam - 1 - reach, 0)], whole[: max(seam - 1 - reach, 0)])
