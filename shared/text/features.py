@@ -28,20 +28,36 @@ class TextFeatures:
     graph: SemanticGraph  # of the rewritten prompt
     nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
     not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
+    acts: tuple[str, ...] = ()  # where there are several (`shared.text.acts`): each as a sentence, in the order of time
+    act_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
 
     @property
     def sentence(self) -> NDArray[np.float16]:
         """Pooled encoding of the whole sentence, (W,)."""
         return self.nodes[0]
 
+    @property
+    def act_vectors(self) -> NDArray[np.float16]:
+        """Pooled encodings of the acts in order, (A, W): that of the whole sentence where there is one."""
+        return self.nodes[:1] if self.act_rows is None else self.act_rows
+
     def to_blob(self) -> bytes:
-        """Safetensors fp16; prompt, rewritten prompt and graph stand in its metadata."""
-        about = {"format": FORMAT, "prompt": self.prompt, "rewritten": self.rewritten, "graph": self.graph.to_json()}
+        """Safetensors fp16; prompt, rewritten prompt, graph and acts stand in its metadata."""
+        about: dict[str, Any] = {
+            "format": FORMAT,
+            "prompt": self.prompt,
+            "rewritten": self.rewritten,
+            "graph": self.graph.to_json(),
+        }
         if self.not_rewritten is not None:
             about["not_rewritten"] = self.not_rewritten
         # one entry: safetensors writes several in random order, and equal features should be equal bytes
+        rows = self.nodes
+        if self.act_rows is not None:
+            about["acts"] = list(self.acts)
+            rows = np.concatenate([self.nodes, self.act_rows])
         metadata = {"features": json.dumps(about, ensure_ascii=False)}
-        return save({"nodes": np.ascontiguousarray(self.nodes, dtype=np.float16)}, metadata=metadata)
+        return save({"nodes": np.ascontiguousarray(rows, dtype=np.float16)}, metadata=metadata)
 
     @classmethod
     def from_blob(cls, blob: bytes) -> TextFeatures:
@@ -56,9 +72,13 @@ class TextFeatures:
             if about["format"] != FORMAT:
                 raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
             graph = SemanticGraph.from_json(about["graph"])
-            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != len(graph.nodes):
-                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {len(graph.nodes)} nodes")
-            return cls(about["prompt"], about["rewritten"], graph, nodes, about.get("not_rewritten"))
+            acts, count = tuple(about.get("acts", ())), len(graph.nodes)
+            if nodes.dtype != np.float16 or nodes.ndim != 2 or len(nodes) != count + len(acts):
+                raise ValueError(f"{nodes.dtype} {nodes.shape} does not fit {count} nodes and {len(acts)} acts")
+            rows = nodes[count:] if acts else None
+            return cls(
+                about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), acts, rows
+            )
         except (SafetensorError, ValueError, KeyError, TypeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
+from shared.text.acts import acts_of
 from shared.text.encoders import Encoding, TextEncoder, load_encoder
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
@@ -131,9 +132,16 @@ class TextPipeline:
         rewritten = self._rewritten(checked)
         graphs = self._graphs([text for text, _ in rewritten])
         return [
-            TextFeatures(prompt, text, graph, self.encode(graph), reason)
+            self._features(prompt, text, graph, reason)
             for prompt, (text, reason), graph in zip(checked, rewritten, graphs, strict=True)
         ]
+
+    def _features(self, prompt: str, text: str, graph: SemanticGraph, reason: str | None) -> TextFeatures:
+        acts = acts_of(graph)
+        if len(acts) == 1:
+            return TextFeatures(prompt, text, graph, self.encode(graph), reason)
+        rows = np.stack(self.pooled(acts)).astype(np.float16)
+        return TextFeatures(prompt, text, graph, self.encode(graph), reason, acts, rows)
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
         """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states

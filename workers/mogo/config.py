@@ -96,8 +96,9 @@ class MOGOConfig(ModelConfig):
     corruption: float = 0.5  # whole frame columns are replaced at a rate drawn from U(0, this), a sample
     first_level: float = 1.0  # weight of level 0 in the loss, to 1 of each other level
     ahead: tuple[int, ...] = ()
-    """Ours: frames by which training also asks level 0 ahead of the next one (Gloeckle et al. 2024, "Better & Faster Large
-    Language Models via Multi-token Prediction"). The past says the next frame; what comes a second later the prompt does."""
+    """Ours: frames by which training also asks level 0 ahead of the next one (Gloeckle et al. 2024, "Better & Faster
+    Large Language Models via Multi-token Prediction"). The past says the next frame; what comes a second later the
+    prompt does."""
     ahead_weight: float = 1.0  # of that loss, to 1 of the loss of eq. 11
     steers: int = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
     tokenizer: TokenizerConfig = TokenizerConfig()

@@ -220,10 +220,10 @@ class _Drawing:
             self.columns[row] = None
 
     def _start(self, request: Request) -> int:
-        sentence = torch.from_numpy(request.text.nodes[0].astype(np.float32)).to(self._device)
+        acts = torch.from_numpy(request.text.act_vectors.astype(np.float32)).to(self._device)
         if request.frames is not None:
-            return self.streams.start(sentence, request.seed)
-        return self.streams.start(sentence, request.seed, ends_from=self._ends_from)
+            return self.streams.start(acts, request.seed, limit=request.frames)
+        return self.streams.start(acts, request.seed, ends_from=self._ends_from, limit=self.limit)
 
     def _stop(self, session: int) -> None:
         self.streams.stop(session)

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
+from shared.errors import InvalidInput
+from shared.motion.features import HeadingLayout
 from shared.nn import distributed
 from workers.mogo.config import MOGOConfig
 from workers.mogo.tokenizer import Tokenizer
@@ -106,6 +108,8 @@ def _joined(
     """Features, seam, clip left, clip entered, and whether that one is whole; `config.steers` of them."""
     rng = np.random.default_rng(0)
     layout = prepared.layout
+    if not isinstance(layout, HeadingLayout):
+        raise InvalidInput(f"motions of layout {layout.name!r} cannot be joined", where="layout")
     for _ in range(config.steers):
         for _ in range(TRIES):
             left, entered = (int(c) for c in rng.choice(clips, 2, p=weights / weights.sum()))

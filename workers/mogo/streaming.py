@@ -67,6 +67,40 @@ class StreamState:
         return {**rows, "memory": self.memory[:, :, index]}
 
 
+PLAN = ("acts", "by")
+
+
+@dataclass
+class _Plan:
+    """The acts that a session has still to come."""
+
+    acts: Tensor  # (A, W)
+    by: list[int]  # frames by which each of them begins at the latest
+    ends_from: int  # of the last one
+
+    @classmethod
+    def of(cls, sentence: Tensor, ends_from: int, limit: int | None) -> _Plan:
+        """Of a sentence (W,) or of acts (A, W); see `Streams.start`."""
+        acts = torch.atleast_2d(sentence)
+        by = [NEVER if limit is None else limit * act // len(acts) for act in range(len(acts))]
+        return cls(acts, by, ends_from)
+
+    def take(self) -> Tensor:
+        """The next act (W,)."""
+        act, self.acts, self.by = self.acts[0], self.acts[1:], self.by[1:]
+        return act
+
+    def save(self) -> dict[str, Tensor]:
+        """As tensors named `PLAN`."""
+        return {"acts": self.acts.clone(), "by": torch.tensor([*self.by, self.ends_from])}
+
+    @classmethod
+    def load(cls, saved: Mapping[str, Tensor]) -> _Plan:
+        """From what `save` gave."""
+        *by, ends_from = saved["by"].tolist()
+        return cls(saved["acts"], by, ends_from)
+
+
 class Streams:
     """Sessions that share the forward passes of one model; they join, leave and are steered between steps."""
 
@@ -97,17 +131,27 @@ class Streams:
         self.state = StreamState.empty(packed, capacity, self.branches, self.window)
         self.capacity = capacity
         self.sessions: list[int] = []  # the session in each row: the active rows come first
+        self._plans: dict[int, _Plan] = {}
         self._started = 0
 
     def start(
-        self, sentence: Tensor, seed: int, *, ends_from: int = NEVER, past: Tensor | None = None, skipped: int = 0
+        self,
+        sentence: Tensor,
+        seed: int,
+        *,
+        ends_from: int = NEVER,
+        limit: int | None = None,
+        past: Tensor | None = None,
+        skipped: int = 0,
     ) -> int:
         """A new session; its first frame comes with the next step.
 
         Args:
-            sentence: (W,) sentence features.
+            sentence: (W,) sentence features, or (A, W) of acts in order: where END is drawn the next one is steered to.
             seed: of its random numbers.
-            ends_from: END may be drawn after so many frames (no length was asked for).
+            ends_from: END of the last act may be drawn after so many frames (no length was asked for).
+            limit: frames of the session, where that is known: each act gets its share of them at least. None = an act
+                goes on until END is drawn.
             past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
                 What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
             skipped: frames that were made before `past`.
@@ -127,16 +171,16 @@ class Streams:
         mine["seeds"].fill_(seed)
         mine["skipped"].fill_(skipped + before - len(past))
         mine["made"].fill_(skipped + before)
-        mine["ends_from"].fill_(ends_from)
-        mine["ended"].fill_(False)
         mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
-        self._read(row, sentence, past)
+        plan = self._plans[self.sessions[row]] = _Plan.of(sentence, ends_from, limit)
+        self._begin(row, plan, past)
         return self.sessions[row]
 
     def steer(self, session: int, sentence: Tensor) -> None:
-        """Another prompt (W,) from the next frame on: position 0 alone is computed anew, on each level; what the frames
-        so far were told stays."""
-        self._read(self._row(session), sentence, self.state.last.new_zeros(0, self.model.levels))
+        """Another prompt, (W,) or (A, W) as in `start`, from the next frame on: position 0 alone is computed anew, on
+        each level; what the frames so far were told stays."""
+        plan = self._plans[session] = _Plan.of(sentence, NEVER, None)
+        self._begin(self._row(session), plan)
 
     def stop(self, session: int) -> None:
         """Forget a session; its row goes to the last one."""
@@ -147,12 +191,20 @@ class Streams:
                 target.copy_(source[name])
         self.sessions[row] = self.sessions[last]
         self.sessions.pop()
+        del self._plans[session]
 
     def step(self) -> dict[int, Tensor]:
         """Draw one frame of every session: its column (V,) of tokens, -1 in a session that has ended."""
         if not self.sessions:
             return {}
+        for row, plan in self._unfinished():
+            if int(self.state.made[row]) >= plan.by[0]:
+                self._begin(row, plan)
         column = self._draw(self.states())
+        while due := [(row, plan) for row, plan in self._unfinished() if self.state.ended[row]]:
+            for row, plan in due:  # the first frame of the next act comes in place of END; others draw what they drew
+                self._begin(row, plan)
+            column = self._draw(self.states())
         self.accept(column)
         return dict(zip(self.sessions, column.unbind(), strict=True))
 
@@ -175,7 +227,8 @@ class Streams:
 
     def save(self, session: int) -> dict[str, Tensor]:
         """All of a session as plain tensors; `resume` goes on with the very tokens that it would have drawn."""
-        return {name: part.clone() for name, part in self.state.row(self._row(session)).items()}
+        tensors = {name: part.clone() for name, part in self.state.row(self._row(session)).items()}
+        return {**tensors, **self._plans[session].save()}
 
     def resume(self, saved: Mapping[str, Tensor]) -> int:
         """A session from what `save` gave.
@@ -185,12 +238,28 @@ class Streams:
         """
         row = self._take_row()
         mine = self.state.row(row)
-        if {n: t.shape for n, t in saved.items()} != {n: t.shape for n, t in mine.items()}:
+        tensors = {name: part for name, part in saved.items() if name not in PLAN}
+        if {n: t.shape for n, t in tensors.items()} != {n: t.shape for n, t in mine.items()}:
             self.sessions.pop()
             raise InvalidInput("the saved session is of another model, window or guidance")
         for name, part in mine.items():
             part.copy_(saved[name])
+        self._plans[self.sessions[row]] = _Plan.load(saved)
         return self.sessions[row]
+
+    def _unfinished(self) -> list[tuple[int, _Plan]]:
+        """Rows that have acts to come."""
+        plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions))
+        return [(row, plan) for row, plan in plans if len(plan.acts)]
+
+    def _begin(self, row: int, plan: _Plan, past: Tensor | None = None) -> None:
+        """Tell a row the next act of its plan."""
+        self._read(row, plan.take(), self.state.last.new_zeros(0, self.model.levels) if past is None else past)
+        made = int(self.state.made[row])
+        shortest = made + self.model.config.min_frames if made or plan.acts.size(0) else 0
+        ends_from = max(shortest, 0 if len(plan.acts) else plan.ends_from)
+        self.state.ends_from[row] = ends_from
+        self.state.ended[row] = False
 
     @torch.no_grad()
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:

@@ -268,3 +268,54 @@ def test_what_cannot_be_is_refused() -> None:
         other.resume(saved)
     assert other.step() == {}
     assert streams.step() == {}
+
+
+def steered(model: RQHCTransformer, at: int, frames: int) -> torch.Tensor:
+    """The columns (frames, V) of a session that somebody steers from prompt 1 to prompt 2."""
+    streams = opened(model, 1)
+    session = streams.start(said(1), 9)
+    before = run(streams, at)[session]
+    streams.steer(session, said(2))
+    return torch.cat([before, run(streams, frames - at)[session]])
+
+
+def test_the_next_act_begins_where_the_model_says_that_one_is_over() -> None:
+    model, least = transformer(), TINY.min_frames
+    model.head.bias.data[-1] = 100.0  # END is all but certain
+    streams = opened(model, 2)
+    beside = streams.start(said(3), 4)
+    session = streams.start(torch.stack([said(1), said(2)]), 9, ends_from=0)
+    found = run(streams, 2 * least + 2)
+    assert torch.equal(found[session][: 2 * least], steered(model, least, 2 * least))
+    assert (found[session][2 * least :] == -1).all()  # and behind the last one the clip ends
+    streams = opened(model, 1)
+    lonely = streams.start(said(3), 4)
+    assert torch.equal(found[beside], run(streams, 2 * least + 2)[lonely])
+
+
+def test_where_the_length_is_known_each_act_gets_its_share() -> None:
+    model = transformer()
+    model.head.bias.data[-1] = -100.0  # END never comes
+    streams = opened(model, 1)
+    session = streams.start(torch.stack([said(1), said(2)]), 9, limit=20)
+    assert torch.equal(run(streams, 20)[session], steered(model, 10, 20))
+
+
+def test_a_saved_session_still_has_its_acts_to_come_and_a_steer_drops_them() -> None:
+    model = transformer()
+    model.head.bias.data[-1] = -100.0
+    streams = opened(model, 1)
+    session = streams.start(torch.stack([said(1), said(2)]), 9, limit=20)
+    run(streams, 4)
+    saved = streams.save(session)
+    streams.stop(session)
+    again = streams.resume(saved)
+    assert torch.equal(run(streams, 16)[again], steered(model, 10, 20)[4:])
+    streams.stop(again)
+    dropped = streams.resume(saved)
+    streams.steer(dropped, said(1))
+    other = opened(model, 1)
+    plain = other.start(said(1), 9)
+    run(other, 4)
+    other.steer(plain, said(1))
+    assert torch.equal(run(streams, 16)[dropped], run(other, 16)[plain])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -26,6 +28,19 @@ def test_a_blob_gives_back_what_went_in() -> None:
     assert (read.prompt, read.rewritten, read.graph) == (made.prompt, made.rewritten, made.graph)
     assert np.array_equal(read.nodes, made.nodes)
     assert np.array_equal(read.sentence, made.nodes[0])
+
+
+def test_acts_come_back_and_one_act_is_the_sentence() -> None:
+    made = features()
+    assert np.array_equal(made.act_vectors, made.nodes[:1])
+    acts = np.random.default_rng(1).normal(size=(2, 384)).astype(np.float16)
+    several = replace(made, acts=("he walks", "he bows"), act_rows=acts)
+    read = TextFeatures.from_blob(several.to_blob())
+    assert read.acts == ("he walks", "he bows")
+    assert np.array_equal(read.act_vectors, acts)
+    assert np.array_equal(read.nodes, made.nodes)
+    with pytest.raises(InvalidFile, match="3 nodes and 2 acts"):
+        TextFeatures.from_blob(replace(several, act_rows=acts[:1]).to_blob())
 
 
 @given(st.integers(0, 2000))

@@ -1,0 +1,221 @@
+"""The acts of a prompt in the order of time: "after bowing, she walks off" to "a person is bowing" and "she walks off".
+
+A model that draws one act at a time (MOGO's steers) is told them one after another. English only, as all captions are:
+what joins acts is a closed set of words, so these are rules over the words and the graph's verbs. What the rules do not
+see stays one act, said by the whole prompt.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from shared.text.graph import SemanticGraph
+
+MOST = 6
+"""Acts of a prompt; what comes behind them stays in the last."""
+NOBODY = "a person"
+
+_LISTS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("acts.toml").read_text("utf-8"))
+_JOINS = [tuple(phrase.split()) for phrase in _LISTS["joins"]]
+_EDGES = [phrase.split() for phrase in _LISTS["edges"]]
+_ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL = (
+    frozenset(_LISTS[name]) for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small")
+)
+_TRAVELS, _TURNS = tuple(_LISTS["travels"]), tuple(_LISTS["turns"])
+_BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
+_STOPS = ",;:."
+
+
+@dataclass(frozen=True)
+class _Words:
+    """A run of the prompt's words, the verbs among them by number."""
+
+    words: tuple[str, ...]
+    verbs: frozenset[int]
+
+    def __len__(self) -> int:
+        return len(self.words)
+
+    def bare(self, index: int) -> str:
+        return self.words[index].strip(".,;:!?\"'()").lower() if 0 <= index < len(self.words) else ""
+
+    def stopped(self, index: int, stops: str = _STOPS) -> bool:
+        """Whether a stop stands behind the word; before the first one there is one."""
+        return index < 0 or self.words[index][-1:] in stops
+
+    def cut(self, start: int, stop: int | None = None) -> _Words:
+        stop = len(self) if stop is None else stop
+        return _Words(self.words[start:stop], frozenset(v - start for v in self.verbs if start <= v < stop))
+
+    def is_verb(self, index: int) -> bool:
+        return index in self.verbs
+
+    @property
+    def bares(self) -> list[str]:
+        return [self.bare(k) for k in range(len(self))]
+
+
+def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
+    """Each act as a sentence of its own, at least one; the prompt itself where there is only one."""
+    verbs = frozenset(word for node in graph.level("action") for word in node.words)
+    clauses = [_trimmed(clause) for part in _by_connective(_Words(graph.words, verbs)) for clause in _by_verb(part)]
+    merged = _merged([clause for clause in clauses if len(clause)])
+    kept = [clause for clause in merged if not _pauses(clause)] or merged
+    if len(kept) < 2:
+        return (graph.text,)
+    sentences = [_sentence(clause) for clause in kept]
+    return (*sentences[: MOST - 1], *filter(None, [" then ".join(sentences[MOST - 1 :])]))
+
+
+def _by_connective(text: _Words) -> Iterator[_Words]:
+    """Clauses that connectives part, in the order of time."""
+    comma = next((k for k in range(1, len(text) - 1) if text.stopped(k, ",")), None)
+    if _fronted(text) and comma is not None and text.verbs & set(range(comma + 1)):
+        said, rest = text.cut(1, comma + 1), list(_by_connective(text.cut(comma + 1)))
+        yield from [*rest, said] if text.bare(0) in _LISTS["fronted_last"] else [said, *rest]
+        return
+    for at in range(1, len(text)):
+        join = next((j for j in _JOINS if _joins(text, at, j)), None)
+        if join is not None:
+            before, after = text.cut(0, at), list(_by_connective(text.cut(at + len(join))))
+            yield from [*after, before] if join == ("after",) else [before, *after]
+            return
+    yield text
+
+
+def _fronted(text: _Words) -> bool:
+    """Whether a clause of its own is said first; "when the music starts" is none."""
+    first = text.bare(0)
+    return first in _LISTS["fronted"] and (first != "when" or text.bare(1) in {"done", "finished"})
+
+
+def _joins(text: _Words, at: int, join: tuple[str, ...]) -> bool:
+    """Whether two clauses are joined there by these words."""
+    end = at + len(join)
+    if end >= len(text) or any(text.bare(at + k) != word for k, word in enumerate(join)):
+        return False
+    if join in (("before",), ("after",)):  # not "bows before the king"
+        return text.bare(end).endswith("ing") or (text.bare(end) in _SUBJECTS and text.is_verb(end + 1))
+    if join[0] in _ADVERBS:
+        return text.stopped(at - 1)
+    return not (len(join) == 2 and join[1] == "next" and text.bare(end) == "to")
+
+
+def _by_verb(text: _Words) -> Iterator[_Words]:
+    """Clauses of a list of verbs: "runs, stops and bows"."""
+    start = 0
+    for at in range(1, len(text)):
+        if at > start and _lists(text, at):
+            yield text.cut(start, at)
+            start = at
+    yield text.cut(start)
+
+
+def _lists(text: _Words, at: int) -> bool:
+    """Whether a further verb of a list begins at a word, behind "and" or a comma."""
+    follows = text.bare(at) == "and" or text.stopped(at - 1, ",;")
+    if not follows or not text.verbs & set(range(at)):
+        return False
+    verb = at + (text.bare(at) == "and")
+    if not text.is_verb(verb) or text.stopped(at - 1, "."):
+        return False
+    if _form(text.bare(verb)) != _form(text.bare(min(text.verbs))):
+        return False  # "lets the arm go up and come down", "walks, keeping the trunk upright"
+    return not text.bare(verb).endswith("ing") or text.bare(at) == "and"
+
+
+def _form(verb: str) -> str:
+    """The ending that verbs of one list share: `s`, `ing`, or none."""
+    return "ing" if verb.endswith("ing") else "s" if verb.endswith("s") else ""
+
+
+def _trimmed(clause: _Words) -> _Words:
+    """Without the words at its edges that say when it comes."""
+    changed = True
+    while changed and len(clause):
+        changed = False
+        for words in _EDGES:
+            count = len(words)
+            if clause.bares[:count] == words:
+                clause, changed = clause.cut(count), True
+            elif clause.bares[-count:] == words and len(clause) > count:
+                clause, changed = clause.cut(0, len(clause) - count), True
+    return clause
+
+
+def _merged(clauses: list[_Words]) -> list[_Words]:
+    """What is no act of its own goes to the clause before it; another side of the same act is said in full."""
+    found: list[_Words] = []
+    for clause in clauses:
+        if not found:
+            found.append(clause)
+        elif found[-1].verbs and {found[-1].bare(v) for v in found[-1].verbs} <= _STILL and not _pauses(found[-1]):
+            found[-1] = _joined(found[-1], clause)  # "stands with the feet together": how, not what
+        elif _refers(clause) or _turns(found[-1], clause):
+            found[-1] = _joined(found[-1], clause)
+        elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in _SUBJECTS | _SIDES):
+            found.append(clause)
+        elif (other := _other_side(found[-1], clause)) is not None:
+            found.append(other)
+        elif found[-1].verbs:
+            found[-1] = _joined(found[-1], clause)  # "walks forward, then left"
+        else:
+            found.append(clause)  # "straight steps and then a left turn"
+    return found
+
+
+def _refers(clause: _Words) -> bool:
+    """ "lowers it again", "comes up": part of what was said before."""
+    verbs = {clause.bare(v) for v in clause.verbs}
+    small = set(clause.bares) - verbs
+    return bool(verbs) and (
+        (bool(small & _REFERRING) and small <= _SMALL)
+        or any(clause.bare(v + 1) in {"it", "them"} for v in clause.verbs)
+    )
+
+
+def _turns(before: _Words, clause: _Words) -> bool:
+    """ "walks" and "turns left", or "turns left" and "walks on": who turns walks."""
+    bares = clause.bares
+    travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in before.verbs)
+    if not travels or not clause.verbs or {"hand", "hands", "arm", "arms"} & {*bares, *before.bares}:
+        return False
+    sided = bool({"left", "right"} & set(bares))
+    if any(clause.bare(v).startswith(_TURNS) for v in clause.verbs) and sided:
+        return not {"left", "right"} & set(before.bares)
+    return bares[-1] == "on" and len(bares) == 2 and bares[0].startswith(_TRAVELS)
+
+
+def _other_side(clause: _Words, side: _Words) -> _Words | None:
+    """ "raises the left hand" and "the right one" to "raises the right hand"."""
+    before, after = (_SIDES & set(part.bares) for part in (clause, side))
+    if len(before) != 1 or len(after) != 1 or before == after:
+        return None
+    (old,), (new,) = before, after
+    words = tuple(
+        word.lower().replace(old, new) if bare == old else word
+        for word, bare in zip(clause.words, clause.bares, strict=True)
+    )
+    return replace(clause, words=words)
+
+
+def _joined(first: _Words, second: _Words) -> _Words:
+    words = (*first.words, "then", *second.words)
+    return _Words(words, first.verbs | {v + len(first) + 1 for v in second.verbs})
+
+
+def _pauses(clause: _Words) -> bool:
+    """ "stops", "stands still": what comes next says it too."""
+    return bool(clause.verbs) and set(clause.bares[min(clause.verbs) :]) <= _PAUSES
+
+
+def _sentence(clause: _Words) -> str:
+    """With somebody who does it."""
+    said = _BY.sub("", " ".join(clause.words)).strip(" ,;:.")
+    if clause.bare(0) in _SUBJECTS:
+        return said
+    return f"{NOBODY} {'is ' if clause.bare(0).endswith('ing') else ''}{said[:1].lower()}{said[1:]}"

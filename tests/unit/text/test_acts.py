@@ -1,0 +1,102 @@
+"""The acts of a prompt, in the order of time; verbs are marked by stars."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shared.text.acts import MOST, acts_of
+from shared.text.graph import SemanticGraph, build_graph
+from shared.text.roles import Frame
+
+
+def graph(marked: str) -> SemanticGraph:
+    words = marked.split()
+    frames = [Frame(k) for k, word in enumerate(words) if "*" in word]
+    return build_graph(marked.replace("*", ""), frames, max_actions=8, max_specifics=16)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "acts"),
+    [
+        ("a man *walks* and then *bows*", ["a man walks", "a person bows"]),
+        ("He *walks* ahead. Then he *waves* his left arm.", ["He walks ahead", "he waves his left arm"]),
+        ("someone *jogs* along, *stops* and *bows*", ["someone jogs along", "a person bows"]),
+        ("she *waves* first and after that *strolls* off", ["she waves", "a person strolls off"]),
+        ("first *bow*, then *wave*, and finally *run*", ["a person bow", "a person wave", "a person run"]),
+        ("After *bowing* to the crowd, she *walks* off.", ["a person is bowing to the crowd", "she walks off"]),
+        ("Before *walking* off, she *bows*.", ["she bows", "a person is walking off"]),
+        ("a girl *bows* before *starting* to *walk*", ["a girl bows", "a person is starting to walk"]),
+        ("he *bows* after *waving*", ["a person is waving", "he bows"]),
+        ("a boy *ends* by *bowing*, followed by *waving*", ["a boy bowing", "a person is waving"]),
+        ("*walking* and *bowing*", ["a person is walking", "a person is bowing"]),
+        ("he *lifts* the left arm, and next the right one", ["he lifts the left arm", "he lifts the right arm"]),
+        ("a dancer *bows* and next *waves*", ["a dancer bows", "a person waves"]),
+    ],
+)  # fmt: skip
+def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -> None:
+    assert list(acts_of(graph(prompt))) == acts
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        "a person *walks* forward",
+        "a person *bows* before the king",
+        "a man *takes* the next left on foot",
+        "a man *walks* next to a wall",
+        "a woman *walks*, *keeping* the trunk upright",
+        "a woman *raises* the hand and then *lowers* it again",
+        "someone *lets* both hands *go* up and *come* down",
+        "a person *bends* forward and *comes* back up",
+        "he *walks* forward and *turns* to the left",
+        "he *walks*, then *turns* left and *walks* on",
+        "he *walks* forward, then left",
+        "a woman *stands* with the feet together and *waves*",
+        "when the music *starts*, he *dances*",
+        "she *strides* on. Every movement is hesitant. The trunk stays upright.",
+        "dance",
+    ],
+)
+def test_what_is_one_act_is_said_by_the_whole_prompt(prompt: str) -> None:
+    assert acts_of(graph(prompt)) == (prompt.replace("*", ""),)
+
+
+def test_too_many_acts_are_said_together_in_the_last() -> None:
+    prompt = " then ".join(["he *bows*"] * (MOST + 2))
+    acts = acts_of(graph(prompt))
+    assert len(acts) == MOST
+    assert acts[-1] == "he bows then he bows then he bows"
+
+
+def test_a_prompt_of_joins_alone_is_one_act() -> None:
+    for prompt in ("and then", "then then then", "after, before", ". , ;", "first"):
+        assert acts_of(graph(prompt)) == (prompt,)
+
+
+WORDS = [
+    "and",
+    "then",
+    "after",
+    "that",
+    "before",
+    "first",
+    "next",
+    "afterwards,",
+    "he",
+    "the",
+    "left",
+    "right",
+    "hand,",
+    "it",
+    "up",
+]
+VERBS = ["*walks*", "*walking*", "*bow*,", "*stops*", "*turns*", "*raises*.", "*stands*", "*lowers*"]
+
+
+@given(st.lists(st.sampled_from(WORDS + VERBS), min_size=1, max_size=24))
+def test_any_order_of_words_has_acts_and_every_act_says_something(words: list[str]) -> None:
+    found = acts_of(graph(" ".join(words)))
+    assert 1 <= len(found) <= MOST
+    assert all(act.strip() for act in found)
