@@ -112,6 +112,40 @@ class Busy(Refused):
         self.seconds = seconds
 
 
+class QuotaUsedUp(Busy):
+    """A tenant's quota has no room for what was asked; nothing was written.
+
+    Args:
+        quota: its name: `queued`, `bytes`.
+        limit, used, asked: items or bytes.
+    """
+
+    problem_type = "quota"
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        where: str | None = None,
+        hint: str | None = None,
+        seconds: int,
+        quota: str,
+        limit: int,
+        used: int,
+        asked: int,
+    ) -> None:
+        super().__init__(message, where=where, hint=hint, seconds=seconds)
+        self.quota = quota
+        self.limit = limit
+        self.used = used
+        self.asked = asked
+
+    @property
+    def left(self) -> int:
+        """What there is still room for."""
+        return max(self.limit - self.used, 0)
+
+
 class ItemsFailed(MareyError):
     """The work ended, but some items failed, died or were cancelled."""
 

@@ -45,6 +45,7 @@ class Plan:
             name=f"evaluation {row.label}",
             comment=f"motions of evaluation {row.id}",
             priority=BACKGROUND,
+            count=len(self.prompts) * self.request.repeats,
         )
 
     def _items(self) -> Iterator[Item]:
@@ -112,6 +113,7 @@ def scoring_job(row: EvaluationRow) -> NewJob:
         name=f"evaluation {row.label}",
         comment=f"score of evaluation {row.id}",
         priority=BACKGROUND,
+        metered=False,
     )
 
 

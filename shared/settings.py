@@ -11,8 +11,11 @@ from pathlib import Path
 from typing import Literal
 
 from platformdirs import user_data_path
-from pydantic import Field, SecretStr, model_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from shared.errors import InvalidInput
+from shared.rates import check_rates
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -51,6 +54,9 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"
     port: int = 8400
     allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
+    rates: dict[str, str] = {}
+    """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
+    is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
 
     require_licence: Literal["any", "commercial"] = "any"
     """`commercial` refuses bundles whose weights carry non-commercial terms."""
@@ -98,6 +104,9 @@ class Settings(BaseSettings):
     stream_idle_seconds: float = 60.0
     """A live stream that nobody watches ends after this long."""
 
+    audit_days: float = Field(default=400.0, gt=0)
+    """The audit log is kept this long."""
+
     log_level: str = "INFO"
     log_json: bool = False
 
@@ -111,6 +120,14 @@ class Settings(BaseSettings):
         """Where clients on this machine reach the API."""
         name = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)  # noqa: S104
         return f"http://[{name}]:{self.port}" if ":" in name else f"http://{name}:{self.port}"
+
+    @field_validator("rates")
+    @classmethod
+    def _known_rates(cls, values: dict[str, str]) -> dict[str, str]:
+        try:
+            return check_rates(values, where="MAREY_RATES")
+        except InvalidInput as error:
+            raise ValueError(str(error)) from error
 
     @model_validator(mode="before")
     @classmethod

@@ -27,6 +27,7 @@ from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.rates import Rates
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
@@ -100,7 +101,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     tailer = Tailer(engine, url)
     redis_url = config.streams_url or config.queue_url
     hub = None if redis_url is None else Hub(redis_url.get_secret_value())
-    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer, hub)
+    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), hub)
     tailer.start()
     try:
         yield

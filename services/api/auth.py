@@ -12,6 +12,8 @@ from services.api.context import Context, Shared
 from shared.errors import Refused, Unauthenticated
 from shared.jobs import ApiKey, authenticate, transaction
 
+METRICS = "metrics"
+"""The scope to see all tenants' queues; no other holds it."""
 bearer = HTTPBearer(auto_error=False, description="An API key: `marey admin keys create`.")
 
 
@@ -32,21 +34,35 @@ def authenticated(shared: Context, secret: str | None) -> ApiKey:
         return authenticate(conn, secret)
 
 
+def admit(shared: Context, key: ApiKey, scope: str, kind: str | None = None) -> None:
+    """Nothing, if the key has the scope and has not asked too often.
+
+    Args:
+        kind: class of the request (`shared.rates`), where it is not called as its scope.
+
+    Raises:
+        Refused: it lacks the scope.
+        Busy: it has asked too often.
+    """
+    check_scope(key, scope)
+    shared.rates.take(key, kind or scope)
+
+
 def check_scope(key: ApiKey, scope: str) -> None:
-    """Nothing, if the key has the scope (`admin` has all).
+    """Nothing, if the key has the scope. `admin` holds all that concern its own tenant.
 
     Raises:
         Refused: it has not.
     """
-    if scope not in key.scopes and "admin" not in key.scopes:
+    if scope not in key.scopes and ("admin" not in key.scopes or scope == METRICS):
         raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
 
 
-def requires(scope: str) -> Callable[[ApiKey], ApiKey]:
-    """A dependency: the caller's key, if it has the scope; raises as `check_scope`."""
+def requires(scope: str, kind: str | None = None) -> Callable[[Context, ApiKey], ApiKey]:
+    """A dependency: the caller's key, if `admit` lets it pass."""
 
-    def check(key: Annotated[ApiKey, Depends(caller)]) -> ApiKey:
-        check_scope(key, scope)
+    def check(shared: Shared, key: Annotated[ApiKey, Depends(caller)]) -> ApiKey:
+        admit(shared, key, scope, kind)
         return key
 
     return check
@@ -55,3 +71,5 @@ def requires(scope: str) -> Callable[[ApiKey], ApiKey]:
 Reader = Annotated[ApiKey, Depends(requires("read"))]
 Submitter = Annotated[ApiKey, Depends(requires("submit"))]
 Operator = Annotated[ApiKey, Depends(requires("operate"))]
+Parser = Annotated[ApiKey, Depends(requires("read", "parse"))]
+Watcher = Annotated[ApiKey, Depends(requires(METRICS))]

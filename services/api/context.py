@@ -1,4 +1,4 @@
-"""What the routes share: one engine, one store, one bundle catalogue, one tailer and one way to Redis a process."""
+"""What the routes share: of each of these one a process."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from services.api.catalogue import Catalogue
+from services.api.rates import Rates
 from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
 from shared.jobs import transaction
@@ -27,6 +28,7 @@ class Context:
     store: AssetStore
     catalogue: Catalogue
     tailer: Tailer
+    rates: Rates
     streams: Hub | None = None
     """None where no Redis is named."""
     seen_ready: bool = False

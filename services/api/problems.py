@@ -12,7 +12,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from shared.errors import Busy, InvalidInput, MareyError, NotFound, Unauthenticated, Unreachable
+from shared.errors import Busy, InvalidInput, MareyError, NotFound, QuotaUsedUp, Unauthenticated, Unreachable
 from shared.items import InvalidItems
 
 TYPE_PREFIX = "urn:marey:problem:"
@@ -31,6 +31,16 @@ class FieldProblem(BaseModel):
     message: str
 
 
+class QuotaBody(BaseModel):
+    """A quota that had no room; items or bytes."""
+
+    name: str
+    limit: int
+    used: int
+    left: int
+    asked: int
+
+
 class ProblemBody(BaseModel):
     """RFC 9457."""
 
@@ -42,6 +52,7 @@ class ProblemBody(BaseModel):
     hint: str | None = Field(default=None, description="What to do about it.")
     problems: list[FieldProblem] | None = Field(default=None, description="The first 1,000 of them.")
     total: int | None = Field(default=None, description="How many there are in all.")
+    quota: QuotaBody | None = Field(default=None, description="Of `quota`: which one, and what is left.")
 
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -66,6 +77,8 @@ def problem_body(error: MareyError) -> ProblemBody:
         body.problems = [
             FieldProblem(line=p.line, field=_clean(p.field), message=_clean(p.message) or "") for p in error.problems
         ]
+    if isinstance(error, QuotaUsedUp):
+        body.quota = QuotaBody(name=error.quota, limit=error.limit, used=error.used, left=error.left, asked=error.asked)
     return body
 
 

@@ -21,6 +21,7 @@ from shared.errors import (
     InvalidInput,
     MareyError,
     NotFound,
+    QuotaUsedUp,
     Refused,
     TimedOut,
     TooLarge,
@@ -36,6 +37,7 @@ SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
 RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
+QUOTA = QuotaUsedUp.problem_type
 
 _ERRORS: dict[str, type[MareyError]] = {
     kind.problem_type: kind
@@ -157,7 +159,7 @@ class Client:
             else:
                 if response.status_code < 400:
                     return response
-                if response.status_code not in RETRIED or attempt == ATTEMPTS or not repeatable:
+                if response.status_code not in RETRIED or attempt == ATTEMPTS or not repeatable or _is_quota(response):
                     raise error_of(response)
                 wait = max(pause, _retry_after(response))
             time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
@@ -176,10 +178,15 @@ def error_of(response: httpx2.Response) -> MareyError:
     if kind == InvalidItems.problem_type:
         problems = [Problem(p.get("line"), p.get("field"), p["message"]) for p in problem.get("problems", [])]
         return InvalidItems(problems, total=problem.get("total"))
-    if kind == Busy.problem_type:
+    if kind in (Busy.problem_type, QUOTA):
         return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
     return found(message, where=where, hint=hint)
+
+
+def _is_quota(response: httpx2.Response) -> bool:
+    """A quota frees up in minutes or by somebody's hand, unlike a rate: who waits is told so at once."""
+    return response.status_code == Busy.status and f"{TYPE_PREFIX}{QUOTA}" in response.text
 
 
 def _foreign(response: httpx2.Response) -> MareyError:

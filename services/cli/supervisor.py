@@ -28,7 +28,7 @@ from shared.storage import open_store
 from shared.webhooks.vault import key_file
 
 KEY_NAME = "serve"
-KEY_SCOPES = ("admin", "operate", "read", "submit")
+KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")
 TICK = 0.2
 LOG_LIMIT = 10 * 2**20
 

@@ -8,7 +8,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import MareyError, Unreachable
+from shared.errors import MareyError, QuotaUsedUp, Unreachable
 from shared.evaluating import plan_evaluation, scoring_job
 from shared.items import InvalidItems
 from shared.jobs import (
@@ -90,7 +90,8 @@ class Evaluations:
                 _after_scoring(conn, row)
 
     def _begin(self, conn: sa.Connection, row: EvaluationRow) -> None:
-        """planned → generating; or failed, when what it asks for is not there any more."""
+        """planned → generating; or failed, when what it asks for is not there any more, or is more than its tenant may
+        ever have. It waits for room in a quota."""
         try:
             with conn.begin_nested():  # a submit that is refused half way leaves nothing
                 prompts = None if row.prompts is None else load_prompts(conn, row.tenant, row.prompts)
@@ -101,6 +102,8 @@ class Evaluations:
         except MareyError as error:
             if isinstance(error, Unreachable):
                 raise
+            if isinstance(error, QuotaUsedUp) and error.asked <= error.limit:
+                return  # it fits once other jobs of the tenant are done
             _end(conn, row, EvaluationState.FAILED, f"it cannot begin: {_told(error)}")
             return
         move_evaluation(

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import threading
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.auth import requires
+from services.api.auth import Parser
 from services.api.problems import RESPONSES
 from shared.bundles import TextSpec, choose_bundle
 from shared.errors import InvalidInput, Unreachable
 from shared.items import MODEL
-from shared.jobs import ApiKey
 from shared.text.keys import as_served
 from shared.text.prompts import check_prompt
 
@@ -74,7 +73,7 @@ class GraphsView(BaseModel):
 
 
 @router.post("/parse")
-def parse_texts(body: ParseBody, key: Annotated[ApiKey, Depends(requires("read"))]) -> GraphsView:
+def parse_texts(body: ParseBody, key: Parser) -> GraphsView:
     """The semantic graph of each prompt."""
     prompts = [check_prompt(prompt, where=f"prompts.{index}") for index, prompt in enumerate(body.prompts)]
     graphs = pipeline_of(body.model).parse(prompts)

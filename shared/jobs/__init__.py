@@ -8,6 +8,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
         job = submit(conn, NewJob(items))
 """
 
+from shared.jobs.audit import audit, list_audit
 from shared.jobs.claim import claim, heartbeat, load_texts, waiting_batches, waiting_items
 from shared.jobs.database import (
     EVENT_CHANNEL,
@@ -63,11 +64,12 @@ from shared.jobs.evaluations import (
     store_prompts,
 )
 from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets
-from shared.jobs.keys import SCOPES, authenticate, create_key, list_keys, revoke_key
+from shared.jobs.keys import SCOPES, authenticate, check_key, create_key, list_keys, revoke_key, rotate_key
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_priority
 from shared.jobs.policy import Policy, policy
+from shared.jobs.quotas import check_room, usage
 from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
 from shared.jobs.reviews import MAX_REVIEWED, reroll, review
 from shared.jobs.schedules import (
@@ -95,6 +97,15 @@ from shared.jobs.streams import (
 )
 from shared.jobs.submit import submit
 from shared.jobs.sweep import sweep
+from shared.jobs.tenant_types import Actor, AuditRow, Quotas, TenantRow, Usage
+from shared.jobs.tenants import (
+    create_tenant,
+    get_tenant,
+    list_tenants,
+    reinstate_tenant,
+    set_quotas,
+    suspend_tenant,
+)
 from shared.jobs.types import (
     DEFAULT_TENANT,
     MAX_KEEP_DAYS,
@@ -163,10 +174,12 @@ __all__ = [
     "SEED_LIMIT",
     "TEST_SPLIT",
     "TEXT_QUEUE",
+    "Actor",
     "ApiKey",
     "AssetDigest",
     "Attempt",
     "AttemptRow",
+    "AuditRow",
     "Claim",
     "ClaimedItem",
     "Committed",
@@ -209,6 +222,7 @@ __all__ = [
     "Page",
     "Policy",
     "Problem",
+    "Quotas",
     "ReportFile",
     "Reroll",
     "Review",
@@ -222,6 +236,8 @@ __all__ = [
     "StreamState",
     "SubmittedJob",
     "SweepReport",
+    "TenantRow",
+    "Usage",
     "WebhookChange",
     "WebhookRow",
     "WorkerBeat",
@@ -229,6 +245,7 @@ __all__ = [
     "abandoned_streams",
     "add_chunk",
     "asset_key",
+    "audit",
     "authenticate",
     "beat",
     "begin_assets",
@@ -238,7 +255,9 @@ __all__ = [
     "change_webhook",
     "check_baseline",
     "check_comparable",
+    "check_key",
     "check_revision",
+    "check_room",
     "claim",
     "claim_deliveries",
     "collect_garbage",
@@ -250,6 +269,7 @@ __all__ = [
     "create_key",
     "create_schedule",
     "create_stream",
+    "create_tenant",
     "create_webhook",
     "delete",
     "delete_schedule",
@@ -268,9 +288,11 @@ __all__ = [
     "get_motion",
     "get_schedule",
     "get_stream",
+    "get_tenant",
     "get_webhook",
     "give_back_deliveries",
     "heartbeat",
+    "list_audit",
     "list_deliveries",
     "list_evaluations",
     "list_items",
@@ -279,6 +301,7 @@ __all__ = [
     "list_motions",
     "list_schedules",
     "list_streams",
+    "list_tenants",
     "list_webhooks",
     "list_workers",
     "live_workers",
@@ -293,6 +316,7 @@ __all__ = [
     "pause",
     "policy",
     "record_attempt",
+    "reinstate_tenant",
     "release",
     "remove_stale_assets",
     "replay_delivery",
@@ -302,17 +326,21 @@ __all__ = [
     "retry",
     "review",
     "revoke_key",
+    "rotate_key",
     "run_schedule",
     "send_test",
     "set_comment",
     "set_priority",
+    "set_quotas",
     "store_prompts",
     "stream_prompts",
     "submit",
+    "suspend_tenant",
     "sweep",
     "take_stream",
     "transaction",
     "upgrade",
+    "usage",
     "waiting_batches",
     "waiting_items",
 ]

@@ -12,31 +12,44 @@ import sqlalchemy as sa
 from shared.jobs import schema
 from shared.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
 from shared.jobs.policy import Policy, policy
+from shared.jobs.quotas import room_to_run
 from shared.jobs.states import ItemState, JobControl, Stage
 from shared.jobs.types import Claim, ClaimedItem, Heartbeat
 
 LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 
+# Items being made, by tenant, and the jobs of those who may have more made.
+SHARE = """
+    share AS (
+        SELECT tenant_id, sum(leased) AS running FROM job WHERE id IN (SELECT job_id FROM lease) GROUP BY tenant_id
+    ), allowed AS (
+        SELECT tenant.id, coalesce(share.running, 0) AS running, tenant.max_running
+        FROM tenant LEFT JOIN share ON share.tenant_id = tenant.id
+        WHERE tenant.suspended_at IS NULL
+          AND (tenant.max_running IS NULL OR coalesce(share.running, 0) < tenant.max_running)
+    )
+"""
+
 # In order: tenant with the smallest share running, priority, age. The first lanes, and the first with the key that the
 # worker has loaded.
-LANES = sa.text("""
-    WITH share AS (
-        SELECT tenant_id, sum(leased) AS running FROM job WHERE id IN (SELECT job_id FROM lease) GROUP BY tenant_id
-    ), ordered AS (
+LANES = sa.text(f"""
+    WITH {SHARE}, ordered AS (
         SELECT lane.job_id, lane.batch_key,
                extract(epoch FROM clock_timestamp() - lane.waiting_since)::float8 AS waited,
+               allowed.running, allowed.max_running IS NOT NULL AS limited,
                row_number() OVER (
-                   ORDER BY coalesce(share.running, 0), job.priority DESC, job.created_at, job.id, lane.waiting_since,
+                   ORDER BY allowed.running, job.priority DESC, job.created_at, job.id, lane.waiting_since,
                             lane.batch_key
                ) AS place
-        FROM lane JOIN job ON job.id = lane.job_id LEFT JOIN share ON share.tenant_id = job.tenant_id
+        FROM lane JOIN job ON job.id = lane.job_id JOIN allowed ON allowed.id = job.tenant_id
         WHERE lane.queue = :queue AND lane.ready + lane.solo > 0 AND job.control = 'run'
     )
-    SELECT job_id, batch_key, waited, place FROM ordered WHERE place <= :tried
+    SELECT job_id, batch_key, waited, running, limited, place FROM ordered WHERE place <= :tried
     UNION
-    (SELECT job_id, batch_key, waited, place FROM ordered WHERE batch_key = :prefer ORDER BY place LIMIT 1)
+    (SELECT job_id, batch_key, waited, running, limited, place FROM ordered WHERE batch_key = :prefer
+     ORDER BY place LIMIT 1)
     ORDER BY place
-""")
+""")  # noqa: S608 - of constants alone
 
 # One statement, for each costs a round trip while the job is locked. Without an item that is free it writes nothing.
 TAKE = sa.text("""
@@ -66,13 +79,14 @@ TAKE = sa.text("""
 
 TEXTS = sa.text("SELECT key, blob FROM text_features WHERE key = ANY(:keys)")
 
-WAITING = sa.text("""
+WAITING = sa.text(f"""
+    WITH {SHARE}
     SELECT lane.queue, sum(ceil(lane.ready::numeric / size.items) + lane.solo)::int AS batches
-    FROM lane JOIN job ON job.id = lane.job_id
+    FROM lane JOIN job ON job.id = lane.job_id JOIN allowed ON allowed.id = job.tenant_id
          JOIN unnest(CAST(:queues AS text[]), CAST(:sizes AS int[])) AS size(queue, items) ON size.queue = lane.queue
     WHERE lane.ready + lane.solo > 0 AND job.control = 'run'
     GROUP BY lane.queue
-""")
+""")  # noqa: S608
 
 
 @dataclass(frozen=True)
@@ -80,6 +94,10 @@ class _Lane:
     job: UUID
     batch_key: str
     waited: float
+    running: int
+    """Items of its tenant that are being made."""
+    limited: bool
+    """Its tenant has a quota of running items."""
 
 
 def claim(
@@ -95,13 +113,14 @@ def claim(
 
     The lane is that of the tenant with the smallest share running, then of the highest priority, then of the oldest
     job. With `prefer_batch_key` (the bundle and settings a worker has loaded) such a lane goes first until the one that
-    is next in order has waited 30 s.
+    is next in order has waited 30 s, or 5 s where that one is of a tenant that has less running. Nothing is taken of
+    tenants that are suspended, or beyond their quota of running items.
     """
     rules = rules or policy()
     found = conn.execute(LANES, {"queue": queue, "tried": LANES_TRIED, "prefer": prefer_batch_key})
-    lanes = [_Lane(row.job_id, row.batch_key, row.waited) for row in found]
+    lanes = [_Lane(row.job_id, row.batch_key, row.waited, row.running, row.limited) for row in found]
     contended: list[_Lane] = []
-    for lane in _preferred_first(lanes, prefer_batch_key, rules.patience):
+    for lane in _preferred_first(lanes, prefer_batch_key, rules):
         taken, locked = _try_lane(conn, lane, queue, worker, limit, rules, skip_locked=True)
         if taken is not None:
             return taken
@@ -168,12 +187,13 @@ def waiting_items(conn: sa.Connection) -> dict[str, int]:
     return {row.queue: int(row.items) for row in conn.execute(query)}
 
 
-def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, patience: float) -> list[_Lane]:
+def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, rules: Policy) -> list[_Lane]:
     """The lanes in the order to try: one that fits what is loaded first, unless the next in order lost its patience."""
     ordered = list(lanes)
-    if prefer is not None and ordered and ordered[0].waited < patience:
-        fitting = next((lane for lane in ordered if lane.batch_key == prefer), None)
-        if fitting is not None:
+    fitting = next((lane for lane in ordered if lane.batch_key == prefer), None)
+    if fitting is not None:
+        patience = rules.patience if fitting.running <= ordered[0].running else rules.tenant_patience
+        if ordered[0].waited < patience:
             ordered.remove(fitting)
             ordered.insert(0, fitting)
     return ordered
@@ -189,7 +209,9 @@ def _try_lane(
     """
     savepoint = conn.begin_nested()
     job = lock_job(conn, lane.job, skip_locked=skip_locked)
-    taken = None if job is None else _take(conn, job, queue, lane.batch_key, worker, limit, rules)
+    if job is not None and lane.limited:
+        limit = room_to_run(conn, job.tenant, limit)
+    taken = None if job is None or limit == 0 else _take(conn, job, queue, lane.batch_key, worker, limit, rules)
     if taken is None:
         savepoint.rollback()
     else:

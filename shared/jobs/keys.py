@@ -6,75 +6,110 @@ import hashlib
 import hmac
 import re
 import secrets
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput, NotFound, Unauthenticated
+from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
+from shared.jobs.tenants import get_tenant
 from shared.jobs.types import DEFAULT_TENANT, ApiKey, NewApiKey
+from shared.rates import check_rates
 
-SCOPES = frozenset({"read", "submit", "operate", "admin"})
+SCOPES = frozenset({"read", "submit", "operate", "admin", "metrics"})
+"""`admin` holds the first three; none of them holds `metrics`, which tells of all tenants."""
 FORM = re.compile(r"marey_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 NOTE_USE_EVERY = 60.0  # seconds; a write per request would be a hot row
+UNUSED = schema.api_key.c.last_used_at.is_(None) | (schema.api_key.c.last_used_at < CLOCK - interval(NOTE_USE_EVERY))
+NEW = "Make one: `marey admin keys create`."
+LONGEST_LIFE = 100 * 365 * 86_400.0
+OVERLAP = 86_400.0
+"""Seconds that a rotated key still works: a day to bring the new one everywhere."""
 
 
-def create_key(conn: sa.Connection, name: str, scopes: Collection[str], *, tenant: str = DEFAULT_TENANT) -> NewApiKey:
+def create_key(
+    conn: sa.Connection,
+    name: str,
+    scopes: Collection[str],
+    *,
+    tenant: str = DEFAULT_TENANT,
+    lifetime: float | None = None,
+    rates: Mapping[str, str] | None = None,
+) -> NewApiKey:
     """Make a key `marey_<prefix>_<secret>`.
 
     A plain SHA-256 is enough for it: the secret has 256 random bits, nothing to guess from a list.
 
+    Args:
+        lifetime: seconds until it expires; None = never.
+        rates: its own rate limits, by class of request (`shared.rates`), before those of the server.
+
     Raises:
-        InvalidInput: an unknown scope, or none.
+        InvalidInput: an unknown scope, or none; a lifetime or rate that cannot be.
         NotFound: no such tenant.
     """
     unknown = set(scopes) - SCOPES
     if unknown or not scopes:
         what = f"unknown scopes: {', '.join(sorted(unknown))}" if unknown else "a key needs a scope"
         raise InvalidInput(what, where="scopes", hint=f"There are {', '.join(sorted(SCOPES))}.")
-    known = conn.execute(sa.select(schema.tenant.c.id).where(schema.tenant.c.id == tenant)).one_or_none()
-    if known is None:
-        raise NotFound("there is no such tenant", where=f"tenant {tenant}")
+    if lifetime is not None and not 0 < lifetime <= LONGEST_LIFE:
+        raise InvalidInput(f"{lifetime:g} seconds are not a lifetime", where="lifetime", hint="Up to 100 years.")
+    checked = check_rates(rates or {}, where="rates")
+    get_tenant(conn, tenant)
     prefix, secret = secrets.token_hex(4), secrets.token_urlsafe(32)
-    values = {
-        "id": new_id(),
-        "tenant_id": tenant,
-        "name": name,
-        "prefix": prefix,
-        "secret_sha256": _digest(secret),
-        "scopes": sorted(scopes),
-    }
-    conn.execute(sa.insert(schema.api_key).values(values))
-    row = conn.execute(_keys().where(schema.api_key.c.id == values["id"])).mappings().one()
-    return NewApiKey(_key(row), f"marey_{prefix}_{secret}")
+    identifier = new_id()
+    conn.execute(
+        sa.insert(schema.api_key).values(
+            id=identifier,
+            tenant_id=tenant,
+            name=name,
+            prefix=prefix,
+            secret_sha256=_digest(secret),
+            scopes=sorted(scopes),
+            expires_at=None if lifetime is None else CLOCK + interval(lifetime),
+            rates=checked,
+        )
+    )
+    return NewApiKey(_one(conn, schema.api_key.c.id == identifier), f"marey_{prefix}_{secret}")
 
 
 def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
-    """The key this secret belongs to; compared in constant time.
+    """The key this secret belongs to; compared in constant time. Its use is noted, at most once a minute.
 
     Raises:
-        Unauthenticated: malformed, unknown or revoked.
+        Unauthenticated: malformed, unknown, revoked or expired.
+        Refused: its tenant is suspended.
     """
     form = FORM.fullmatch(secret)
     if form is None:
         raise Unauthenticated("this is no API key", hint="Keys look like marey_<8>_<43>.")
     table = schema.api_key.c
-    stored = conn.execute(
-        sa.select(table.id, table.secret_sha256).where(table.prefix == form[1], table.revoked_at.is_(None))
-    ).one_or_none()
-    if stored is None or not hmac.compare_digest(stored.secret_sha256, _digest(form[2])):
-        raise Unauthenticated(
-            "this API key is unknown or revoked",
-            where=f"marey_{form[1]}_…",
-            hint="Make one: `marey admin keys create`.",
-        )
-    unused = table.last_used_at.is_(None) | (table.last_used_at < CLOCK - interval(NOTE_USE_EVERY))
-    conn.execute(sa.update(schema.api_key).where(table.id == stored.id, unused).values(last_used_at=CLOCK))
-    return _key(conn.execute(_keys().where(table.id == stored.id)).mappings().one())
+    row = conn.execute(_standing().where(table.prefix == form[1])).mappings().one_or_none()
+    if row is None or not hmac.compare_digest(row["secret_sha256"], _digest(form[2])):
+        raise _unknown(form[1])
+    key = _valid(row)
+    if not row["unused"]:
+        return key
+    note = sa.update(schema.api_key).where(table.id == key.id, UNUSED).values(last_used_at=CLOCK)
+    used = conn.execute(note.returning(table.last_used_at)).scalar_one_or_none()  # none: another request was first
+    return key if used is None else replace(key, last_used=used)
+
+
+def check_key(conn: sa.Connection, key: UUID) -> None:
+    """Nothing, if a key that was let in may stay: for what is open for minutes.
+
+    Raises:
+        Unauthenticated, Refused: as `authenticate`.
+    """
+    row = conn.execute(_standing().where(schema.api_key.c.id == key)).mappings().one_or_none()
+    if row is None:
+        raise Unauthenticated("this API key is gone")
+    _valid(row)
 
 
 def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
@@ -82,6 +117,40 @@ def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
     table = schema.api_key.c
     rows = conn.execute(_keys().where(table.tenant_id == tenant).order_by(table.id.desc()))
     return [_key(row) for row in rows.mappings()]
+
+
+def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = OVERLAP) -> NewApiKey:
+    """A new key in the place of another, with its name, scopes, rates and length of life; the old one works a while.
+
+    Args:
+        overlap: seconds; 0 = the old one is invalid from now on. Never longer than it would have lived.
+
+    Raises:
+        NotFound: the tenant has no such key.
+        Conflict: it is revoked, expired, or was rotated before.
+        InvalidInput: an overlap that cannot be.
+    """
+    if not 0 <= overlap <= LONGEST_LIFE:
+        raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap")
+    table = schema.api_key.c
+    ours = (table.tenant_id == tenant) & (table.id == key)
+    state = sa.select((table.expires_at <= CLOCK).label("expired")).where(ours).with_for_update()
+    expired = conn.execute(state).one_or_none()
+    if expired is None:
+        raise _no_such_key(key)
+    old = _one(conn, ours)
+    for wrong, what in (
+        (old.revoked is not None, "is revoked"),
+        (expired.expired, "has expired"),
+        (old.replaced_by is not None, f"was rotated to {old.replaced_by}"),
+    ):
+        if wrong:
+            raise Conflict(f"this key {what}", where=f"key {key}", hint=NEW)
+    lifetime = None if old.expires is None else (old.expires - old.created).total_seconds()
+    new = create_key(conn, old.name, old.scopes, tenant=tenant, lifetime=lifetime, rates=old.rates)
+    ends = sa.func.least(table.expires_at, CLOCK + interval(overlap))  # least() leaves out what is null
+    conn.execute(sa.update(schema.api_key).where(ours).values(expires_at=ends, replaced_by=new.key.id))
+    return new
 
 
 def revoke_key(conn: sa.Connection, tenant: str, key: UUID) -> ApiKey:
@@ -95,25 +164,81 @@ def revoke_key(conn: sa.Connection, tenant: str, key: UUID) -> ApiKey:
     conn.execute(sa.update(schema.api_key).where(ours, table.revoked_at.is_(None)).values(revoked_at=CLOCK))
     row = conn.execute(_keys().where(ours)).mappings().one_or_none()
     if row is None:
-        raise NotFound("there is no such key", where=f"key {key}", hint="`marey admin keys list` shows them.")
+        raise _no_such_key(key)
     return _key(row)
+
+
+def _valid(row: sa.RowMapping) -> ApiKey:
+    key = _key(row)
+    if key.revoked is not None:
+        raise _unknown(key.prefix)
+    if row["expired"]:
+        raise Unauthenticated(
+            f"this API key expired on {key.expires:%Y-%m-%d %H:%M} UTC", where=_shown(key.prefix), hint=NEW
+        )
+    if row["suspended"]:
+        raise Refused(f"the tenant {key.tenant!r} is suspended", hint="Ask the operator of this server.")
+    return key
+
+
+def _unknown(prefix: str) -> Unauthenticated:
+    return Unauthenticated("this API key is unknown or revoked", where=_shown(prefix), hint=NEW)
+
+
+def _shown(prefix: str) -> str:
+    """What may be shown of a key."""
+    return f"marey_{prefix}_…"
+
+
+def _no_such_key(key: UUID) -> NotFound:
+    return NotFound("there is no such key", where=f"key {key}", hint="`marey admin keys list` shows them.")
 
 
 def _digest(secret: str) -> bytes:
     return hashlib.sha256(secret.encode()).digest()
 
 
+FIELDS = {
+    "id": "id",
+    "tenant_id": "tenant",
+    "name": "name",
+    "prefix": "prefix",
+    "scopes": "scopes",
+    "created_at": "created",
+    "last_used_at": "last_used",
+    "expires_at": "expires",
+    "revoked_at": "revoked",
+    "replaced_by": "replaced_by",
+    "rates": "rates",
+}
+"""Columns, and what they are called in `ApiKey`."""
+
+
 def _keys() -> sa.Select[*tuple[Any, ...]]:
     table = schema.api_key.c
-    return sa.select(
-        *(table.id, table.tenant_id.label("tenant"), table.name, table.prefix, table.scopes),
-        table.created_at.label("created"),
-        table.last_used_at.label("last_used"),
-        table.revoked_at.label("revoked"),
+    return sa.select(*(table[column].label(name) for column, name in FIELDS.items()))
+
+
+def _standing() -> sa.Select[*tuple[Any, ...]]:
+    """Keys with what says whether they are valid."""
+    table, tenant = schema.api_key.c, schema.tenant.c
+    return (
+        _keys()
+        .add_columns(
+            table.secret_sha256,
+            UNUSED.label("unused"),
+            (table.expires_at <= CLOCK).label("expired"),
+            tenant.suspended_at.is_not(None).label("suspended"),
+        )
+        .join(schema.tenant, tenant.id == table.tenant_id)
     )
 
 
+def _one(conn: sa.Connection, which: sa.ColumnElement[bool]) -> ApiKey:
+    return _key(conn.execute(_keys().where(which)).mappings().one())
+
+
 def _key(row: sa.RowMapping) -> ApiKey:
-    values: dict[str, Any] = dict(row)
+    values: dict[str, Any] = {name: row[name] for name in FIELDS.values()}
     values["scopes"] = tuple(row["scopes"])
     return ApiKey(**values)

@@ -11,6 +11,7 @@ from shared.jobs import schema
 from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
 from shared.jobs.listings import get_job
+from shared.jobs.quotas import check_room
 from shared.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
 from shared.jobs.types import PRIORITY_LIMIT, JobRow
 
@@ -66,6 +67,7 @@ def retry(
     Raises:
         NotFound: the tenant has no such job.
         Conflict: no item can be retried, or the prompts were erased.
+        QuotaUsedUp: the tenant's quotas have no room for them.
     """
     locked = lock_job_of(conn, tenant, job)
     refuse_erased(locked, "retried")
@@ -77,6 +79,7 @@ def retry(
             where=f"job {job}",
             hint=f"Items that are {', '.join(sorted(wanted))} can.",
         )
+    check_room(conn, tenant, sum(moved.values()), lock=True)
     table = schema.item
     rows = conn.execute(
         sa.update(table)

@@ -18,6 +18,8 @@ class Policy:
     max_attempts: int = 3
     patience: float = 30.0
     """A worker keeps to its loaded bundle until the lane that is next in order has waited this long."""
+    tenant_patience: float = 5.0
+    """The same where that lane is of a tenant that has less running: a load of a bundle is no reason to wait longer."""
     backoff: float = 5.0
     """Delay after the first retryable error; doubles each attempt, up to `backoff_limit`."""
     backoff_limit: float = 300.0
@@ -27,6 +29,7 @@ class Policy:
     idempotency: float = 86_400.0
     asset_grace: float = 3_600.0
     """Assets still `writing` are stale this long after their lease went."""
+    audit_kept: float = 400 * 86_400.0
 
 
 @lru_cache(maxsize=1)
@@ -38,4 +41,5 @@ def policy() -> Policy:
         stall=chosen.stall_seconds,
         max_attempts=chosen.max_attempts,
         worker_live=max(4 * chosen.heartbeat_seconds, chosen.lease_seconds),
+        audit_kept=chosen.audit_days * 86_400.0,
     )

@@ -173,7 +173,8 @@ def _is_due() -> sa.ColumnElement[bool]:
     """While one of its evaluations runs, a schedule waits: runs that take longer than their interval do not pile up."""
     table, evaluation = schema.schedule.c, schema.evaluation.c
     runs = sa.exists().where(evaluation.schedule_id == table.id, evaluation.finished_at.is_(None))
-    return ~table.paused & (table.next_at <= CLOCK) & ~runs
+    idle = sa.exists().where(schema.tenant.c.id == table.tenant_id, schema.tenant.c.suspended_at.is_not(None))
+    return ~table.paused & (table.next_at <= CLOCK) & ~runs & ~idle
 
 
 def _evaluation(row: ScheduleRow, due: datetime | None, reason: str) -> NewEvaluation:

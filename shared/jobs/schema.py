@@ -1,13 +1,12 @@
 """The tables. `migrations/` makes them; a test compares the two. Those of webhooks stand in `webhook_schema.py`.
 
-Rooms left, without tables yet: quotas and rates (columns of `tenant`).
-
 The rows of `job` and `lane` change with every claim and commit. No index names what changes in them, and their pages
 are half empty, so that Postgres cleans up behind each update by itself (heap-only tuples) and a claim costs the same
 after thousands of others. Lanes of jobs that have ended are deleted.
 
 Lock order, so that nothing deadlocks: schedule row, evaluation row, job row, lease row, item rows, lane rows, asset
-rows. Who holds a job's lock may change everything about that job; the heartbeat takes a lease row alone.
+rows, tenant row. Who holds a job's lock may change everything about that job; the heartbeat takes a lease row alone.
+Under the tenant's lock claims and submits count what there is of a quota, one after the other.
 """
 
 from __future__ import annotations
@@ -52,6 +51,14 @@ tenant = sa.Table(
     metadata,
     sa.Column("id", sa.Text, primary_key=True),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
+    sa.Column("suspended_at", Time),  # set = no request is answered, nothing is claimed
+    # Quotas; null = none. What is used of them is counted where it stands: a counter of its own could drift.
+    sa.Column("max_queued", sa.Integer),
+    sa.Column("max_running", sa.Integer),
+    sa.Column("max_bytes", sa.BigInteger),
+    sa.Column("max_streams", sa.Integer),  # open ones of one key; null = MAREY_STREAMS_PER_KEY
+    sa.CheckConstraint("id ~ '^[a-z0-9][a-z0-9_-]{0,62}$'", name="id"),  # it stands in the keys of the asset store
+    sa.CheckConstraint("least(max_queued, max_running, max_bytes, max_streams) >= 0", name="quotas"),
 )
 
 api_key = sa.Table(
@@ -64,8 +71,12 @@ api_key = sa.Table(
     sa.Column("secret_sha256", BYTEA, nullable=False),
     sa.Column("scopes", ARRAY(sa.Text), nullable=False),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
-    sa.Column("last_used_at", Time),
+    sa.Column("last_used_at", Time),  # within a minute
+    sa.Column("expires_at", Time),
     sa.Column("revoked_at", Time),
+    sa.Column("replaced_by", Id, sa.ForeignKey("api_key.id")),  # it was rotated
+    sa.Column("rates", JSONB, nullable=False, server_default=sa.text("'{}'")),  # {"submit": "60/minute"}: its own
+    sa.Index("ix_api_key_tenant_id_id", "tenant_id", "id"),
 )
 
 job = sa.Table(
@@ -103,6 +114,8 @@ job = sa.Table(
     sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
     sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),
     sa.Index("ix_job_keep_days", "id", postgresql_where=sa.text("keep_days IS NOT NULL")),
+    # For counting what a tenant has in the queue. Its predicate changes once in a job's life.
+    sa.Index("ix_job_open", "tenant_id", postgresql_where=sa.text("finished_at IS NULL")),
     postgresql_with={"fillfactor": 50},
 )
 
@@ -243,6 +256,7 @@ asset = sa.Table(
     sa.CheckConstraint("state IN ('writing', 'stored')", name="state"),
     sa.CheckConstraint("sha256 ~ '^[0-9a-f]{64}$'", name="sha256"),
     sa.Index("ix_asset_writing", "announced_at", postgresql_where=sa.text("state = 'writing'")),
+    sa.Index("ix_asset_stored", "tenant_id", postgresql_include=["size"], postgresql_where=sa.text("state = 'stored'")),
 )
 
 # Who is writing what: two leases may produce the same content at once, and each keeps it from the collector.
@@ -454,4 +468,20 @@ evaluation_report = sa.Table(
     sa.Column("asset_id", Id, sa.ForeignKey("asset.id"), nullable=False),
     sa.CheckConstraint("format IN ('html', 'json', 'md')", name="format"),
     sa.Index("ix_evaluation_report_asset_id", "asset_id"),
+)
+
+# Who did what, when. Refers to nothing: it outlives what it is about.
+audit_event = sa.Table(
+    "audit_event",
+    metadata,
+    sa.Column("id", Id, primary_key=True),
+    sa.Column("at", Time, nullable=False),
+    sa.Column("tenant_id", sa.Text, nullable=False),
+    sa.Column("key_id", Id),  # null = somebody beside the database (`marey admin`)
+    sa.Column("actor", sa.Text, nullable=False),  # name of the key, or who ran the command
+    sa.Column("verb", sa.Text, nullable=False),
+    sa.Column("target", sa.Text, nullable=False),
+    sa.Column("data", JSONB, nullable=False),  # no prompts, no secrets
+    sa.Index("ix_audit_event_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_audit_event_at", "at"),
 )

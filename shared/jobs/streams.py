@@ -22,6 +22,7 @@ from shared.jobs.listings import cut_page, page_limit, read_cursor
 from shared.jobs.outbox import tell_of_stream
 from shared.jobs.states import OPEN_STREAMS, StreamState
 from shared.jobs.submit import check_text, submit
+from shared.jobs.tenants import get_tenant
 from shared.jobs.types import (
     NewItem,
     NewJob,
@@ -42,7 +43,7 @@ def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID
     """A new stream, waiting for a worker.
 
     Args:
-        limit: how many may be open at once under one API key.
+        limit: how many may be open at once under one API key, where its tenant has no quota of its own.
 
     Raises:
         Busy: the key has that many.
@@ -53,6 +54,8 @@ def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID
     table = schema.stream
     # The key's row is the lock: two requests at once count one after the other.
     conn.execute(sa.select(schema.api_key.c.id).where(schema.api_key.c.id == stream.key).with_for_update())
+    own = get_tenant(conn, stream.tenant).quotas.streams
+    limit = limit if own is None else own
     mine = sa.select(sa.func.count()).where(table.c.key_id == stream.key, table.c.ended_at.is_(None))
     if conn.execute(mine).scalar_one() >= limit:
         raise Busy(
@@ -116,9 +119,11 @@ def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
 
 def open_streams(conn: sa.Connection, bundle: str, limit: int = 200) -> list[StreamRow]:
     """The streams of a bundle that are not over, oldest first: those that wait, and those that a worker has or had (the
-    lease on Redis tells which)."""
-    table = schema.stream.c
-    query = _streams().where(table.bundle == bundle, table.ended_at.is_(None)).order_by(table.id).limit(limit)
+    lease on Redis tells which). None that waits of a tenant that is suspended."""
+    table, tenant = schema.stream.c, schema.tenant.c
+    idle = sa.exists().where(tenant.id == table.tenant_id, tenant.suspended_at.is_not(None))
+    wanted = (table.bundle == bundle) & table.ended_at.is_(None) & ((table.state != StreamState.WAITING) | ~idle)
+    query = _streams().where(wanted).order_by(table.id).limit(limit)
     return [_row(row) for row in conn.execute(query).mappings()]
 
 
@@ -200,7 +205,7 @@ def end_stream(
         item, blob = clip
         texts = insert(schema.text_features).values(key=item.text_key, blob=blob)
         conn.execute(texts.on_conflict_do_nothing())
-        job = submit(conn, NewJob([item], tenant=row.tenant_id, name=row.name, comment=f"clip of stream {stream}")).id
+        job = submit(conn, _clip_job(stream, row.tenant_id, row.name, item)).id
     state = StreamState.ENDED if problem is None else StreamState.FAILED
     values = {
         "state": state,
@@ -223,6 +228,10 @@ def abandoned_streams(conn: sa.Connection, seconds: float) -> Sequence[UUID]:
 
 
 # --- helpers ---
+
+
+def _clip_job(stream: UUID, tenant: str, name: str | None, item: NewItem) -> NewJob:
+    return NewJob([item], tenant=tenant, name=name, comment=f"clip of stream {stream}", metered=False)
 
 
 def _streams() -> sa.Select[*tuple[Any, ...]]:

@@ -20,6 +20,7 @@ from shared.jobs.errors import IdempotencyMismatch
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, Lane, LaneChange, NewEvent, among, change_lanes, interval, lock_job, record
 from shared.jobs.policy import policy
+from shared.jobs.quotas import check_room
 from shared.jobs.states import JobState, Stage
 from shared.jobs.types import (
     MAX_KEEP_DAYS,
@@ -49,6 +50,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
 
     Raises:
         InvalidInput: no items, or a value out of its range; nothing is written (roll the transaction back).
+        QuotaUsedUp: the tenant's quotas have no room for it; likewise.
         IdempotencyMismatch: the key was used with another body.
     """
     if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
@@ -63,6 +65,8 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     earlier = _take_key(conn, job, identifier)
     if earlier is not None:
         return earlier
+    if job.metered:
+        check_room(conn, job.tenant, job.count or 1, lock=False)
     conn.execute(
         sa.insert(schema.job).values(
             id=identifier,
@@ -78,6 +82,8 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     total = sum(lanes.values())
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
+    if job.metered:
+        check_room(conn, job.tenant, total, lock=True)  # last: others of the tenant wait from here to the commit
     _begin(conn, identifier, total)
     change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
     return SubmittedJob(identifier, replayed=False, items=total)

@@ -18,7 +18,8 @@ from shared.jobs.types import Problem, SweepReport
 
 
 def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
-    """Take back expired leases, make due items ready, forget old idempotency rows, workers and events of webhooks.
+    """Take back expired leases, make due items ready, forget old idempotency rows, workers, events of webhooks and of
+    the audit log.
 
     An item of a lost lease is marked `solo`: it is claimed alone next time, and only the loss of a lease it was alone
     in (as such) counts as an attempt. Safe to run in several processes at once; each job is a transaction of its own.
@@ -102,10 +103,11 @@ def _make_due_ready(conn: sa.Connection, job_id: UUID) -> int:
 
 def _tidy(conn: sa.Connection, rules: Policy) -> int:
     """Forget what is old; how many assets are stale (their removal needs the store: `remove_stale_assets`)."""
-    keys, workers, assets = schema.idempotency, schema.worker, schema.asset
+    keys, workers, assets, audits = schema.idempotency, schema.worker, schema.asset, schema.audit_event
     conn.execute(sa.delete(keys).where(keys.c.created_at < CLOCK - interval(rules.idempotency)))
     conn.execute(sa.delete(workers).where(workers.c.seen_at < CLOCK - interval(rules.worker_kept)))
     forget_events(conn)
+    conn.execute(sa.delete(audits).where(audits.c.at < CLOCK - interval(rules.audit_kept)))
     return conn.execute(
         sa.select(sa.func.count())
         .select_from(assets)

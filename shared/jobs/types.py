@@ -91,6 +91,10 @@ class NewJob:
     """Share of failed and dead items (0 … 1) above which the rest is cancelled; None = never."""
     keep_days: int | None = None
     """Days after its end when it is deleted, motions and files too; None = by hand alone."""
+    count: int | None = None
+    """How many items there are, where that is known: a job that no quota has room for is refused before it is read."""
+    metered: bool = True
+    """Quotas apply. Not to what only finishes what was accepted: a stream's clip, the score of an evaluation."""
     idempotency_key: str | None = None
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
@@ -435,7 +439,13 @@ class ApiKey:
     scopes: tuple[str, ...]
     created: datetime
     last_used: datetime | None
+    """Within a minute."""
+    expires: datetime | None
     revoked: datetime | None
+    replaced_by: UUID | None
+    """The key it was rotated to."""
+    rates: Mapping[str, str]
+    """Rate limits of its own, by class of request: {"submit": "60/minute"}."""
 
 
 @dataclass(frozen=True)

@@ -373,19 +373,21 @@ def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:
     assert httpx2.get(f"{api.url}/readyz").status_code == 200
 
 
-def test_metrics_count_the_items_that_wait_by_queue(http: httpx2.Client) -> None:
+def test_metrics_count_the_items_that_wait_by_queue(api: LiveApi, http: httpx2.Client) -> None:
     def waiting() -> float:
-        lines = http.get("/metrics").text.splitlines()
+        lines = watcher.get("/metrics").text.splitlines()
         return sum(float(line.rpartition(" ")[2]) for line in lines if line.startswith("marey_waiting_items{"))
 
-    before = waiting()
-    submit(http, {"prompt": "a person waits"}, {"prompt": "a person waits longer"})
-    assert waiting() == before + 2
+    with api.http("metrics") as watcher:
+        before = waiting()
+        submit(http, {"prompt": "a person waits"}, {"prompt": "a person waits longer"})
+        assert waiting() == before + 2
 
 
 def test_metrics_count_requests_by_route_and_want_a_key(api: LiveApi, http: httpx2.Client) -> None:
     http.get(f"/v1/jobs/{uuid4()}")
-    text = http.get("/metrics").text
+    with api.http("metrics") as watcher:
+        text = watcher.get("/metrics").text
     assert 'marey_http_requests_total{method="GET",route="/v1/jobs/{job}",status="404"}' in text
     refused(httpx2.get(f"{api.url}/metrics"), 401, "unauthenticated")
 

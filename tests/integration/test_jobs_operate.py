@@ -1,4 +1,4 @@
-"""Operator verbs, listings and keys."""
+"""Operator verbs and listings."""
 
 from __future__ import annotations
 
@@ -8,16 +8,14 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound, Unauthenticated
+from shared.errors import Conflict, InvalidInput, NotFound
 from shared.jobs import (
     ItemFailure,
     ItemState,
     JobControl,
     JobState,
-    authenticate,
     cancel,
     claim,
-    create_key,
     delete,
     events_after,
     fail_items,
@@ -25,12 +23,10 @@ from shared.jobs import (
     get_motion,
     list_items,
     list_jobs,
-    list_keys,
     list_motions,
     pause,
     resume,
     retry,
-    revoke_key,
     set_comment,
     set_priority,
     transaction,
@@ -236,48 +232,6 @@ def test_a_foreign_cursor_is_refused(engine: sa.Engine, cursor: str) -> None:
 def test_a_page_holds_one_to_a_thousand_rows(engine: sa.Engine, limit: int) -> None:
     with transaction(engine) as conn, pytest.raises(InvalidInput, match="limit"):
         list_jobs(conn, "default", limit=limit)
-
-
-# --- keys ---
-
-
-def test_a_key_opens_until_it_is_revoked(engine: sa.Engine) -> None:
-    with transaction(engine) as conn:
-        made = create_key(conn, "ci", {"submit", "read"})
-        key = authenticate(conn, made.secret)
-        assert (key.id, key.tenant, key.scopes, key.name) == (made.key.id, "default", ("read", "submit"), "ci")
-        assert key.last_used is not None
-        assert revoke_key(conn, "default", key.id).revoked is not None
-        with pytest.raises(Unauthenticated, match="revoked"):
-            authenticate(conn, made.secret)
-        assert [row.id for row in list_keys(conn, "default")] == [key.id]
-
-
-def test_the_secret_is_stored_nowhere(engine: sa.Engine) -> None:
-    with transaction(engine) as conn:
-        made = create_key(conn, "ci", {"read"})
-        row = str(conn.execute(sa.text("SELECT row_to_json(api_key)::text FROM api_key")).scalar_one())
-    assert made.secret.rpartition("_")[2] not in row
-    assert made.secret not in repr(made.key)
-
-
-@pytest.mark.parametrize("change", [lambda s: s[:-1] + ("A" if s[-1] != "A" else "B"), lambda s: s[:-1], str.upper])
-def test_a_wrong_secret_opens_nothing(engine: sa.Engine, change: Callable[[str], str]) -> None:
-    with transaction(engine) as conn:
-        made = create_key(conn, "ci", {"read"})
-        with pytest.raises(Unauthenticated):
-            authenticate(conn, change(made.secret))
-
-
-def test_a_key_needs_known_scopes_and_a_tenant(engine: sa.Engine) -> None:
-    with transaction(engine) as conn:
-        for scopes in ({"root"}, set[str]()):
-            with pytest.raises(InvalidInput, match="scope"):
-                create_key(conn, "ci", scopes)
-        with pytest.raises(NotFound, match="tenant"):
-            create_key(conn, "ci", {"read"}, tenant="studio")
-        with pytest.raises(NotFound):
-            revoke_key(conn, "default", uuid4())
 
 
 def test_two_prompts_of_one_index_are_variants_in_a_listing(engine: sa.Engine) -> None:

@@ -16,10 +16,12 @@ from shared.jobs import (
     NewMotion,
     NewText,
     Problem,
+    Quotas,
     begin_assets,
     claim,
     commit_motions,
     commit_texts,
+    create_tenant,
     submit,
     transaction,
 )
@@ -51,6 +53,13 @@ def submit_items(engine: sa.Engine, items: int | Iterable[NewItem], **job: objec
     chosen = map(new_item, range(items)) if isinstance(items, int) else items
     with transaction(engine) as conn:
         return submit(conn, NewJob(chosen, **job)).id  # pyright: ignore[reportArgumentType]
+
+
+def new_tenant(engine: sa.Engine, name: str = "studio", **quotas: int) -> str:
+    """A tenant with these quotas; its name."""
+    with transaction(engine) as conn:
+        create_tenant(conn, name, Quotas(**quotas))
+    return name
 
 
 def claim_some(engine: sa.Engine, queue: str = MODEL, limit: int = 32, worker: str = "w", **more: object) -> Claim:

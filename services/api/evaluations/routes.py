@@ -8,6 +8,7 @@ from uuid import UUID
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.context import Connection, Shared
 from services.api.evaluations import service
@@ -62,6 +63,7 @@ def get_evaluation(evaluation: UUID, conn: Connection, key: Reader) -> Evaluatio
 @router.delete("/{evaluation}", status_code=202)
 def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> EvaluationDetailView:
     """Cancel an evaluation and the job that runs for it. One that is over stays as it is."""
+    note(conn, key, "evaluation.cancel", evaluation)
     return service.detail(conn, jobs.cancel_evaluation(conn, key.tenant, evaluation))
 
 

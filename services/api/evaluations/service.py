@@ -8,6 +8,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from services.api.audit import note
 from services.api.context import Context
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
 from services.api.jobs.service import Fields, read_fields, read_object
@@ -70,6 +71,7 @@ def create(shared: Context, key: jobs.ApiKey, body: bytes) -> EvaluationDetailVi
         new = jobs.NewEvaluation(key.tenant, plan.request, sha256, name=fields.name, comment=fields.comment)
         made = jobs.create_evaluation(conn, new)
         assert made is not None  # only one of a schedule can be there already
+        note(conn, key, "evaluation.begin", made, bundle=plan.request.bundle)
         return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
 
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from services.api.auth import Reader
+from services.api.auth import Watcher
 from services.api.context import Context, Shared
 from services.api.health.metrics import render
 from services.api.schemas import View
@@ -54,8 +54,8 @@ def readyz(shared: Shared) -> JSONResponse:
 
 
 @router.get("/metrics", response_class=PlainTextResponse)
-def metrics(shared: Shared, key: Reader) -> Response:
-    """For Prometheus; wants a key with the scope `read`."""
+def metrics(shared: Shared, key: Watcher) -> Response:
+    """For Prometheus; wants a key with the scope `metrics`: it tells of all tenants."""
     return Response(render(shared.engine), media_type=CONTENT_TYPE_LATEST)
 
 

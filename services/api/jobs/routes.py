@@ -10,6 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from fastapi.sse import EventSourceResponse
 
+from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.context import Connection, Context, Shared
 from services.api.guards import limit_of_submit, read_body
@@ -48,6 +49,11 @@ IdempotencyKey = Annotated[
         pattern=r"^[\x21-\x7e]+$",
         description="The same key and body within 24 hours give the same job; another body is refused.",
     ),
+]
+
+
+Reason = Annotated[
+    str | None, Query(max_length=500, pattern=r"^[^\x00]*$", description="Why; it stands in the job's events.")
 ]
 
 
@@ -116,6 +122,7 @@ def _write(
     new = jobs.NewJob(
         items=submission.new_items(),
         tenant=key.tenant,
+        count=submission.count,
         idempotency_key=idempotency_key,
         body_sha256=sha256 if idempotency_key else None,
         **submission.fields.model_dump(),
@@ -123,6 +130,8 @@ def _write(
     with jobs.transaction(shared.engine) as conn:
         submitted = jobs.submit(conn, new)
         row = jobs.get_job(conn, key.tenant, submitted.id)
+        if not submitted.replayed:
+            note(conn, key, "job.submit", row.id, items=row.total, priority=row.priority)
     headers = {"Location": f"/v1/jobs/{submitted.id}"}
     if submitted.replayed:
         headers["Idempotency-Replayed"] = "true"
@@ -156,6 +165,8 @@ def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator) -> Jo
         row = jobs.set_priority(conn, key.tenant, job, patch.priority)
     if "comment" in patch.model_fields_set:
         row = jobs.set_comment(conn, key.tenant, job, patch.comment)
+    if patch.model_fields_set:
+        note(conn, key, "job.change", job, fields=sorted(patch.model_fields_set), priority=patch.priority)
     return JobView.of(row)
 
 
@@ -163,24 +174,28 @@ def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator) -> Jo
 def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
     """Delete a job that has ended, with its motions."""
     jobs.delete(conn, key.tenant, job)
+    note(conn, key, "job.delete", job)
 
 
 @router.post("/{job}/pause")
-def pause_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Give out no more items; those being made are finished."""
-    return JobView.of(jobs.pause(conn, key.tenant, job))
+    note(conn, key, "job.pause", job, reason=reason)
+    return JobView.of(jobs.pause(conn, key.tenant, job, reason or f"paused by {key.name}"))
 
 
 @router.post("/{job}/resume")
-def resume_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Go on with a paused job."""
-    return JobView.of(jobs.resume(conn, key.tenant, job))
+    note(conn, key, "job.resume", job, reason=reason)
+    return JobView.of(jobs.resume(conn, key.tenant, job, reason or f"resumed by {key.name}"))
 
 
 @router.post("/{job}/cancel")
-def cancel_job(job: UUID, conn: Connection, key: Operator) -> JobView:
+def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Cancel what is not done yet."""
-    return JobView.of(jobs.cancel(conn, key.tenant, job))
+    note(conn, key, "job.cancel", job, reason=reason)
+    return JobView.of(jobs.cancel(conn, key.tenant, job, reason or f"cancelled by {key.name}"))
 
 
 @router.post("/{job}/retry")
@@ -189,9 +204,12 @@ def retry_job(
     conn: Connection,
     key: Operator,
     failed_only: Annotated[bool, Query(description="Leave cancelled items as they are.")] = False,
+    reason: Reason = None,
 ) -> JobView:
     """Try failed, dead and cancelled items again."""
-    return JobView.of(jobs.retry(conn, key.tenant, job, failed_only=failed_only))
+    note(conn, key, "job.retry", job, failed_only=failed_only, reason=reason)
+    why = reason or f"retried by {key.name}"
+    return JobView.of(jobs.retry(conn, key.tenant, job, failed_only=failed_only, reason=why))
 
 
 @router.get("/{job}/items")

@@ -8,6 +8,7 @@ from uuid import UUID
 from fastapi import APIRouter, Depends, Path, Query, Response
 from pydantic import Field
 
+from services.api.audit import note
 from services.api.auth import Reader, Submitter
 from services.api.context import Connection, Shared
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
@@ -75,6 +76,7 @@ def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> lis
     """Keep or reject motions, all or none; said again, nothing changes. Answers them in the order given."""
     verdict = None if body.verdict is None else jobs.Review(body.verdict)
     rows = jobs.review(conn, key.tenant, body.motions, verdict, by=key.name, comment=body.comment)
+    note(conn, key, "motion.review", rows[0].id, verdict=verdict, motions=len(rows))
     return [MotionView.of(row) for row in rows]
 
 
@@ -92,6 +94,7 @@ def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: S
         by=key.name,
         comment=body.comment,
     )
+    note(conn, key, "motion.reroll", body.motions[0], motions=len(takes))
     return RerollsView(items=[RerollView.of(take) for take in takes])
 
 

@@ -7,6 +7,7 @@ from uuid import UUID
 from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.context import Connection, Shared
 from services.api.evaluations.routes import body_of
@@ -55,12 +56,14 @@ async def change_schedule(schedule: UUID, request: Request, shared: Shared, key:
 def delete_schedule(schedule: UUID, conn: Connection, key: Operator) -> None:
     """Remove a schedule. Its evaluations stay, and one that runs goes on."""
     jobs.delete_schedule(conn, key.tenant, schedule)
+    note(conn, key, "schedule.delete", schedule)
 
 
 @router.post("/{schedule}/run", status_code=202)
 def run_schedule(schedule: UUID, response: Response, conn: Connection, key: Submitter) -> EvaluationDetailView:
     """Plan an evaluation now, beside its times; also while it is paused."""
     made = jobs.run_schedule(conn, key.tenant, schedule)
+    note(conn, key, "schedule.run", schedule, evaluation=str(made))
     response.headers["Location"] = f"/v1/evaluations/{made}"
     return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from uuid import UUID
 
+from services.api.audit import note
 from services.api.context import Context
 from services.api.evaluations.schemas import AskedFields
 from services.api.evaluations.service import read_asked, stored
@@ -33,7 +34,9 @@ def create(shared: Context, key: jobs.ApiKey, body: bytes) -> ScheduleView:
             prompts=None if asked.prompts is None else sha256,
             name=fields.name,
         )
-        return ScheduleView.of(jobs.get_schedule(conn, key.tenant, jobs.create_schedule(conn, new)))
+        made = jobs.create_schedule(conn, new)
+        note(conn, key, "schedule.create", made, bundle=asked.request.bundle)
+        return ScheduleView.of(jobs.get_schedule(conn, key.tenant, made))
 
 
 def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: bytes) -> ScheduleView:
@@ -56,4 +59,5 @@ def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: bytes) -> Sc
             sha256 = stored(conn, key.tenant, plan)
             changed = (asked.request, None if asked.prompts is None else sha256)
         change = jobs.ScheduleChange(**fields.model_dump(), request=changed)
+        note(conn, key, "schedule.change", schedule, fields=sorted(fields.model_fields_set))
         return ScheduleView.of(jobs.change_schedule(conn, key.tenant, schedule, change))

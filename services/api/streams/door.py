@@ -11,7 +11,7 @@ from fastapi import WebSocket
 from starlette.datastructures import QueryParams
 from starlette.websockets import WebSocketDisconnect
 
-from services.api.auth import authenticated, check_scope
+from services.api.auth import admit, authenticated, check_scope
 from services.api.context import Context
 from services.api.streams import service
 from services.api.streams.session import Session, Visit
@@ -66,7 +66,7 @@ def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams)
         Unauthenticated, Refused, InvalidInput, NotFound: by what is wrong.
     """
     key = authenticated(shared, secret)
-    check_scope(key, "read")
+    admit(shared, key, "read")
     first, slow = first_frame(query.get("from")), _slow(query.get("slow"))
     if slow == "pause":
         check_scope(key, "submit")  # it is a message like those a client sends

@@ -52,7 +52,7 @@ class Messages:
         while (message := await self._wire.receive()) is not None:
             try:
                 control = self._control(message)
-                ask = partial(service.command, self._shared, self._key.tenant, self._stream, control)
+                ask = partial(service.command, self._shared, self._key, self._stream, control)
                 await self._hub.call(ask)
             except MareyError as error:
                 await self._wire.complain(error)

@@ -56,7 +56,7 @@ def get_stream(stream: UUID, shared: Shared, conn: Connection, key: Reader) -> S
 def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailView:
     """Ask a live stream to end; one that still waits is over at once, and one that is over stays as it is."""
     service.hub_of(shared)
-    row = service.stop(shared, key.tenant, stream)
+    row = service.stop(shared, key, stream)
     with jobs.transaction(shared.engine) as conn:
         return service.detail(conn, shared, row)
 

@@ -9,6 +9,7 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
+from services.api.audit import note
 from services.api.catalogue import Catalogue
 from services.api.context import Context
 from services.api.streams.hub import Hub
@@ -61,6 +62,7 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
     new = _new_stream(key, body, shared.catalogue)
     with transaction(shared.engine) as conn:
         stream = create_stream(conn, new, limit=shared.config.streams_per_key)
+        note(conn, key, "stream.begin", stream, bundle=new.bundle)
         view = detail(conn, shared, get_stream(conn, key.tenant, stream))
     try:
         Bell(hub.redis).ring()
@@ -94,8 +96,8 @@ def is_over(row: StreamRow) -> bool:
     return row.state not in OPEN_STREAMS
 
 
-def command(shared: Context, tenant: str, stream: UUID, control: Control) -> None:
-    """Ask something of a stream that is not over.
+def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> None:
+    """Ask something of a stream that is not over. Steers are many, and are on record with the stream itself.
 
     Raises:
         NotFound: the tenant has no such stream.
@@ -103,16 +105,18 @@ def command(shared: Context, tenant: str, stream: UUID, control: Control) -> Non
         Unreachable: Redis or the database does not answer.
     """
     with transaction(shared.engine) as conn:
-        row = get_stream(conn, tenant, stream)
-    if is_over(row):
-        raise Conflict(f"the stream is over: {row.reason}", where=f"stream {stream}")
+        row = get_stream(conn, key.tenant, stream)
+        if is_over(row):
+            raise Conflict(f"the stream is over: {row.reason}", where=f"stream {stream}")
+        if control.kind in ("pause", "resume"):
+            note(conn, key, f"stream.{control.kind}", stream)
     if control.kind == "stop":
-        stop(shared, tenant, stream)
+        stop(shared, key, stream)
     else:
         ControlQueue(hub_of(shared).redis, str(stream)).send(control)
 
 
-def stop(shared: Context, tenant: str, stream: UUID) -> StreamRow:
+def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
     """Ask a stream to end, and see how it stands then. One that waits is over at once; one that is over stays so.
 
     A worker may take the stream at this very moment. Both lock its row, and look again once they have it: if we come
@@ -124,9 +128,10 @@ def stop(shared: Context, tenant: str, stream: UUID) -> StreamRow:
         Unreachable: Redis or the database does not answer.
     """
     with transaction(shared.engine) as conn:
-        get_stream(conn, tenant, stream)
+        get_stream(conn, key.tenant, stream)
+        note(conn, key, "stream.stop", stream)
         end_stream(conn, stream, NEVER_TAKEN, STOPPED)
-        row = get_stream(conn, tenant, stream)
+        row = get_stream(conn, key.tenant, stream)
     if not is_over(row):
         ControlQueue(hub_of(shared).redis, str(stream)).send(Control("stop"))
     return row

@@ -7,6 +7,7 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Response
 
+from services.api.audit import note
 from services.api.auth import Operator, Reader
 from services.api.context import Connection, Shared
 from services.api.problems import RESPONSES
@@ -35,6 +36,7 @@ def create_webhook(
     secret = new_signing_secret()
     sealed = Vault.of(shared.config).encrypt(secret)
     made = jobs.create_webhook(conn, jobs.NewWebhook(key.tenant, url, body.events, sealed, body.name))
+    note(conn, key, "webhook.create", made, events=list(body.events))
     response.headers["Location"] = f"/v1/webhooks/{made}"
     return MadeWebhookView.made(jobs.get_webhook(conn, key.tenant, made), secret)
 
@@ -58,6 +60,7 @@ def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Con
     fields = patch.model_dump()
     if patch.url is not None:
         fields["url"] = check_url(patch.url, Allowed.of(shared.config.webhook_allow))
+    note(conn, key, "webhook.change", webhook, fields=sorted(patch.model_fields_set))
     return WebhookView.of(jobs.change_webhook(conn, key.tenant, webhook, jobs.WebhookChange(**fields)))
 
 
@@ -65,11 +68,13 @@ def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Con
 def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
     """Remove a webhook, with its deliveries and their log."""
     jobs.delete_webhook(conn, key.tenant, webhook)
+    note(conn, key, "webhook.delete", webhook)
 
 
 @router.post("/{webhook}/test", status_code=202)
 def send_test(webhook: UUID, conn: Connection, key: Operator) -> DeliveryView:
     """Send it a message of the type `webhook.test`, which is tried once."""
+    note(conn, key, "webhook.test", webhook)
     return DeliveryView.of(jobs.send_test(conn, key.tenant, webhook))
 
 
@@ -97,4 +102,5 @@ def get_delivery(webhook: UUID, event: UUID, conn: Connection, key: Reader) -> D
 @router.post("/{webhook}/deliveries/{event}/replay", status_code=202)
 def replay_delivery(webhook: UUID, event: UUID, conn: Connection, key: Operator) -> DeliveryView:
     """Deliver it once more, now, under the same id and with all tries; also one that waits for its next try."""
+    note(conn, key, "webhook.replay", webhook, event=str(event))
     return DeliveryView.of(jobs.replay_delivery(conn, key.tenant, webhook, event))

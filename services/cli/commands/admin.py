@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from services.cli import console
-from shared.errors import InvalidInput
+from services.cli.commands import keys, tenants
+from services.cli.database import connection, engine_of, identifier, operator, settings_here
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from shared.settings import Settings
+    from shared.jobs import AuditRow
 
 app = typer.Typer(help="For the operator of a server, beside its database.", no_args_is_help=True)
-keys = typer.Typer(help="API keys.", no_args_is_help=True)
-app.add_typer(keys, name="keys")
-
-Scopes = Annotated[list[str] | None, typer.Option("--scope", help="read, submit, operate or admin; may be repeated.")]
+app.add_typer(tenants.app, name="tenants")
+app.add_typer(keys.app, name="keys")
 
 
 @app.command()
 def migrate() -> None:
     """Bring the database to the newest revision, and make the bucket of an S3 store where there is none."""
-    config = _settings()
+    config = settings_here()
     from shared.jobs import upgrade
     from shared.storage import open_store
 
-    upgrade(_engine(config))
+    upgrade(engine_of(config))
     console.say("the database is at the newest revision")
     store = open_store(config)
     store.prepare()
@@ -40,11 +41,16 @@ def migrate() -> None:
 @app.command()
 def gc(as_json: console.Json = False) -> None:
     """Remove stored files that nothing refers to."""
-    config = _settings()
-    from shared.jobs import collect_garbage
+    config = settings_here()
+    from shared.jobs import DEFAULT_TENANT, audit, collect_garbage, transaction
     from shared.storage import open_store
 
-    report = collect_garbage(_engine(config), open_store(config))
+    engine = engine_of(config)
+    report = collect_garbage(engine, open_store(config))
+    with transaction(engine) as conn:
+        removed = {"rows": report.rows, "orphans": report.orphans, "missing": len(report.missing)}
+        audit(conn, DEFAULT_TENANT, operator(), "store.gc", "assets", **removed)
+    engine.dispose()
     if as_json:
         console.result_json({"rows": report.rows, "orphans": report.orphans, "missing": list(report.missing)})
     else:
@@ -55,65 +61,26 @@ def gc(as_json: console.Json = False) -> None:
         raise typer.Exit(1)
 
 
-@keys.command("create")
-def create(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose key it is.")],
-    scopes: Scopes = None,
+@app.command()
+def audit(
+    tenant: Annotated[str | None, typer.Option("--tenant", help="In this tenant alone.")] = None,
+    key: Annotated[str | None, typer.Option("--key", help="By the key of this id alone.")] = None,
+    verb: Annotated[str | None, typer.Option("--verb", help="As job.cancel; or a noun, as job.")] = None,
+    days: Annotated[float | None, typer.Option("--days", min=0, help="In the last so many days.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 50,
     as_json: console.Json = False,
 ) -> None:
-    """Make a key and print it, this once."""
-    config = _settings()
-    from shared.jobs import create_key, transaction
-
-    with transaction(_engine(config)) as conn:
-        made = create_key(conn, name, scopes or ["read", "submit"])
-    if as_json:
-        console.result_json({"id": str(made.key.id), "secret": made.secret, "scopes": list(made.key.scopes)})
-    else:
-        console.result(made.secret)
-        console.say(f"{name}: {', '.join(made.key.scopes)}. It is shown only now; put it into MAREY_KEY.")
-
-
-@keys.command("list")
-def list_them(as_json: console.Json = False) -> None:
-    """List keys, without their secrets."""
-    config = _settings()
-    from shared.jobs import DEFAULT_TENANT, list_keys, transaction
-
-    with transaction(_engine(config)) as conn:
-        found = list_keys(conn, DEFAULT_TENANT)
-    rows = [
-        {
-            "id": str(key.id),
-            "name": key.name,
-            "scopes": ",".join(key.scopes),
-            "created": key.created.isoformat(),
-            "last_used": key.last_used and key.last_used.isoformat(),
-            "revoked": key.revoked and key.revoked.isoformat(),
-        }
-        for key in found
-    ]
+    """Show who did what, newest first: by name of the key, or of whoever ran `marey admin`."""
+    wanted = None if key is None else identifier(key, "a key", "`marey admin keys list` shows them.")
+    since = None if days is None else datetime.now(UTC) - timedelta(days=days)
+    with connection() as conn:
+        rows = [_audit_row(row) for row in _audited(conn, limit, tenant=tenant, key=wanted, verb=verb, since=since)]
     if as_json:
         for row in rows:
             console.result_json(row)
     else:
-        console.table(("id", "name", "scopes", "created", "last used", "revoked"), (list(row.values()) for row in rows))
-
-
-@keys.command("revoke")
-def revoke(key: Annotated[str, typer.Argument(metavar="ID", help="Id of the key.")]) -> None:
-    """Make a key invalid from now on."""
-    from uuid import UUID
-
-    try:
-        wanted = UUID(key)
-    except ValueError:
-        raise InvalidInput(f"{key!r} is not the id of a key", hint="`marey admin keys list` shows them.") from None
-    config = _settings()
-    from shared.jobs import DEFAULT_TENANT, revoke_key, transaction
-
-    with transaction(_engine(config)) as conn:
-        console.say(f"{revoke_key(conn, DEFAULT_TENANT, wanted).name} is revoked")
+        columns = ("at", "tenant", "actor", "key", "verb", "target", "data")
+        console.table(columns, ([row[name] for name in columns[:-1]] + [_in_words(row["data"])] for row in rows))
 
 
 def doctor(as_json: console.Json = False) -> None:
@@ -132,30 +99,24 @@ def doctor(as_json: console.Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _settings() -> Settings:
-    """The settings; those of the embedded server of this home where no database is named.
+def _audited(conn: sa.Connection, limit: int, **which: Any) -> Iterator[AuditRow]:
+    """The newest `limit` rows, page by page."""
+    from shared.jobs import list_audit
 
-    Raises:
-        InvalidInput: the extra `server` is not installed.
-    """
-    from services.cli.roles import needs_extra
-
-    try:
-        from shared.runtime.embedded import postgres_url
-        from shared.settings import settings
-    except ImportError as error:
-        raise needs_extra("server", error) from error
-    from pydantic import SecretStr
-
-    config = settings()
-    if config.database_url is not None:
-        return config
-    return config.model_copy(update={"database_url": SecretStr(postgres_url(config.home.absolute()))})
+    cursor: str | None = None
+    while limit > 0:
+        page = list_audit(conn, cursor=cursor, limit=min(limit, 1000), **which)
+        yield from page.rows
+        limit -= len(page.rows)
+        cursor = page.cursor
+        if cursor is None:
+            return
 
 
-def _engine(config: Settings) -> sa.Engine:
-    from shared.jobs import create_engine
+def _audit_row(row: AuditRow) -> dict[str, Any]:
+    own = {"id": str(row.id), "at": row.at.isoformat(), "key": row.key and str(row.key), "data": dict(row.data)}
+    return {**own, "tenant": row.tenant, "actor": row.actor, "verb": row.verb, "target": row.target}
 
-    if config.database_url is None:
-        raise AssertionError("_settings fills it")
-    return create_engine(config.database_url.get_secret_value(), pool_size=2)
+
+def _in_words(data: Mapping[str, object]) -> str:
+    return ", ".join(f"{name}={value}" for name, value in data.items())

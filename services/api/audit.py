@@ -1,0 +1,12 @@
+"""Notes in the audit log of what a request did, in the transaction in which it does it."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from shared import jobs
+
+
+def note(conn: sa.Connection, key: jobs.ApiKey, verb: str, target: object, **data: object) -> None:
+    """Note that this key did something; see `shared.jobs.audit`."""
+    jobs.audit(conn, key.tenant, jobs.Actor(key.name, key.id), verb, target, **data)

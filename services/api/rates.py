@@ -1,0 +1,96 @@
+"""Rate limits by key and class of request, counted in Redis so that all API processes share them."""
+
+# pyright: reportMissingTypeStubs=false
+from __future__ import annotations
+
+import math
+import threading
+import time
+
+import structlog
+from limits import RateLimitItemPerSecond
+from limits.errors import StorageError
+from limits.storage import RedisStorage
+from limits.strategies import FixedWindowRateLimiter
+from redis.backoff import NoBackoff
+from redis.retry import Retry
+
+from shared.errors import Busy
+from shared.jobs import ApiKey
+from shared.rates import Rate, read_rate
+from shared.runtime.queue import redis_client
+from shared.settings import Settings
+
+OPTIONS = "socket_timeout=0.5&socket_connect_timeout=0.5"
+"""A counter is worth less than the request it counts: who waits longer for Redis goes without."""
+AWAY_SECONDS = 5.0
+"""After Redis did not answer nobody asks it for so long: requests shall not wait for it one after the other."""
+PREFIX = "marey:rate"
+
+log = structlog.get_logger(__name__)
+
+
+class Rates:
+    """Made once a process; connects to nothing before it counts.
+
+    While Redis is away requests are served uncounted, and the log says so: a limit keeps a loop of somebody's script
+    from crowding others out, and quotas, which hold what costs something, stand in the database.
+    """
+
+    def __init__(self, config: Settings) -> None:
+        self._rates = {kind: read_rate(text, where=kind) for kind, text in config.rates.items()}
+        self._limiter = None
+        if config.queue_url is not None:
+            url = config.queue_url.get_secret_value()
+            client = redis_client(f"{url}{'&' if '?' in url else '?'}{OPTIONS}")
+            client.set_retry(Retry(NoBackoff(), 1))  # once more, at once, for a connection that went stale
+            pool = client.connection_pool
+            storage = RedisStorage("redis://", connection_pool=pool, key_prefix=PREFIX, wrap_exceptions=True)
+            self._limiter = FixedWindowRateLimiter(storage)
+        self._lock = threading.Lock()
+        self._again = 0.0  # when Redis may be asked
+        self._away = False
+
+    def take(self, key: ApiKey, kind: str) -> None:
+        """Count one request of a class.
+
+        Raises:
+            Busy: it is one too many in this window.
+        """
+        rate = self._rate(key, kind)
+        if rate is None or self._limiter is None or time.monotonic() < self._again:
+            return
+        item = RateLimitItemPerSecond(rate.amount, rate.seconds)
+        try:
+            allowed = self._limiter.hit(item, str(key.id), kind)
+            seconds = (
+                0.0 if allowed else self._limiter.get_window_stats(item, str(key.id), kind).reset_time - time.time()
+            )
+        except StorageError as error:
+            self._lose(error)
+            return
+        self._find()
+        if not allowed:
+            raise Busy(
+                f"this key may make {rate.amount} requests of the class {kind} in {rate.seconds} s, and has made them",
+                where=f"rate {kind}",
+                hint="Send it again after the seconds of `Retry-After`.",
+                seconds=max(math.ceil(seconds), 1),
+            )
+
+    def _rate(self, key: ApiKey, kind: str) -> Rate | None:
+        own = key.rates.get(kind)
+        return self._rates.get(kind) if own is None else read_rate(own, where=kind)
+
+    def _lose(self, error: Exception) -> None:
+        with self._lock:
+            self._again = time.monotonic() + AWAY_SECONDS
+            if not self._away:
+                log.warning("rates_uncounted", error=type(error.__cause__ or error).__name__)
+            self._away = True
+
+    def _find(self) -> None:
+        if self._away:
+            with self._lock:
+                self._away = False
+            log.info("rates_counted_again")

@@ -1,0 +1,139 @@
+"""`marey admin keys …`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from services.cli import console
+from services.cli.database import connection, identifier, operator
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from shared.jobs import ApiKey, NewApiKey
+
+app = typer.Typer(help="API keys.", no_args_is_help=True)
+
+DAY = 86_400.0
+HINT = "`marey admin keys list` shows them."
+COLUMNS = ("id", "name", "tenant", "scopes", "created", "last_used", "expires", "revoked", "replaced_by", "rates")
+
+Scopes = Annotated[
+    list[str] | None, typer.Option("--scope", help="read, submit, operate, admin or metrics; may be repeated.")
+]
+Tenant = Annotated[str, typer.Option("--tenant", help="Whose key it is.")]
+Key = Annotated[str, typer.Argument(metavar="ID", help="Id of the key.")]
+Rates = Annotated[
+    list[str] | None,
+    typer.Option("--rate", help="A rate limit of its own, as submit=60/minute (read, submit, operate, parse)."),
+]
+
+
+@app.command("create")
+def create(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose key it is.")],
+    scopes: Scopes = None,
+    tenant: Tenant = "default",
+    days: Annotated[
+        float | None, typer.Option("--days", help="It expires after so many days; never, if unset.")
+    ] = None,
+    rates: Rates = None,
+    as_json: console.Json = False,
+) -> None:
+    """Make a key and print it, this once."""
+    with connection() as conn:
+        from shared.jobs import audit, create_key
+
+        lifetime = None if days is None else days * DAY
+        chosen = scopes or ["read", "submit"]
+        made = create_key(conn, name, chosen, tenant=tenant, lifetime=lifetime, rates=_rates(rates))
+        audit(conn, tenant, operator(), "key.create", made.key.id, name=name, scopes=list(made.key.scopes))
+    _show_secret(made, as_json)
+
+
+@app.command("list")
+def list_them(
+    tenant: Annotated[str | None, typer.Option("--tenant", help="Those of this tenant alone.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """List keys, without their secrets."""
+    with connection() as conn:
+        from shared.jobs import get_tenant, list_keys, list_tenants
+
+        tenants = list_tenants(conn) if tenant is None else [get_tenant(conn, tenant)]
+        rows = [_row(key) for each in tenants for key in list_keys(conn, each.id)]
+    if as_json:
+        for row in rows:
+            console.result_json(row)
+    else:
+        console.table([column.replace("_", " ") for column in COLUMNS], (list(row.values()) for row in rows))
+
+
+@app.command("rotate")
+def rotate(
+    key: Key,
+    tenant: Tenant = "default",
+    hours: Annotated[
+        float, typer.Option("--overlap-hours", min=0, help="The old one works so much longer; 0 = not at all.")
+    ] = 24.0,
+    as_json: console.Json = False,
+) -> None:
+    """Make a new key in the place of another, and print it, this once."""
+    wanted = identifier(key, "a key", HINT)
+    with connection() as conn:
+        from shared.jobs import audit, rotate_key
+
+        made = rotate_key(conn, tenant, wanted, overlap=hours * 3600)
+        audit(conn, tenant, operator(), "key.rotate", wanted, new=str(made.key.id), overlap_hours=hours)
+    _show_secret(made, as_json)
+    if not as_json:
+        console.say(f"The old one works for {hours:g} hours." if hours else "The old one is invalid from now on.")
+
+
+@app.command("revoke")
+def revoke(key: Key, tenant: Tenant = "default") -> None:
+    """Make a key invalid from now on."""
+    wanted = identifier(key, "a key", HINT)
+    with connection() as conn:
+        from shared.jobs import audit, revoke_key
+
+        revoked = revoke_key(conn, tenant, wanted)
+        audit(conn, tenant, operator(), "key.revoke", wanted, name=revoked.name)
+    console.say(f"{revoked.name} is revoked")
+
+
+def _show_secret(made: NewApiKey, as_json: bool) -> None:
+    key = made.key
+    if as_json:
+        expires = key.expires and key.expires.isoformat()
+        row = {"id": str(key.id), "secret": made.secret, "tenant": key.tenant, "scopes": list(key.scopes)}
+        console.result_json({**row, "expires": expires})
+    else:
+        console.result(made.secret)
+        console.say(f"{key.name}: {', '.join(key.scopes)}. It is shown only now; put it into MAREY_KEY.")
+
+
+def _row(key: ApiKey) -> dict[str, Any]:
+    return {
+        "id": str(key.id),
+        "name": key.name,
+        "tenant": key.tenant,
+        "scopes": ",".join(key.scopes),
+        "created": key.created.isoformat(),
+        "last_used": key.last_used and key.last_used.isoformat(),
+        "expires": key.expires and key.expires.isoformat(),
+        "revoked": key.revoked and key.revoked.isoformat(),
+        "replaced_by": key.replaced_by and str(key.replaced_by),
+        "rates": ",".join(f"{kind}={rate}" for kind, rate in sorted(key.rates.items())),
+    }
+
+
+def _rates(given: list[str] | None) -> dict[str, str]:
+    rates: dict[str, str] = {}
+    for each in given or ():
+        kind, separator, rate = each.partition("=")
+        if not separator:
+            raise InvalidInput(f"{each!r} is not a rate limit", where="--rate", hint="Write submit=60/minute.")
+        rates[kind] = rate
+    return rates

@@ -1,0 +1,88 @@
+"""What commands need that work beside the database, without the API."""
+
+from __future__ import annotations
+
+import getpass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import sqlalchemy as sa
+
+    from shared.jobs import Actor
+    from shared.settings import Settings
+
+
+def settings_here() -> Settings:
+    """The settings; those of the embedded server of this home where no database is named.
+
+    Raises:
+        InvalidInput: the extra `server` is not installed.
+    """
+    from services.cli.roles import needs_extra
+
+    try:
+        from shared.runtime.embedded import postgres_url
+        from shared.settings import settings
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    from pydantic import SecretStr
+
+    config = settings()
+    if config.database_url is not None:
+        return config
+    return config.model_copy(update={"database_url": SecretStr(postgres_url(config.home.absolute()))})
+
+
+def engine_of(config: Settings) -> sa.Engine:
+    """An engine for the database of `settings_here`."""
+    from shared.jobs import create_engine
+
+    if config.database_url is None:
+        raise AssertionError("settings_here fills it")
+    return create_engine(config.database_url.get_secret_value(), pool_size=2)
+
+
+@contextmanager
+def connection() -> Iterator[sa.Connection]:
+    """One transaction in the database of this place; raises as `settings_here`.
+
+    Raises:
+        Unreachable: it does not answer.
+    """
+    config = settings_here()
+    from shared.jobs import transaction
+
+    engine = engine_of(config)
+    try:
+        with transaction(engine) as conn:
+            yield conn
+    finally:
+        engine.dispose()
+
+
+def operator() -> Actor:
+    """Who runs this command, for the audit log."""
+    from shared.jobs import Actor
+
+    try:
+        name = getpass.getuser()
+    except (KeyError, OSError):  # a container's user without a name
+        name = "?"
+    return Actor(f"marey admin ({name})")
+
+
+def identifier(text: str, what: str, hint: str) -> UUID:
+    """An id that was given on the command line.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    try:
+        return UUID(text)
+    except ValueError:
+        raise InvalidInput(f"{text!r} is not the id of {what}", hint=hint) from None

@@ -1,0 +1,77 @@
+"""The audit log: who did what from which key, when. Written in the transaction of what it tells; holds no prompts."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.jobs import schema
+from shared.jobs.ids import new_id
+from shared.jobs.journal import CLOCK
+from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.tenant_types import Actor, AuditRow
+from shared.jobs.types import Page
+
+
+def audit(conn: sa.Connection, tenant: str, actor: Actor, verb: str, target: object, **data: object) -> None:
+    """Note that somebody did something.
+
+    Args:
+        verb: noun and verb: "job.cancel".
+        target: identifier of what it was done to.
+        data: what tells it apart (a count, a priority); never a prompt, never a secret.
+    """
+    conn.execute(
+        sa.insert(schema.audit_event).values(
+            id=new_id(),
+            at=CLOCK,
+            tenant_id=tenant,
+            key_id=actor.key,
+            actor=actor.name,
+            verb=verb,
+            target=str(target),
+            data={name: value for name, value in data.items() if value is not None},
+        )
+    )
+
+
+def list_audit(
+    conn: sa.Connection,
+    *,
+    tenant: str | None = None,
+    key: UUID | None = None,
+    verb: str | None = None,
+    since: datetime | None = None,
+    cursor: str | None = None,
+    limit: int = 50,
+) -> Page[AuditRow]:
+    """What was done, newest first; by one key, of one kind, in one tenant, if they are given.
+
+    Args:
+        verb: "job.cancel", or a noun: "job".
+    """
+    table = schema.audit_event.c
+    query = _rows()
+    if tenant is not None:
+        query = query.where(table.tenant_id == tenant)
+    if key is not None:
+        query = query.where(table.key_id == key)
+    if verb is not None:
+        query = query.where((table.verb == verb) | table.verb.startswith(f"{verb}.", autoescape=True))
+    if since is not None:
+        query = query.where(table.at >= since)
+    if cursor is not None:
+        query = query.where(table.id < read_cursor(cursor, UUID))
+    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([AuditRow(**row) for row in rows], limit, lambda row: str(row.id))
+
+
+def _rows() -> sa.Select[*tuple[Any, ...]]:
+    table = schema.audit_event.c
+    return sa.select(
+        *(table.id, table.at, table.tenant_id.label("tenant"), table.key_id.label("key")),
+        *(table.actor, table.verb, table.target, table.data),
+    )

@@ -1,0 +1,71 @@
+"""What tenants are to the rest: quotas and what is used of them, and who did what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from uuid import UUID
+
+
+@dataclass(frozen=True)
+class Quotas:
+    """What a tenant may have at once; None = as much as there is."""
+
+    queued: int | None = None
+    """Items that are not done yet: waiting or being made."""
+    running: int | None = None
+    """Items being made."""
+    bytes: int | None = None
+    """Of its files in the asset store, with those that are expected of its queued items."""
+    streams: int | None = None
+    """Open live streams of one key; None = `MAREY_STREAMS_PER_KEY`."""
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a tenant has, counted where it stands."""
+
+    queued: int
+    running: int
+    bytes: int
+    """Stored."""
+    expected: int
+    """Bytes that its queued items will likely leave."""
+    streams: int
+    """Open ones, of all its keys."""
+
+
+@dataclass(frozen=True)
+class TenantRow:
+    """A tenant."""
+
+    id: str
+    created: datetime
+    suspended: datetime | None
+    quotas: Quotas
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Who does something."""
+
+    name: str
+    """Of the API key, or of the person at the command line."""
+    key: UUID | None = None
+
+
+@dataclass(frozen=True)
+class AuditRow:
+    """Something that was done."""
+
+    id: UUID
+    at: datetime
+    tenant: str
+    key: UUID | None
+    actor: str
+    verb: str
+    """Noun and verb: "job.cancel"."""
+    target: str
+    """What it was done to: the identifier of a job, a key, a tenant."""
+    data: Mapping[str, object]
