@@ -94,7 +94,8 @@ class Mine:
         return json.loads(re.sub(r"<(\w+)>", lambda name: self.ids[name[1]], body))
 
     def send(self, http: httpx2.Client, method: str, template: str) -> httpx2.Response:
-        return http.request(method, self.path(template), json=self.body(f"{method} {template}"))
+        own = {"before": self.ids["evaluation"]} if template.endswith("/comparison") else None
+        return http.request(method, self.path(template), json=self.body(f"{method} {template}"), params=own)
 
     def secrets(self) -> list[str]:
         return [PROMPT, NAME, self.sha256]
@@ -126,7 +127,7 @@ def mine(place: Studio) -> Iterator[Mine]:
                 ("schedule", "/v1/schedules"), ("webhook", "/v1/webhooks"),
             )
         }  # fmt: skip
-        ids["event"] = accepted(http.post(f"/v1/webhooks/{ids['webhook']}/test"))["id"]
+        ids["event"] = accepted(http.post(f"/v1/webhooks/{ids['webhook']}/test"))["event"]
         place.work()
         motion = http.get(f"/v1/jobs/{ids['job']}/motions").json()["items"][0]
         sha256 = next(file["sha256"] for file in motion["files"] if file["format"] == "npz")
@@ -161,7 +162,7 @@ def snapshot(place: Studio, mine: Mine) -> list[object]:
     """All that its owner is told of it."""
     paths = [path for method, path in requests() if method == "GET" and "{" in path]
     with place.api.http() as owner:
-        return [(path, owner.get(mine.path(path)).text) for path in paths]
+        return [(path, mine.send(owner, "GET", path).text) for path in paths]
 
 
 def test_no_socket_shows_what_another_tenant_has(place: Studio, mine: Mine) -> None:
