@@ -113,21 +113,27 @@ class Deliverer(threading.Thread):
             del self._under_way[task]
 
     async def _deliver(self, due: DueDelivery) -> None:
+        attempt = await self._try(due)
         try:
-            body = message_of(due, self._api)
-            try:
-                headers = headers_of(due, body, self._vault.decrypt(due.secret))
-            except InvalidInput as error:
-                attempt = Attempt(None, 0.0, str(error).splitlines()[0])
-            else:
-                attempt = await self._sender.send(due.url, headers, body)
             state = await self._blocking(lambda: self._record(due, attempt))
         except Unreachable as error:
             log.warning("webhook_not_recorded", event_id=str(due.event), error=error.message)  # told again, later
         except Exception:
-            log.exception("webhook_failed", event_id=str(due.event))
+            log.exception("webhook_not_recorded", event_id=str(due.event))
         else:
             _note(due, attempt, state)
+
+    async def _try(self, due: DueDelivery) -> Attempt:
+        try:
+            body = message_of(due, self._api)
+            headers = headers_of(due, body, self._vault.decrypt(due.secret))
+            return await self._sender.send(due.url, headers, body)
+        except InvalidInput as error:
+            return Attempt(None, 0.0, str(error).splitlines()[0])
+        except Exception:
+            # It counts as a try: one that trips us up must not be tried every minute for ever.
+            log.exception("webhook_failed", event_id=str(due.event))
+            return Attempt(None, 0.0, "an internal error; the scheduler's log has its traceback")
 
     # --- in threads: the database is synchronous ---
 

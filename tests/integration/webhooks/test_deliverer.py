@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from services.scheduler.webhooks import EACH, Deliverer
 from shared.errors import InvalidInput
 from shared.jobs import (
     DEFAULT_TENANT,
+    Attempt,
     DeliveryState,
     cancel,
     claim_deliveries,
@@ -49,10 +50,10 @@ def receiver() -> Iterator[Receiver]:
 
 
 @contextmanager
-def delivering(engine: sa.Engine, *, vault: Vault = VAULT, seconds: float = 30) -> Iterator[Deliverer]:
+def delivering(engine: sa.Engine, *, vault: Vault = VAULT, sender: Sender | None = None) -> Iterator[Deliverer]:
     """A deliverer until the end of the block."""
     stopping = threading.Event()
-    sender = Sender(Allowed.of(LOOPBACK), seconds=seconds)
+    sender = sender or Sender(Allowed.of(LOOPBACK), seconds=60)
     thread = Deliverer(engine, vault, sender, api=API, interval=0.02, stopping=stopping)
     thread.start()
     try:
@@ -178,6 +179,22 @@ def test_a_secret_that_does_not_open_is_told_in_the_log_and_nothing_is_sent(
         wait(lambda: deliveries(engine, webhook)[0].state is DeliveryState.FAILED)
     assert errors(engine, webhook, sent.event) == ["MAREY_WEBHOOK_KEY: does not open this webhook's secret"]
     assert receiver.received == []
+
+
+class Tripping(Sender):
+    """A sender with a bug."""
+
+    async def send(self, url: str, headers: Mapping[str, str], body: bytes) -> Attempt:
+        raise ZeroDivisionError(url)
+
+
+def test_a_bug_costs_a_try_and_holds_up_nobody(engine: sa.Engine) -> None:
+    webhook = new_webhook(engine)
+    happen(engine)
+    with delivering(engine, sender=Tripping(Allowed.of([]))):
+        wait(lambda: deliveries(engine, webhook)[0].attempts == 1)
+    (row,) = deliveries(engine, webhook)
+    assert (row.state, "internal error" in (row.error or "")) == (DeliveryState.PENDING, True)
 
 
 # --- the process ---
