@@ -41,19 +41,24 @@ MAX_ERROR = 300
 KEPT = 30 * 86_400.0
 """Seconds for which events are kept, delivered or not."""
 
-# From each webhook a few, so that one with thousands does not stand before all others.
+# From each webhook a few, so that one with thousands does not stand before all others. Locked are those alone that are
+# taken; one that somebody else took since the first look is no longer due in the second.
 CLAIM = sa.text("""
-    WITH picked AS MATERIALIZED (
+    WITH wanted AS MATERIALIZED (
         SELECT due.webhook_id, due.event_id
         FROM webhook
         LEFT JOIN unnest(CAST(:busy AS uuid[]), CAST(:counts AS int[])) AS busy (id, count) ON busy.id = webhook.id
         CROSS JOIN LATERAL (
             SELECT webhook_id, event_id, next_at FROM webhook_delivery
             WHERE webhook_id = webhook.id AND state = 'pending' AND next_at <= now()
-            ORDER BY next_at LIMIT greatest(0, :each - coalesce(busy.count, 0)) FOR UPDATE SKIP LOCKED
+            ORDER BY next_at LIMIT greatest(0, :each - coalesce(busy.count, 0))
         ) AS due
         WHERE NOT webhook.paused
         ORDER BY due.next_at LIMIT :limit
+    ), picked AS MATERIALIZED (
+        SELECT webhook_id, event_id FROM webhook_delivery JOIN wanted USING (webhook_id, event_id)
+        WHERE state = 'pending' AND next_at <= now()
+        FOR UPDATE OF webhook_delivery SKIP LOCKED
     ), claimed AS (
         UPDATE webhook_delivery AS delivery
         SET claim = :claim, next_at = clock_timestamp() + make_interval(secs => :hold)

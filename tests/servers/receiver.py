@@ -41,12 +41,14 @@ class Receiver:
         answer: what to do with a request once it is noted; 200 unless it is changed.
         received: every request, in order.
         released: set at the end; who hangs waits for it.
+        written: bytes of an endless answer.
     """
 
     def __init__(self, *, tls: ssl.SSLContext | None = None) -> None:
         self.answer: Callable[[Receiver, BaseHTTPRequestHandler, Received], None] = status(200)
         self.received: list[Received] = []
         self.released = threading.Event()
+        self.written = 0
         self.scheme = "http" if tls is None else "https"
         self._noted = threading.Condition()
         receiver = self
@@ -142,6 +144,7 @@ def endless(receiver: Receiver, handler: BaseHTTPRequestHandler, _request: Recei
         if receiver.released.is_set():
             return
         handler.wfile.write(bytes(2**20))
+        receiver.written += 2**20
 
 
 def stalling(receiver: Receiver, handler: BaseHTTPRequestHandler, _request: Received) -> None:
