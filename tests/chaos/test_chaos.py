@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import shutil
 import threading
@@ -20,12 +21,17 @@ from shared.jobs.schema import item, lease
 from shared.storage import FolderStore
 from shared.storage.port import AssetStore
 from tests.chaos.driver import Cluster
+from tests.servers.receiver import LOOPBACK, Receiver
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.support.toy_jobs import audit, ended, job_row, states, submit_toys
+from tests.support.webhooks import KEY, deliveries, new_webhook, told
 
 PRODUCT_TIMES: dict[str, str] = {}
 SHORT_TIMES = {"MAREY_LEASE_SECONDS": "3", "MAREY_HEARTBEAT_SECONDS": "0.5", "MAREY_SWEEP_SECONDS": "0.5"}
 """A third of the product's: a prompt that kills its worker takes four leases to end."""
+
+
+WEBHOOKS = {"MAREY_WEBHOOK_KEY": KEY, "MAREY_WEBHOOK_ALLOW": json.dumps(LOOPBACK)}
 
 
 @dataclass
@@ -105,6 +111,13 @@ def stage(short_home: Path) -> Iterator[Stage]:
         cluster.__exit__()
 
 
+@pytest.fixture
+def receiver() -> Iterator[Receiver]:
+    """Who is told by webhook."""
+    with Receiver() as made:
+        yield made
+
+
 def prompts(count: int, *deeds: str) -> list[str]:
     """`count` harmless prompts with these in their midst."""
     walks = [f"walk {n}" for n in range(count - len(deeds))]
@@ -140,10 +153,11 @@ def working(cluster: Cluster, name: str) -> Callable[[], bool]:
     return holds
 
 
-def test_every_item_ends_once_whatever_is_killed(stage: Stage, tmp_path: Path) -> None:
+def test_every_item_ends_once_whatever_is_killed(stage: Stage, receiver: Receiver, tmp_path: Path) -> None:
     """The short seed: two workers, 40 items; a toxic prompt and each fault once."""
     disk = Folder(tmp_path / "assets")
-    cluster = stage({**SHORT_TIMES, **disk.environment})
+    cluster = stage({**SHORT_TIMES, **disk.environment, **WEBHOOKS})
+    webhook = new_webhook(cluster.engine, receiver.url())
     job = submit_toys(cluster.engine, prompts(40, "kill the worker"), steps=8, step_seconds=0.1)
     cluster.wait(working(cluster, "worker-0"), "worker-0 works")
     cluster.kill_child("worker-0")
@@ -158,6 +172,9 @@ def test_every_item_ends_once_whatever_is_killed(stage: Stage, tmp_path: Path) -
     assert found.pop("dead") == ["kill the worker"]
     assert len(found.pop("succeeded")) == 39
     assert not found
+    cluster.wait(lambda: deliveries(cluster.engine, webhook)[0].state == "delivered", "the webhook is told")
+    assert told(cluster.engine, webhook) == [("job.ended", "partial")]
+    assert {request.id for request in receiver.received} == {str(deliveries(cluster.engine, webhook)[0].event)}
 
 
 @pytest.mark.slow

@@ -40,6 +40,7 @@ from shared.jobs import (
 )
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, let_expire, make_due, motion_of, new_item, submit_items
+from tests.support.webhooks import new_webhook
 
 VERBS = {"pause": pause, "resume": resume, "cancel": cancel, "retry": retry}
 PROMPTS = st.sampled_from(["walk", "run", "jump", "wave"])
@@ -56,7 +57,8 @@ class Jobs(RuleBasedStateMachine):
         super().__init__()
         self.succeeded: dict[UUID, UUID] = {}
         with self.engine.begin() as conn:
-            conn.execute(sa.text("TRUNCATE job, lease, asset, text_features CASCADE"))
+            conn.execute(sa.text("TRUNCATE job, lease, asset, text_features, webhook, webhook_event CASCADE"))
+        new_webhook(self.engine)
 
     @rule(
         target=jobs,

@@ -74,6 +74,16 @@ CHECKS = {
         SELECT job.id, job.state, job_event.data FROM job JOIN job_event ON job_event.job_id = job.id
         WHERE seq = event_seq AND job_event.data ->> 'state' <> job.state
     """,
+    "a webhook is not told each end and pause of a job once": """
+        SELECT webhook.id, job.id FROM webhook JOIN job USING (tenant_id)
+        WHERE webhook.events @> ARRAY['job.ended', 'job.paused'] AND webhook.created_at < job.created_at
+          AND ARRAY(SELECT data ->> 'to' FROM job_event WHERE job_event.job_id = job.id AND kind = 'state'
+                    AND data ->> 'to' NOT IN ('queued', 'running') ORDER BY seq)
+            <> ARRAY(SELECT event.data ->> 'state' FROM webhook_event AS event
+                     JOIN webhook_delivery AS delivery ON delivery.event_id = event.id
+                     WHERE delivery.webhook_id = webhook.id AND event.data ->> 'job' = job.id::text
+                       AND event.kind LIKE 'job.%' ORDER BY event.id)
+    """,
     "a job has ended without its time, or runs with one": """
         SELECT id, state, finished_at FROM job WHERE (finished_at IS NULL) <> (ready + leased > 0)
     """,
