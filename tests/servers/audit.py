@@ -41,6 +41,10 @@ CHECKS = {
         WHERE item.queue <> 'evaluator' GROUP BY
           item.id HAVING count(motion.id) <> CASE WHEN item.state = 'succeeded' THEN 1 ELSE 0 END
     """,
+    "a tenant has more queued or running than it may": """
+        SELECT tenant.id, sum(job.ready + job.leased), sum(job.leased) FROM tenant JOIN job ON job.tenant_id = tenant.id
+        GROUP BY tenant.id HAVING sum(job.ready + job.leased) > max_queued OR sum(job.leased) > max_running
+    """,
     "a motion's file is not stored": """
         SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
         WHERE asset.state <> 'stored'
