@@ -9,7 +9,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
 """
 
 from shared.jobs.audit import audit, list_audit
-from shared.jobs.claim import claim, heartbeat, load_texts, waiting_batches, waiting_items
+from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches, waiting_items
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
@@ -292,6 +292,7 @@ __all__ = [
     "get_webhook",
     "give_back_deliveries",
     "heartbeat",
+    "leased_items",
     "list_audit",
     "list_deliveries",
     "list_evaluations",

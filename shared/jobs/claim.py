@@ -158,8 +158,13 @@ def heartbeat(
     renewed = conn.execute(sa.update(schema.lease).where(table.token == lease_token).values(renewal))
     if renewed.rowcount == 0:
         return Heartbeat(lost=True, gone=frozenset(open_items))
-    held = set(conn.execute(sa.select(schema.item.c.id).where(schema.item.c.lease_token == lease_token)).scalars())
-    return Heartbeat(lost=False, gone=frozenset(open_items) - held)
+    return Heartbeat(lost=False, gone=frozenset(open_items) - leased_items(conn, lease_token))
+
+
+def leased_items(conn: sa.Connection, lease_token: UUID) -> frozenset[UUID]:
+    """The items that a lease holds; none once it is gone."""
+    table = schema.item.c
+    return frozenset(conn.execute(sa.select(table.id).where(table.lease_token == lease_token)).scalars())
 
 
 def load_texts(conn: sa.Connection, keys: Sequence[str]) -> dict[str, bytes]:

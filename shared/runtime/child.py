@@ -16,7 +16,7 @@ from uuid import UUID
 
 from shared.errors import InvalidInput, Unreachable
 from shared.jobs import Heartbeat as Answer
-from shared.jobs import WorkerBeat, beat, create_engine, heartbeat, retire, transaction
+from shared.jobs import WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
 from shared.runtime.committer import Committer
 from shared.runtime.faults import patiently
 from shared.runtime.handler import Handler, HandlerFactory, Role
@@ -68,7 +68,11 @@ class Child:
         self._ready = False
         self._ticked = time.monotonic()
         self._heartbeat = Heartbeat(
-            self._renew, interval=chosen.heartbeat_seconds, stopping=self._stopping, present=self._present
+            self._renew,
+            interval=chosen.heartbeat_seconds,
+            stopping=self._stopping,
+            present=self._present,
+            held_by=self._held_by,
         )
         store = open_store(chosen)
         self._committer = Committer(self._engine, store, self._heartbeat, self._stopping)
@@ -140,6 +144,10 @@ class Child:
     def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
         with transaction(self._beats) as conn:
             return heartbeat(conn, token, items, progressed=progressed)
+
+    def _held_by(self, token: UUID) -> frozenset[UUID]:
+        with transaction(self._beats) as conn:
+            return leased_items(conn, token)
 
     def _tell_status(self) -> None:
         age = time.monotonic() - self._ticked

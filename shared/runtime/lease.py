@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Collection, Iterable
 from uuid import UUID
 
@@ -12,6 +13,8 @@ from shared.jobs import Heartbeat as Answer
 from shared.runtime.logs import logger
 
 log = logger(__name__)
+
+LOOK_SECONDS = 1.0
 
 Renew = Callable[[UUID, Collection[UUID], bool], Answer]
 """Renews one lease in the database: its token, its open items, whether it progressed. Raises `Unreachable`."""
@@ -71,7 +74,8 @@ class HeldLease:
 
 
 class Heartbeat(threading.Thread):
-    """Renews every held lease each `interval` seconds, on its own connection.
+    """Renews every held lease each `interval` seconds, on its own connection, and looks each second in between whether
+    something was taken away: what is cancelled leaves the batch within two seconds, a step of decoding included.
 
     A batch that is silent for too long is not renewed: the database measures that, by its own clock. While the database
     is away nothing is given up here: the fence decides at the commit.
@@ -84,11 +88,16 @@ class Heartbeat(threading.Thread):
         interval: float,
         stopping: threading.Event,
         present: Callable[[], None] = lambda: None,
+        held_by: Callable[[UUID], frozenset[UUID]] | None = None,
+        look_seconds: float = LOOK_SECONDS,
     ) -> None:
-        """`present`, called after each round, says that this worker lives. Raises `Unreachable` at most."""
+        """`present`, called after each round, says that this worker lives; `held_by` reads the items of a lease. Both
+        raise `Unreachable` at most."""
         super().__init__(name="heartbeat", daemon=True)
         self._renew = renew
         self._present = present
+        self._held_by = held_by
+        self._look_seconds = look_seconds
         self._interval = interval
         self._stopping = stopping
         self._held: dict[UUID, HeldLease] = {}
@@ -105,7 +114,11 @@ class Heartbeat(threading.Thread):
         self._held.pop(lease.claim.lease_token, None)
 
     def run(self) -> None:
-        while not self._closed.wait(self._interval):
+        due = time.monotonic() + self._interval
+        while not self._closed.wait(self._pause(due)):
+            if time.monotonic() < due:
+                self.look()
+                continue
             self.beat()
             try:
                 self._present()
@@ -113,10 +126,33 @@ class Heartbeat(threading.Thread):
                 log.warning("presence_failed", error=error.message)
             except Exception:
                 log.exception("presence_failed")  # without this thread every lease here would run out
+            due = time.monotonic() + self._interval
 
     def close(self) -> None:
         """End the thread; leases still held run out by themselves."""
         self._closed.set()
+
+    def _pause(self, due: float) -> float:
+        """Seconds until there is something to do."""
+        left = max(due - time.monotonic(), 0.0)
+        return left if self._held_by is None else min(left, self._look_seconds)
+
+    def look(self) -> None:
+        """Learn what was taken away, without renewing anything. Outages are the heartbeat's to tell of."""
+        if self._held_by is None:
+            return
+        for token, lease in list(self._held.items()):
+            items = lease.open
+            if not items:
+                continue
+            try:
+                held = self._held_by(token)
+            except Unreachable:
+                continue
+            except Exception:
+                log.exception("look_failed")
+                continue
+            lease.learn(Answer(lost=False, gone=items - held))
 
     def beat(self) -> None:
         """Renew each lease once."""

@@ -27,6 +27,7 @@ from shared.jobs import (
     transaction,
 )
 from shared.runtime.embedded import EmbeddedServer
+from tests.support.command import Command
 from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
 from tests.support.live_streams import BUNDLE as STREAMER
@@ -269,6 +270,20 @@ def test_an_operator_says_why_and_the_events_tell_it(place: Studio) -> None:
     assert [(verb, "retry it" in data) for verb, _, target, data in audited(place) if target == job][2:4] == [
         ("job.retry", True), ("job.cancel", False),
     ]  # fmt: skip
+
+
+def test_the_command_line_has_the_same_verbs_with_their_reasons(place: Studio) -> None:
+    marey = Command({"MAREY_SERVER": place.api.url, "MAREY_KEY": place.api.key})
+    with place.api.http() as http:
+        job = accepted(http.post("/v1/jobs", json=BODIES["POST /v1/jobs"]))["id"]
+        for verb in ("pause", "resume", "cancel", "retry"):
+            marey("jobs", verb, job, "--reason", f"{verb} it").ok()
+        marey("jobs", "priority", job, "--", -7).ok()
+        assert json.loads(marey("jobs", "comment", job, "for Monday", "--json").ok().out)["priority"] == -7
+        events = [event for event in http.get(f"/v1/jobs/{job}/events").json()["items"] if event["kind"] != "state"]
+        told = ["pause it", "resume it", "cancel it", "retry it", "priority set to -7", "for Monday"]
+        assert [event["reason"] for event in events[1:]] == told
+        marey("jobs", "cancel", job).ok()
 
 
 # --- quotas and suspension over HTTP ---

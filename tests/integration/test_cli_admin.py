@@ -9,13 +9,12 @@ from typing import Any
 
 import pytest
 import sqlalchemy as sa
-from typer.testing import CliRunner
 
-from services.cli.main import app
 from shared.errors import Unauthenticated
 from shared.jobs import authenticate, transaction
 from shared.settings import settings
 from tests.servers.jobs import submit_items
+from tests.support.command import Command
 from tests.support.marey import Ran
 
 
@@ -24,10 +23,7 @@ class Admin:
 
     def __call__(self, *arguments: object) -> Ran:
         """Run `marey admin …` to its end."""
-        done = CliRunner().invoke(app, ["admin", *map(str, arguments)])
-        if done.exception is not None and not isinstance(done.exception, SystemExit):
-            raise done.exception
-        return Ran(done.exit_code, done.stdout, done.stderr)
+        return Command({})("admin", *arguments)
 
     def json(self, *arguments: object) -> list[dict[str, Any]]:
         """What a command gives as JSON lines."""

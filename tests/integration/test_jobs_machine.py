@@ -17,7 +17,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from shared.errors import Conflict, NotFound
+from shared.errors import Conflict, NotFound, QuotaUsedUp
 from shared.jobs import (
     Claim,
     Committed,
@@ -35,6 +35,7 @@ from shared.jobs import (
     release,
     resume,
     retry,
+    set_quotas,
     sweep,
     transaction,
 )
@@ -59,6 +60,8 @@ class Jobs(RuleBasedStateMachine):
         with self.engine.begin() as conn:
             conn.execute(sa.text("TRUNCATE job, lease, asset, text_features, webhook, webhook_event CASCADE"))
         new_webhook(self.engine)
+        with transaction(self.engine) as conn:
+            set_quotas(conn, "default", {"queued": 12, "running": 4})
 
     @rule(
         target=jobs,
@@ -66,9 +69,12 @@ class Jobs(RuleBasedStateMachine):
         bundles=st.integers(1, 2),
         fail_early=st.sampled_from([None, None, 0.0, 0.5]),
     )
-    def submit(self, prompts: list[str], bundles: int, fail_early: float | None) -> UUID:
+    def submit(self, prompts: list[str], bundles: int, fail_early: float | None):
         items = [new_item(n, prompt, bundle=f"{n % bundles}@0") for n, prompt in enumerate(prompts)]
-        return submit_items(self.engine, items, fail_early=fail_early)
+        try:
+            return submit_items(self.engine, items, fail_early=fail_early)
+        except QuotaUsedUp:
+            return multiple()
 
     @rule(target=claims, queue=st.sampled_from(["text", "hgm3"]), limit=st.integers(1, 4), loaded=st.booleans())
     def claim(self, queue: str, limit: int, loaded: bool):
@@ -126,7 +132,7 @@ class Jobs(RuleBasedStateMachine):
         try:
             with transaction(self.engine) as conn:
                 VERBS[verb](conn, "default", job)
-        except (Conflict, NotFound):
+        except (Conflict, NotFound, QuotaUsedUp):
             pass
 
     @rule(job=consumes(jobs))

@@ -15,6 +15,8 @@ Job = Annotated[str, typer.Argument(metavar="JOB", help="The job's id.")]
 Jobs = Annotated[list[str], typer.Argument(metavar="JOB…", help="Ids of jobs.")]
 Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
 
+Reason = Annotated[str | None, typer.Option("--reason", help="Why; it stands in the job's events.")]
+
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
@@ -85,31 +87,52 @@ def wait(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> No
 
 
 @app.command()
-def pause(jobs: Jobs, as_json: console.Json = False) -> None:
+def pause(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Stop giving out items of jobs; those being made are finished."""
-    _act(jobs, "pause", as_json)
+    _act(jobs, "pause", as_json, reason=reason)
 
 
 @app.command()
-def resume(jobs: Jobs, as_json: console.Json = False) -> None:
+def resume(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Go on with paused jobs."""
-    _act(jobs, "resume", as_json)
+    _act(jobs, "resume", as_json, reason=reason)
 
 
 @app.command()
-def cancel(jobs: Jobs, as_json: console.Json = False) -> None:
+def cancel(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
     """Cancel what is not done yet; what is done stays."""
-    _act(jobs, "cancel", as_json)
+    _act(jobs, "cancel", as_json, reason=reason)
 
 
 @app.command()
 def retry(
     jobs: Jobs,
     failed_only: Annotated[bool, typer.Option("--failed-only", help="Leave cancelled items as they are.")] = False,
+    reason: Reason = None,
     as_json: console.Json = False,
 ) -> None:
     """Try failed, dead and cancelled items again."""
-    _act(jobs, "retry", as_json, failed_only=failed_only or None)
+    _act(jobs, "retry", as_json, failed_only=failed_only or None, reason=reason)
+
+
+@app.command()
+def priority(
+    job: Job,
+    value: Annotated[int, typer.Argument(metavar="PRIORITY", help="-1000 to 1000; higher runs first. `-- -5` is -5.")],
+    as_json: console.Json = False,
+) -> None:
+    """Order a job among yours."""
+    _change(job, {"priority": value}, as_json)
+
+
+@app.command()
+def comment(
+    job: Job,
+    text: Annotated[str, typer.Argument(metavar="TEXT", help="Empty removes the one that stands there.")],
+    as_json: console.Json = False,
+) -> None:
+    """Write a comment on a job."""
+    _change(job, {"comment": text or None}, as_json)
 
 
 @app.command()
@@ -146,6 +169,17 @@ def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
                 console.result_json(found)
             else:
                 console.say(f"{job} {found['state']}")
+
+
+def _change(job: str, patch: dict[str, Any], as_json: bool) -> None:
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.patch(f"/v1/jobs/{job}", patch)
+    if as_json:
+        console.result_json(found)
+    else:
+        console.say(f"{job}: priority {found['priority']}" + (f", {found['comment']}" if found["comment"] else ""))
 
 
 def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:

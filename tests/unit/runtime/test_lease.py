@@ -117,3 +117,34 @@ def test_a_worker_told_to_stop_wants_no_more_results() -> None:
     stopping.set()
     assert len(lease.dropped()) == 2
     assert not lease.lost  # what is finished is still written
+
+
+def test_what_is_taken_away_between_two_heartbeats_is_dropped_without_a_renewal(database: Database) -> None:
+    """The heart beats in a minute; the look in between comes within a hundredth of a second."""
+    claim, looked = make_claim(2), threading.Event()
+    kept = claim.items[0].id
+
+    def held_by(token: UUID) -> frozenset[UUID]:
+        assert token == claim.lease_token
+        looked.set()
+        return frozenset({kept})
+
+    heart = Heartbeat(database.renew, interval=60.0, stopping=threading.Event(), held_by=held_by, look_seconds=0.01)
+    lease = heart.hold(claim)
+    heart.start()
+    assert looked.wait(30)
+    heart.close()
+    heart.join(30)
+    assert lease.dropped() == {claim.items[1].id}
+    assert database.asked == []
+
+
+def test_an_outage_between_two_heartbeats_takes_nothing_away(database: Database) -> None:
+    def away(_token: UUID) -> frozenset[UUID]:
+        raise Unreachable("gone")
+
+    heart = Heartbeat(database.renew, interval=60.0, stopping=threading.Event(), held_by=away)
+    lease = heart.hold(make_claim(2))
+    heart.look()
+    assert lease.dropped() == frozenset()
+    assert len(lease.open) == 2
