@@ -107,6 +107,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
         yield
     finally:
         tailer.stop()
+        app.state.context.rates.close()
         if hub is not None:
             hub.close()
         engine.dispose()

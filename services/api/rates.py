@@ -39,10 +39,10 @@ class Rates:
 
     def __init__(self, config: Settings) -> None:
         self._rates = {kind: read_rate(text, where=kind) for kind, text in config.rates.items()}
-        self._limiter = None
+        self._client = self._limiter = None
         if config.queue_url is not None:
             url = config.queue_url.get_secret_value()
-            client = redis_client(f"{url}{'&' if '?' in url else '?'}{OPTIONS}")
+            client = self._client = redis_client(f"{url}{'&' if '?' in url else '?'}{OPTIONS}")
             client.set_retry(Retry(NoBackoff(), 1))  # once more, at once, for a connection that went stale
             pool = client.connection_pool
             storage = RedisStorage("redis://", connection_pool=pool, key_prefix=PREFIX, wrap_exceptions=True)
@@ -77,6 +77,11 @@ class Rates:
                 hint="Send it again after the seconds of `Retry-After`.",
                 seconds=max(math.ceil(seconds), 1),
             )
+
+    def close(self) -> None:
+        """Give the connections back."""
+        if self._client is not None:
+            self._client.close()
 
     def _rate(self, key: ApiKey, kind: str) -> Rate | None:
         own = key.rates.get(kind)
