@@ -72,5 +72,13 @@ def home_relative(path: str | os.PathLike[str]) -> str:
     return os.path.relpath(text) if not os.path.relpath(text).startswith("..") else text
 
 
+def length_of_time(seconds: float) -> str:
+    """`45 s`, `12 min`, `3 h 20 min`."""
+    if seconds < 90:
+        return f"{max(round(seconds), 1)} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
 def _cell(value: object) -> str:
     return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value).replace("\n", " ")

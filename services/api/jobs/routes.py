@@ -15,6 +15,7 @@ from services.api.auth import Operator, Reader, Submitter
 from services.api.context import Connection, Context, Shared
 from services.api.guards import limit_of_submit, read_body
 from services.api.jobs import service
+from services.api.jobs.estimates import EstimateView, QueueView
 from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
 from services.api.jobs.schemas import (
     CheckedView,
@@ -100,8 +101,7 @@ async def submit_job(
     }
     submission = await run_in_threadpool(_read, kind, body, fields, shared)
     if validate_only:
-        checked = CheckedView(valid=True, items=submission.count, bundles=submission.bundles)
-        return JSONResponse(checked.model_dump(mode="json"))
+        return await run_in_threadpool(_check, shared, submission)
     sha256 = service.request_sha256(str(request.url.query), body)
     return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
 
@@ -114,6 +114,21 @@ def _read(kind: str, body: bytes, fields: dict[str, Any], shared: Context) -> se
     raise InvalidInput(
         f"{kind[:60]!r} is not a kind of body this takes", where="Content-Type", hint=f"{JSON} or {NDJSON}."
     )
+
+
+def _check(shared: Context, submission: service.Submission) -> JSONResponse:
+    by_bundle = submission.by_bundle
+    with jobs.transaction(shared.engine) as conn:
+        estimate = jobs.estimate(conn, by_bundle)
+        waiting = jobs.waiting_items(conn)
+    checked = CheckedView(
+        valid=True,
+        items=submission.count,
+        bundles=submission.bundles,
+        estimate=EstimateView.of(estimate),
+        waiting=sum(waiting.get(queue, 0) for queue in {jobs.TEXT_QUEUE, *(model for model, _ in by_bundle)}),
+    )
+    return JSONResponse(checked.model_dump(mode="json"))
 
 
 def _write(
@@ -155,6 +170,12 @@ def list_jobs(
 def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
     """One job."""
     return JobView.of(jobs.get_job(conn, key.tenant, job))
+
+
+@router.get("/{job}/queue")
+def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
+    """What comes before the job's items, and when it may be done: from what was measured here, or no number."""
+    return QueueView.of(jobs.place_of(conn, key.tenant, job))
 
 
 @router.patch("/{job}")

@@ -8,6 +8,7 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
 from services.api.schemas import View
 from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
@@ -69,6 +70,8 @@ class CheckedView(View):
     items: int
     """Motions that would be made."""
     bundles: list[str]
+    estimate: EstimateView
+    waiting: int = Field(description="Items that wait for the same models now, or to be read, whoever's.")
 
 
 class CountersView(View):

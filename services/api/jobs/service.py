@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -38,6 +39,14 @@ class Submission:
     def bundles(self) -> list[str]:
         """Exact bundles, each once."""
         return sorted({offer.bundle.reference for offer in self.offers})
+
+    @property
+    def by_bundle(self) -> Counter[tuple[str, str]]:
+        """Motions by model and exact bundle."""
+        counts: Counter[tuple[str, str]] = Counter()
+        for item, offer in zip(self.items, self.offers, strict=True):
+            counts[offer.bundle.manifest.model, offer.bundle.reference] += item.variants
+        return counts
 
     def new_items(self) -> Iterator[NewItem]:
         """One row a motion."""

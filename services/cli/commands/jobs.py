@@ -17,6 +17,9 @@ Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wai
 
 Reason = Annotated[str | None, typer.Option("--reason", help="Why; it stands in the job's events.")]
 
+FIELDS = (
+    *("id", "name", "comment", "state", "control", "priority", "created", "started", "finished", "expires", "erased"),
+)
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
@@ -61,14 +64,17 @@ def show(job: Job, as_json: console.Json = False) -> None:
 
     with Client.here() as client:
         found = client.get(f"/v1/jobs/{job}")
+        place = client.get(f"/v1/jobs/{job}/queue")
         if as_json:
-            console.result_json(found)
+            console.result_json({**found, "queue": place})
             return
-        for field in ("id", "name", "comment", "state", "control", "priority", "created", "started", "finished"):
+        for field in FIELDS:
             if found[field] is not None:
                 console.result(f"{field:<10} {found[field]}")
         counts = ", ".join(f"{found['counters'][name]} {name}" for name in COUNTERS if found["counters"][name])
         console.result(f"{'items':<10} {found['total']}: {counts}")
+        if found["counters"]["ready"] + found["counters"]["leased"]:
+            _show_place(place)
         for state in ("failed", "dead"):
             if found["counters"][state]:
                 _show_failures(client, job, state)
@@ -191,6 +197,15 @@ def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:
             console.result(f"{'':<10} {error['hint']}")
     if page.get("next"):
         console.result(f"{'':<10} … and more: `marey fetch {job} --json` has a line for each")
+
+
+def _show_place(place: dict[str, Any]) -> None:
+    ahead = f"{place['items_ahead']} items of {place['jobs_ahead']} jobs come first"
+    turns = f"; {place['tenants'] - 1} other tenants take turns" if place["tenants"] > 1 else ""
+    console.result(f"{'queue':<10} {ahead}{turns}")
+    if place["seconds"] is not None:
+        console.result(f"{'left':<10} about {console.length_of_time(place['seconds'])}")
+    console.result(f"{'':<10} {place['estimate']['basis']}")
 
 
 def _done(job: dict[str, Any]) -> int:

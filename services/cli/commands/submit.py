@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -60,7 +60,7 @@ def submit(
             keep_days=keep_days,
         )
         if dry_run:
-            console.say(f"{job['items']} motions would be made; nothing was submitted.")
+            _tell_dry_run(job)
             if as_json:
                 console.result_json(job)
             return
@@ -71,6 +71,17 @@ def submit(
         if not watch and fetch is None:
             return
         _follow(client, job["id"], fetch, formats, timeout, as_json)
+
+
+def _tell_dry_run(checked: dict[str, Any]) -> None:
+    console.say(
+        f"{checked['items']} motions would be made, with {', '.join(checked['bundles'])}; nothing was submitted."
+    )
+    estimate = checked["estimate"]
+    if estimate["seconds"] is not None:
+        behind = f", behind {checked['waiting']} that wait now" if checked["waiting"] else ""
+        console.say(f"That takes about {console.length_of_time(estimate['seconds'])}{behind}.")
+    console.say(estimate["basis"])
 
 
 def read_prompts(prompts: list[str] | None, file: str | None, input_format: options.InputFormat | None) -> list[Item]:

@@ -1,0 +1,84 @@
+"""How long things take, as the API tells it: each number with where it comes from."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from pydantic import Field
+
+from services.api.schemas import View
+from shared.jobs import Estimate, JobState, QueuePlace, Speed
+
+
+class SpeedView(View):
+    """What was measured of a bundle on this platform."""
+
+    bundle: str
+    motions: int = Field(description="How many it was measured on, of the last 2,000 that were made.")
+    seconds: float = Field(description="Of a worker for one motion, without reading the prompt and writing the files.")
+    since: datetime
+    until: datetime
+
+    @classmethod
+    def of(cls, row: Speed) -> SpeedView:
+        """From a row."""
+        return cls(**vars(row))
+
+
+class EstimateView(View):
+    """How long motions take once it is their turn."""
+
+    items: int
+    seconds: float | None = Field(description="Null = there is no measure of some bundle.")
+    workers: dict[str, int] = Field(description="Those that live, by model; where none does, one is reckoned with.")
+    speeds: list[SpeedView]
+    unmeasured: list[str] = Field(description="Bundles with which none of the last motions was made.")
+    basis: str = Field(description="Where the number comes from, or why there is none, for a person.")
+
+    @classmethod
+    def of(cls, row: Estimate) -> EstimateView:
+        """From a row."""
+        return cls(
+            items=row.items,
+            seconds=row.seconds,
+            workers=dict(row.workers),
+            speeds=[SpeedView.of(speed) for speed in row.speeds],
+            unmeasured=list(row.unmeasured),
+            basis=basis_of(row),
+        )
+
+
+class QueueView(View):
+    """Where a job stands in the queue."""
+
+    state: JobState
+    jobs_ahead: int = Field(description="Of the same tenant, with items that wait: of higher priority, or older.")
+    items_ahead: int
+    tenants: int = Field(description="Who wait for the same workers, this one too: they take turns.")
+    seconds: float | None = Field(description="Until it is done; null = ended, paused or not measured.")
+    estimate: EstimateView = Field(description="Of its own open items.")
+
+    @classmethod
+    def of(cls, row: QueuePlace) -> QueueView:
+        """From a row."""
+        own = {name: value for name, value in vars(row).items() if name != "estimate"}
+        return cls(estimate=EstimateView.of(row.estimate), **own)
+
+
+def basis_of(row: Estimate) -> str:
+    """Where an estimate comes from, or why there is none."""
+    if row.unmeasured:
+        names = ", ".join(row.unmeasured)
+        return f"no estimate: none of the last motions made here was made with {names}"
+    if not row.speeds:
+        return "nothing is left to make"
+    parts = [
+        f"{speed.seconds:.3g} s a motion, measured on the last {speed.motions} of {speed.bundle} "
+        f"({speed.since:%Y-%m-%d %H:%M} to {speed.until:%Y-%m-%d %H:%M} UTC)"
+        for speed in row.speeds
+    ]
+    workers = [
+        f"{count} {name} workers" if count else f"no {name} worker lives: one reckoned"
+        for name, count in row.workers.items()
+    ]
+    return "; ".join((*parts, *workers))

@@ -1,0 +1,110 @@
+"""How long it will take: from what this platform measured of the same bundles, or no number at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.jobs import schema
+from shared.jobs.listings import get_job
+from shared.jobs.states import ENDED, OPEN, JobControl
+from shared.jobs.types import TEXT_QUEUE, Estimate, QueuePlace, Speed
+from shared.jobs.workers import live_workers
+
+MEASURED = 2000
+"""The last motions that were made, whoever's: a bundle that is not among them has no measure."""
+
+SPEEDS = sa.text("""
+    WITH recent AS (SELECT item_id, elapsed, created_at FROM motion ORDER BY id DESC LIMIT :measured)
+    SELECT item.bundle, count(*) AS motions, avg(recent.elapsed) AS seconds, min(recent.created_at) AS since,
+           max(recent.created_at) AS until
+    FROM recent JOIN item ON item.id = recent.item_id
+    WHERE item.bundle = ANY(:bundles)
+    GROUP BY item.bundle ORDER BY item.bundle
+""")
+
+# In the order of a claim, with equal shares: within the tenant priority, then age; other tenants take turns with it.
+AHEAD = sa.text("""
+    WITH ours AS (SELECT id, tenant_id, priority, created_at FROM job WHERE id = :job),
+    waiting AS (
+        SELECT job.id, job.tenant_id, job.priority, job.created_at, sum(lane.ready + lane.solo) AS items
+        FROM lane JOIN job ON job.id = lane.job_id
+        WHERE lane.queue = ANY(:queues) AND lane.ready + lane.solo > 0 AND job.control = 'run' AND job.id <> :job
+        GROUP BY job.id
+    )
+    SELECT count(*) FILTER (WHERE first) AS jobs, coalesce(sum(items) FILTER (WHERE first), 0) AS items,
+           count(DISTINCT tenant_id) FILTER (WHERE NOT same) AS tenants
+    FROM (
+        SELECT waiting.tenant_id, waiting.items, waiting.tenant_id = ours.tenant_id AS same,
+               waiting.tenant_id = ours.tenant_id
+               AND (-waiting.priority, waiting.created_at, waiting.id) < (-ours.priority, ours.created_at, ours.id)
+               AS first
+        FROM waiting, ours
+    ) AS ranked
+""")
+
+
+def estimate(conn: sa.Connection, items: Mapping[tuple[str, str], int], *, tenants: int = 1) -> Estimate:
+    """How long so many motions take, if nothing is before them.
+
+    Args:
+        items: motions by model and exact bundle.
+        tenants: how many share the workers.
+    """
+    measured = {speed.bundle: speed for speed in _speeds(conn, [bundle for _, bundle in items])}
+    workers = live_workers(conn)
+    unmeasured = tuple(sorted(bundle for _, bundle in items if bundle not in measured))
+    seconds = None
+    if not unmeasured:
+        # Queues have workers of their own, and go on side by side.
+        by_queue = {
+            queue: sum(count * measured[b].seconds for (q, b), count in items.items() if q == queue)
+            / max(workers.get(queue, 0), 1)
+            for queue, _ in items
+        }
+        seconds = max(by_queue.values(), default=0.0) * tenants
+    return Estimate(
+        items=sum(items.values()),
+        seconds=seconds,
+        workers={queue: workers.get(queue, 0) for queue in sorted({queue for queue, _ in items})},
+        speeds=tuple(measured[bundle] for bundle in sorted(measured)),
+        unmeasured=unmeasured,
+    )
+
+
+def place_of(conn: sa.Connection, tenant: str, job: UUID) -> QueuePlace:
+    """What comes before a job's waiting items, and when it may be done.
+
+    Raises:
+        NotFound: the tenant has no such job.
+    """
+    row = get_job(conn, tenant, job)
+    item = schema.item.c
+    left = conn.execute(
+        sa.select(item.model, item.bundle, sa.func.count().label("items"))
+        .where(item.job_id == job, item.state.in_(sorted(OPEN)))
+        .group_by(item.model, item.bundle)
+    ).all()
+    queues = [TEXT_QUEUE, *{each.model for each in left}]  # what is read now is made later
+    ahead = conn.execute(AHEAD, {"job": job, "queues": queues}).one()
+    tenants = 1 + int(ahead.tenants)
+    own = estimate(conn, {(each.model, each.bundle): each.items for each in left}, tenants=tenants)
+    held = row.state in ENDED or row.control is not JobControl.RUN
+    seconds = None
+    if own.seconds is not None and not held:
+        # What is before it is taken to be as long as its own motions.
+        seconds = own.seconds * (1 + int(ahead.items) / max(own.items, 1))
+    return QueuePlace(
+        state=row.state,
+        jobs_ahead=0 if held else int(ahead.jobs),
+        items_ahead=0 if held else int(ahead.items),
+        tenants=tenants,
+        seconds=seconds,
+        estimate=own,
+    )
+
+
+def _speeds(conn: sa.Connection, bundles: list[str]) -> list[Speed]:
+    return [Speed(**row) for row in conn.execute(SPEEDS, {"bundles": bundles, "measured": MEASURED}).mappings()]
