@@ -74,6 +74,8 @@ class Settings(BaseSettings):
     relay_seconds: float = 0.5
     evaluation_seconds: float = 2.0
     """The scheduler looks this often whether a schedule is due or an evaluation can go on."""
+    retention_seconds: float = 60.0
+    """The scheduler looks this often for jobs whose days are over, and for files with erased prompts."""
     max_attempts: int = 3
     drain_seconds: float = 300.0
     """A drain task claims nothing after this long and returns."""

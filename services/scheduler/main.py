@@ -4,6 +4,7 @@ harmless, and so is its death."""
 from __future__ import annotations
 
 import threading
+from functools import partial
 
 import sqlalchemy as sa
 
@@ -14,14 +15,18 @@ from services.scheduler.sending import Sender
 from services.scheduler.webhooks import Deliverer
 from shared.errors import InvalidInput
 from shared.jobs import (
+    KEPT,
     Problem,
     abandoned_streams,
     create_engine,
+    delete_expired,
     end_stream,
     remove_stale_assets,
+    rewrite_files,
     sweep,
     transaction,
 )
+from shared.motion.clip import without_prompt
 from shared.runtime.app import create_app
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
@@ -117,6 +122,12 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
                 end_stream(conn, stream, None, NOBODY.message, problem=NOBODY)
                 log.warning("stream_abandoned", stream=str(stream))
 
+    def retain() -> None:
+        deleted = delete_expired(engine, store)
+        rewritten = rewrite_files(engine, store, partial(without_prompt, kept=KEPT))
+        if deleted or rewritten:
+            log.info("retained", jobs_deleted=deleted, files_rewritten=rewritten)
+
     return [
         # A lease that ran out while the database was away is not its worker's fault: let heartbeats come first.
         Periodic(
@@ -127,6 +138,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
             probe=probe,
             grace=chosen.lease_seconds,
         ),
+        Periodic("retention", retain, seconds=chosen.retention_seconds, stopping=stopping, probe=probe),
         Periodic("stale_assets", remove_stale, seconds=STALE_ASSETS_SECONDS, stopping=stopping),
         Periodic(
             "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY

@@ -64,7 +64,7 @@ from shared.jobs.evaluations import (
     open_evaluations,
     store_prompts,
 )
-from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets
+from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets, remove_unused_assets
 from shared.jobs.keys import SCOPES, authenticate, check_key, create_key, list_keys, revoke_key, rotate_key
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
@@ -72,6 +72,7 @@ from shared.jobs.operate import cancel, delete, pause, resume, retry, set_commen
 from shared.jobs.policy import Policy, policy
 from shared.jobs.quotas import check_room, usage
 from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
+from shared.jobs.retention import KEPT, delete_expired, erase, rewrite_files
 from shared.jobs.reviews import MAX_REVIEWED, reroll, review
 from shared.jobs.schedules import (
     change_schedule,
@@ -119,6 +120,7 @@ from shared.jobs.types import (
     Claim,
     ClaimedItem,
     Committed,
+    Erasure,
     Estimate,
     EventRow,
     GarbageReport,
@@ -168,6 +170,7 @@ __all__ = [
     "DEFAULT_TENANT",
     "EVALUATOR_QUEUE",
     "EVENT_CHANNEL",
+    "KEPT",
     "MAX_KEEP_DAYS",
     "MAX_REVIEWED",
     "NO_TEXT",
@@ -191,6 +194,7 @@ __all__ = [
     "DeliveryState",
     "DueDelivery",
     "EarlierRun",
+    "Erasure",
     "Estimate",
     "EvaluationEvent",
     "EvaluationJob",
@@ -279,12 +283,14 @@ __all__ = [
     "create_tenant",
     "create_webhook",
     "delete",
+    "delete_expired",
     "delete_schedule",
     "delete_webhook",
     "delivery_attempts",
     "downgrade",
     "due_schedules",
     "end_stream",
+    "erase",
     "estimate",
     "evaluation_events",
     "events_after",
@@ -329,6 +335,7 @@ __all__ = [
     "reinstate_tenant",
     "release",
     "remove_stale_assets",
+    "remove_unused_assets",
     "replay_delivery",
     "reroll",
     "resume",
@@ -336,6 +343,7 @@ __all__ = [
     "retry",
     "review",
     "revoke_key",
+    "rewrite_files",
     "rotate_key",
     "run_schedule",
     "send_test",

@@ -66,6 +66,15 @@ def remove_stale_assets(engine: sa.Engine, store: ObjectStore, *, rules: Policy 
     return _remove_unreferenced(engine, store, _unreferenced() & stale)
 
 
+def remove_unused_assets(engine: sa.Engine, store: ObjectStore) -> int:
+    """Remove stored assets that nothing refers to; how many. Objects without a row are left to `collect_garbage`.
+
+    Raises:
+        Unreachable: the store or the database does not answer; what is left goes the next time.
+    """
+    return _remove_unreferenced(engine, store, _unreferenced() & (schema.asset.c.state == "stored"))
+
+
 def _unreferenced() -> sa.ColumnElement[bool]:
     asset = schema.asset.c.id
     return ~(

@@ -35,6 +35,9 @@ from shared.jobs.types import (
 
 CHUNK = 2000  # items held in memory at a time, and keys of one look-up
 
+TEXTS_LOCK = 0x6D617265
+"""Advisory lock: shared by those who count on text features that they saw, exclusive to who forgets some."""
+
 COLUMNS = (
     *("id", "job_id", "position", "index", "variant", "name", "prompt", "model", "bundle", "seed", "seconds"),
     *("settings", "tags", "text_key", "generate_batch_key", "stage", "queue", "batch_key", "replaces"),
@@ -134,6 +137,7 @@ def _take_key(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJo
 def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0) -> Counter[Lane]:
     """COPY the items in chunks, their positions from `first` on; how many each lane has got. Counters and lanes are the
     caller's."""
+    conn.execute(sa.select(sa.func.pg_advisory_xact_lock_shared(TEXTS_LOCK)))
     lanes: Counter[Lane] = Counter()
     connection = cast("psycopg.Connection", conn.connection.driver_connection)
     positions = itertools.count(first)

@@ -456,6 +456,16 @@ class NewApiKey:
     secret: str
 
 
+@dataclass(frozen=True)
+class Erasure:
+    """A job whose prompts were erased."""
+
+    job: UUID
+    erased: datetime
+    files_left: int
+    """Files that are still to be written anew; nobody gets them before."""
+
+
 # --- estimates ---
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -201,6 +201,17 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         features_fps=features_fps,
         manifest=cast("dict[str, Any]", manifest),
     )
+
+
+def without_prompt(data: bytes, kept: Collection[str], where: str = "npz") -> bytes:
+    """A clip's npz file whose manifest says no more than what is `kept`, and that the rest was erased.
+
+    Raises:
+        InvalidFile, TooLarge: see `load_npz`.
+    """
+    clip = parse_npz(data, where)
+    manifest = {name: value for name, value in clip.manifest.items() if name in kept}
+    return replace(clip, manifest={**manifest, "erased": True}).to_npz()
 
 
 def _arrays(data: bytes, where: str) -> dict[str, NDArray[Any]]:

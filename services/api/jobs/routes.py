@@ -19,6 +19,7 @@ from services.api.jobs.estimates import EstimateView, QueueView
 from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
 from services.api.jobs.schemas import (
     CheckedView,
+    ErasureView,
     EventsView,
     EventView,
     ItemView,
@@ -231,6 +232,16 @@ def retry_job(
     note(conn, key, "job.retry", job, failed_only=failed_only, reason=reason)
     why = reason or f"retried by {key.name}"
     return JobView.of(jobs.retry(conn, key.tenant, job, failed_only=failed_only, reason=why))
+
+
+@router.post("/{job}/erase")
+def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
+    """Forget the prompts of a job that has ended; motions, names and tags stay.
+
+    What the database holds of them goes at once. Files that hold them are given to nobody any more, and written anew
+    within minutes: `files_left` says how many are still to be. There is no way back.
+    """
+    return ErasureView(**vars(jobs.erase(conn, key.tenant, job, by=key.name)))
 
 
 @router.get("/{job}/items")

@@ -113,6 +113,14 @@ class JobView(View):
         return cls(counters=counters, **own)
 
 
+class ErasureView(View):
+    """A job whose prompts were erased."""
+
+    job: UUID
+    erased: datetime
+    files_left: int = Field(description="Files that are still to be written anew; nobody gets them before.")
+
+
 class ErrorView(View):
     """Why an item has no result."""
 

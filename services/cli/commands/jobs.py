@@ -154,6 +154,28 @@ def delete(jobs: Jobs, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do
             console.say(f"{job} deleted")
 
 
+@app.command()
+def erase(
+    jobs: Jobs,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    as_json: console.Json = False,
+) -> None:
+    """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
+    from services.cli.client import Client
+
+    if not yes:
+        typer.confirm(f"Forget the prompts of {len(jobs)} jobs for good?", abort=True, err=True)
+    with Client.here() as client:
+        for job in jobs:
+            found = client.post(f"/v1/jobs/{job}/erase")
+            if as_json:
+                console.result_json(found)
+                continue
+            left = found["files_left"]
+            more = f"; {left} npz files are written anew and cannot be fetched before" if left else ""
+            console.say(f"{job} prompts erased{more}")
+
+
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
     from services.cli.client import Client
     from services.cli.watching import check_ended, watch_job
