@@ -9,11 +9,12 @@ import sqlalchemy as sa
 from shared.errors import Conflict, InvalidInput
 from shared.jobs import schema
 from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from shared.jobs.evaluation_types import EVALUATOR_QUEUE
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
 from shared.jobs.listings import get_job
 from shared.jobs.quotas import check_room
 from shared.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
-from shared.jobs.types import PRIORITY_LIMIT, JobRow
+from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, JobRow
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:
@@ -81,9 +82,11 @@ def retry(
         )
     check_room(conn, tenant, sum(moved.values()), lock=True)
     table = schema.item
+    ours = (table.c.job_id == job) & table.c.state.in_(sorted(wanted))
+    _refuse_unread(conn, job, ours)
     rows = conn.execute(
         sa.update(table)
-        .where(table.c.job_id == job, table.c.state.in_(sorted(wanted)))
+        .where(ours)
         .values(
             state=ItemState.READY,
             attempts=0,
@@ -196,6 +199,18 @@ def refuse_erased(job: LockedJob, verb: str) -> None:
             f"the job's prompts were erased, so it cannot be {verb}",
             where=f"job {job.id}",
             hint="Submit the prompts again as a new job.",
+        )
+
+
+def _refuse_unread(conn: sa.Connection, job: UUID, items: sa.ColumnElement[bool]) -> None:
+    """A backup holds nothing of what was read of a prompt; what brings such an item back could not make it."""
+    table = schema.item.c
+    unread = items & (table.text_key == NO_TEXT) & (table.model != EVALUATOR_QUEUE)
+    if conn.execute(sa.select(table.id).where(unread).limit(1)).one_or_none() is not None:
+        raise Conflict(
+            "items of this job came from a backup, and cannot be retried",
+            where=f"job {job}",
+            hint="Submit their prompts again as a new job.",
         )
 
 

@@ -18,7 +18,7 @@ from shared.jobs.operate import refuse_erased, refuse_needed
 from shared.jobs.quotas import check_room
 from shared.jobs.states import ENDED, ItemState, JobControl, Review
 from shared.jobs.submit import check_text, write_items
-from shared.jobs.types import NO_TEXT, SEED_LIMIT, ItemRow, MotionRow, NewItem, Reroll
+from shared.jobs.types import SEED_LIMIT, ItemRow, MotionRow, NewItem, Reroll
 
 MAX_REVIEWED = 1000
 """Motions of one call."""
@@ -186,8 +186,10 @@ class _Numbers:
 
 def _refuse_streams(conn: sa.Connection, items: Sequence[UUID]) -> None:
     table = schema.item.c
-    clips = sa.exists().where(schema.stream.c.job_id == table.job_id) | (table.text_key == NO_TEXT)
-    clip = conn.execute(sa.select(table.id).where(among(table.id, items), clips).limit(1)).scalar_one_or_none()
+    motion = schema.motion.c
+    streamed = sa.exists().where(schema.stream.c.job_id == table.job_id) | motion.metadata.has_key("stream")
+    query = sa.select(table.id).join(schema.motion, motion.item_id == table.id).where(among(table.id, items), streamed)
+    clip = conn.execute(query.limit(1)).scalar_one_or_none()
     if clip is not None:
         raise Conflict(
             "it is the clip of a live stream, which nothing can play again",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from services.cli import console
-from services.cli.commands import keys, tenants
+from services.cli.commands import backup, keys, tenants
 from services.cli.database import connection, engine_of, identifier, operator, settings_here
 
 if TYPE_CHECKING:
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 app = typer.Typer(help="For the operator of a server, beside its database.", no_args_is_help=True)
 app.add_typer(tenants.app, name="tenants")
 app.add_typer(keys.app, name="keys")
+app.command("export")(backup.export)
+app.command("import")(backup.import_)
 
 
 @app.command()

@@ -11,7 +11,6 @@ import sqlalchemy as sa
 
 from shared.errors import Conflict, InvalidInput, NotFound
 from shared.jobs import (
-    NO_TEXT,
     SEED_LIMIT,
     ItemRow,
     JobState,
@@ -185,7 +184,9 @@ def test_a_paused_job_stays_paused_and_a_cancelled_one_goes_on_for_its_take(engi
 
 
 def test_what_cannot_be_made_again_is_refused(engine: sa.Engine) -> None:
-    _, (clip,) = made(engine, new_item(0, text_key=NO_TEXT))
+    _, (clip,) = made(engine, new_item(0))
+    with transaction(engine) as conn:
+        conn.execute(sa.text("""UPDATE motion SET metadata = '{"stream": "x"}'"""))
     with pytest.raises(Conflict, match="clip of a live stream"):
         roll(engine, clip)
     job, (motion,) = made(engine, new_item(0))

@@ -1,0 +1,237 @@
+"""A backup: a folder of a tenant's ended jobs and their files, each with its hash.
+
+`manifest.json` (written last: without it a backup is not whole) names `jobs/ID.jsonl` with their SHA-256; a job's first
+line is the job, then a line an item with its motion, then a line an event. `files/ab/ab…` hold content under its hash.
+Plain JSON and bytes: nothing in it is ever run or unpickled, and no path is taken from it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from uuid import UUID
+
+import sqlalchemy as sa
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
+
+from shared.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from shared.hashing import sha256_of
+from shared.jobs import asset_key, transaction
+from shared.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
+from shared.motion.files import write_atomically
+from shared.storage import AssetStore
+
+MANIFEST = "manifest.json"
+MOST_BYTES = 2**31
+"""Of a job's records: 100,000 items take about 0.5 GiB."""
+TRIES = 3
+
+
+class Entry(BaseModel):
+    """A job's records."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    size: int = Field(ge=0, le=MOST_BYTES)
+
+
+class Manifest(BaseModel):
+    """What a backup says of itself."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    format: Literal["marey-backup"] = "marey-backup"
+    version: Literal[1] = 1
+    tenant: str
+    created: AwareDatetime
+    items: int
+    files: int
+    bytes: int
+    jobs: dict[UUID, Entry]
+
+
+def export_tenant(
+    engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
+) -> tuple[Manifest, int]:
+    """Back up every job of a tenant that has ended; the manifest, and how many jobs are left out for they have not.
+
+    Raises:
+        InvalidInput: the folder holds something, or cannot be written.
+        Conflict: a job changed meanwhile.
+        NotFound: the store lacks a file: data loss, told and not passed over.
+    """
+    _prepare(folder)
+    with transaction(engine) as conn:
+        jobs, running = ended_jobs(conn, tenant)
+    entries: dict[UUID, Entry] = {}
+    items = 0
+    files: dict[str, int] = {}
+    for job in jobs:
+        with transaction(engine) as conn:
+            conn.execute(sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
+            backup = back_up(conn, tenant, job)
+        data = b"".join(_lines(backup))
+        for sha256, asset in backup.assets().items():
+            if sha256 not in files:
+                _save(store, tenant, sha256, folder)
+                files[sha256] = asset.size
+        write_atomically(folder / "jobs" / f"{job}.jsonl", data)
+        entries[job] = Entry(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
+        items += len(backup.items)
+        done(job)
+    manifest = Manifest(
+        tenant=tenant, created=datetime.now(UTC), items=items, files=len(files), bytes=sum(files.values()), jobs=entries
+    )
+    write_atomically(folder / MANIFEST, (manifest.model_dump_json(indent=1) + "\n").encode())
+    return manifest, running
+
+
+def import_tenant(
+    engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, *, done: Callable[[UUID], None] = lambda _: None
+) -> tuple[Manifest, int]:
+    """Check a backup wholly, then write what is not there yet; its manifest, and how many jobs were written.
+
+    Each job is one transaction: broken off, it is run again and goes on.
+
+    Raises:
+        NotFound: there is no backup.
+        InvalidFile: anything is missing, has another hash, or is none of ours; nothing was written then.
+        Conflict: another tenant has a job of it.
+    """
+    manifest = read_manifest(folder)
+    for job, entry in manifest.jobs.items():
+        for sha256, asset in read_job(folder, job, entry).assets().items():
+            _check_content(folder, sha256, asset.size)
+    written = 0
+    for job, entry in manifest.jobs.items():
+        written += _restore(engine, store, tenant, folder, read_job(folder, job, entry))
+        done(job)
+    return manifest, written
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """The manifest of a backup; raises as `import_tenant`."""
+    path = folder / MANIFEST
+    try:
+        return Manifest.model_validate_json(_plain(path).read_bytes())
+    except FileNotFoundError:
+        raise NotFound(
+            "there is no whole backup", where=str(path), hint="The manifest is written last; was it broken off?"
+        ) from None
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+
+
+def read_job(folder: Path, job: UUID, entry: Entry) -> JobBackup:
+    """The records of a job, checked; raises as `import_tenant`."""
+    path = folder / "jobs" / f"{job}.jsonl"
+    try:
+        size = _plain(path).stat().st_size
+        data = path.read_bytes() if size == entry.size else b""
+    except FileNotFoundError:
+        raise InvalidFile("is missing", where=str(path)) from None
+    if size != entry.size or hashlib.sha256(data).hexdigest() != entry.sha256:
+        raise InvalidFile("is not what the manifest says: another hash", where=str(path))
+    parts: dict[str, list[Any]] = {"job": [], "item": [], "event": []}
+    for number, line in enumerate(data.splitlines(), 1):
+        try:
+            ((kind, value),) = json.loads(line).items()
+            parts[kind].append(value)
+        except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
+            raise InvalidFile("is no record of a backup", where=f"{path}: line {number}") from None
+    try:
+        (own,) = parts["job"]
+        backup = JobBackup.model_validate({"job": own, "items": parts["item"], "events": parts["event"]})
+    except ValidationError as error:
+        raise _invalid(path, error) from None
+    except ValueError:
+        raise InvalidFile("does not hold one job", where=str(path)) from None
+    if backup.job.id != job:
+        raise InvalidFile(f"holds job {backup.job.id}", where=str(path))
+    return backup
+
+
+def _lines(backup: JobBackup) -> Iterator[bytes]:
+    document = backup.model_dump(mode="json")
+    records = [("job", document["job"])]
+    records += [("item", item) for item in document["items"]] + [("event", event) for event in document["events"]]
+    for kind, value in records:
+        yield json.dumps({kind: value}, separators=(",", ":")).encode() + b"\n"
+
+
+def _prepare(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise InvalidInput("the folder is not empty", where=str(folder), hint="Name a new one.")
+        (folder / "jobs").mkdir()
+        (folder / "files").mkdir()
+    except OSError as error:
+        raise InvalidInput(f"cannot write here: {error.strerror}", where=str(folder)) from error
+
+
+def _save(store: AssetStore, tenant: str, sha256: str, folder: Path) -> None:
+    data = store.get(asset_key(tenant, sha256))
+    if hashlib.sha256(data).hexdigest() != sha256:
+        raise InvalidFile("the store holds something else under this hash", where=asset_key(tenant, sha256))
+    path = _content(folder, sha256)
+    path.parent.mkdir(exist_ok=True)
+    write_atomically(path, data)
+
+
+def _restore(engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, backup: JobBackup) -> bool:
+    assets = list(backup.assets().values())
+    for attempt in range(1, TRIES + 1):
+        with transaction(engine) as conn:
+            announce(conn, tenant, assets)
+        for asset in assets:
+            key = asset_key(tenant, asset.sha256)
+            if not store.exists(key):
+                store.put(key, _content(folder, asset.sha256), media_type=asset.media_type)
+        try:
+            with transaction(engine) as conn:
+                return restore(conn, tenant, backup)
+        except Conflict:
+            if attempt == TRIES:
+                raise
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _check_content(folder: Path, sha256: str, size: int) -> None:
+    path = _content(folder, sha256)
+    try:
+        found = _plain(path).stat().st_size
+    except FileNotFoundError:
+        raise InvalidFile("is missing", where=str(path)) from None
+    if found != size or sha256_of(path) != sha256:
+        raise InvalidFile("is not what its name says: another hash", where=str(path))
+
+
+def _content(folder: Path, sha256: str) -> Path:
+    return folder / "files" / sha256[:2] / sha256
+
+
+def _plain(path: Path) -> Path:
+    """A file, and no way out of the backup.
+
+    Raises:
+        FileNotFoundError: there is none.
+        InvalidFile: a link, a folder, a device.
+    """
+    for part in (path, path.parent):
+        if part.is_symlink():
+            raise InvalidFile("is a link, which a backup does not have", where=str(part))
+    if path.exists() and not path.is_file():
+        raise InvalidFile("is no plain file", where=str(path))
+    return path
+
+
+def _invalid(path: Path, error: ValidationError) -> InvalidFile:
+    first = error.errors(include_url=False, include_input=False)[0]
+    field = ".".join(str(part) for part in first["loc"])
+    return InvalidFile(f"{field + ': ' if field else ''}{first['msg']}", where=str(path))

@@ -1,0 +1,50 @@
+"""`marey admin export` and `import`: a tenant's jobs, motions and files as a folder, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from services.cli import console
+from services.cli.database import engine_of, settings_here
+
+if TYPE_CHECKING:
+    from services.cli.backup import Manifest
+
+Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the backup.")]
+Tenant = Annotated[str, typer.Option("--tenant", help="Whose jobs.")]
+
+
+def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
+    """Back up every job that has ended, with its motions and files, into a new folder."""
+    config = settings_here()
+    from services.cli.backup import export_tenant
+    from shared.storage import open_store
+
+    manifest, running = export_tenant(engine_of(config), open_store(config), tenant, folder)
+    _tell(manifest, as_json, written=len(manifest.jobs))
+    if running:
+        console.say(f"{running} jobs have not ended and are not in it; back them up later.")
+
+
+def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
+    """Check a backup, every hash of it, then bring back the jobs that are not there."""
+    config = settings_here()
+    from services.cli.backup import import_tenant
+    from shared.storage import open_store
+
+    manifest, written = import_tenant(engine_of(config), open_store(config), tenant, folder)
+    _tell(manifest, as_json, written=written)
+
+
+def _tell(manifest: Manifest, as_json: bool, *, written: int) -> None:
+    if as_json:
+        document = manifest.model_dump(mode="json", exclude={"jobs"})
+        console.result_json({**document, "jobs": len(manifest.jobs), "written": written})
+        return
+    size = f"{manifest.bytes / 2**20:.1f} MiB"
+    there = len(manifest.jobs) - written
+    more = f"; {there} jobs were there already" if there else ""
+    console.say(f"{written} jobs of {manifest.items} items in all, {manifest.files} files, {size}{more}")

@@ -1,0 +1,227 @@
+"""A backup brings back what was there, and believes nothing that it is given."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from uuid import UUID
+
+import pytest
+import sqlalchemy as sa
+
+from services.cli.backup import Manifest, export_tenant, import_tenant
+from shared.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
+from shared.jobs import (
+    GarbageReport,
+    ItemFailure,
+    JobRow,
+    NewMotion,
+    Review,
+    asset_key,
+    begin_assets,
+    cancel,
+    collect_garbage,
+    commit_motions,
+    events_after,
+    fail_items,
+    get_job,
+    list_items,
+    list_jobs,
+    reroll,
+    retry,
+    review,
+    transaction,
+)
+from shared.jobs.types import EventRow, ItemRow
+from shared.storage import FolderStore
+from tests.servers.audit import audit
+from tests.servers.jobs import PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
+from tests.support.marey import Marey
+
+TABLES = "job, asset, text_features, idempotency"
+
+
+def work(engine: sa.Engine, store: FolderStore, *, fail: int = 0) -> None:
+    claimed = claim_some(engine)
+    good = claimed.items[: len(claimed.items) - fail]
+    motions: list[NewMotion] = [motion_of(item.id) for item in good]
+    with transaction(engine) as conn:
+        begin_assets(conn, claimed.lease_token, [file for motion in motions for file in motion.files.values()])
+        for motion in motions:
+            store.put(asset_key("default", motion.files["npz"].sha256), str(motion.item).encode())
+        bad = claimed.items[len(good) :]
+        fail_items(conn, claimed.lease_token, [ItemFailure(item.id, PROBLEM, False) for item in bad])
+        commit_motions(conn, claimed.lease_token, motions)
+
+
+def studio(engine: sa.Engine, store: FolderStore) -> list[UUID]:
+    """A job with a failed item, a verdict and a re-roll; one that was cancelled before its prompts were read."""
+    rich = submit_items(engine, [new_item(k, name=f"n{k}", tags=(f"shot={k}",)) for k in range(4)], name="rich")
+    parse_texts(engine)
+    work(engine, store, fail=1)
+    with transaction(engine) as conn:
+        motions = [item.motion.id for item in list_items(conn, "default", rich).rows if item.motion]
+        review(conn, "default", motions[:1], Review.KEPT, by="ann", comment="good")
+        reroll(conn, "default", motions[1:2], lambda item: new_item(item.index, item.prompt), by="ann")
+    work(engine, store)
+    gone = submit_items(engine, [new_item(0, "nobody walks")], keep_days=1)
+    with transaction(engine) as conn:
+        cancel(conn, "default", gone)
+    return [rich, gone]
+
+
+def told(engine: sa.Engine, jobs: Sequence[UUID]) -> list[tuple[JobRow, Sequence[ItemRow], list[EventRow]]]:
+    with transaction(engine) as conn:
+        return [
+            (get_job(conn, "default", job), list_items(conn, "default", job).rows, events_after(conn, "default", job))
+            for job in jobs
+        ]
+
+
+def contents(store: FolderStore) -> dict[str, bytes]:
+    return {key: store.get(key) for key in list(store.keys())}
+
+
+def lose_everything(engine: sa.Engine, store: FolderStore) -> None:
+    with transaction(engine) as conn:
+        conn.execute(sa.text(f"TRUNCATE {TABLES} CASCADE"))
+    for key in list(store.keys()):
+        store.delete(key)
+
+
+def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:
+    jobs = studio(engine, folder_store)
+    running = submit_items(engine, 1)
+    before, files = told(engine, jobs), contents(folder_store)
+    manifest, left = export_tenant(engine, folder_store, "default", tmp_path / "b")
+    assert (list(manifest.jobs), manifest.items, manifest.files, left) == (jobs, 6, 4, 1)
+    lose_everything(engine, folder_store)
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 2
+    after = told(engine, jobs)
+    assert after[0] == before[0]
+    assert (after[1][0].keep_days, before[1][0].keep_days) == (None, 1)  # its days are over, or would soon be
+    assert after[1][1:] == before[1][1:]
+    assert contents(folder_store) == files
+    with transaction(engine) as conn:
+        assert audit(conn) == []
+        with pytest.raises(NotFound):
+            get_job(conn, "default", running)
+        with pytest.raises(Conflict, match="came from a backup"):
+            retry(conn, "default", jobs[0])
+    assert collect_garbage(engine, folder_store) == GarbageReport(0, 0, ())
+    assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 0  # again: nothing to do
+    assert told(engine, jobs) == after
+
+
+def test_another_tenants_job_is_not_overwritten_and_a_folder_with_something_in_it_is_not_used(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    studio(engine, folder_store)
+    export_tenant(engine, folder_store, "default", tmp_path / "b")
+    with pytest.raises(InvalidInput, match="not empty"):
+        export_tenant(engine, folder_store, "default", tmp_path / "b")
+    with engine.begin() as conn:
+        conn.execute(sa.text("INSERT INTO tenant (id) VALUES ('other')"))
+    with pytest.raises(Conflict, match="another tenant"):
+        import_tenant(engine, folder_store, "other", tmp_path / "b")
+    with transaction(engine) as conn:
+        assert list_jobs(conn, "other").rows == ()
+
+
+def edit_manifest(folder: Path, **changes: object) -> None:
+    document = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps(document | changes))
+
+
+def edit_job(folder: Path, change: Callable[[bytes], bytes]) -> None:
+    """Change the records of the first job, and its hash with them: a forger's work."""
+    manifest = Manifest.model_validate_json((folder / "manifest.json").read_bytes())
+    first = next(iter(manifest.jobs))
+    path = folder / "jobs" / f"{first}.jsonl"
+    data = change(path.read_bytes())
+    path.write_bytes(data)
+    jobs = {str(job): entry.model_dump() for job, entry in manifest.jobs.items()}
+    jobs[str(first)] = {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
+    edit_manifest(folder, jobs=jobs)
+
+
+def a_file(folder: Path) -> Path:
+    return next(path for path in (folder / "files").rglob("*") if path.is_file())
+
+
+def link_away(folder: Path) -> None:
+    path = a_file(folder)
+    (folder / "outside").write_bytes(path.read_bytes())
+    path.unlink()
+    path.symlink_to(folder / "outside")
+
+
+DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
+    "no manifest": (lambda b: (b / "manifest.json").unlink(), NotFound, "no whole backup"),
+    "another version": (lambda b: edit_manifest(b, version=2), InvalidFile, "version"),
+    "a path for a job": (lambda b: edit_manifest(b, jobs={"../../x": {}}), InvalidFile, "jobs"),
+    "no job file": (lambda b: [p.unlink() for p in (b / "jobs").iterdir()], InvalidFile, "is missing"),
+    "no content": (lambda b: a_file(b).unlink(), InvalidFile, "is missing"),
+    "other content": (lambda b: a_file(b).write_bytes(b"x" * 36), InvalidFile, "another hash"),
+    "a link": (link_away, InvalidFile, "is a link"),
+    "other records": (
+        lambda b: [p.write_bytes(p.read_bytes().replace(b"walk", b"hack")) for p in (b / "jobs").iterdir()],
+        InvalidFile,
+        "another hash",
+    ),
+    "a forged state": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"state":"failed"', b'"state":"succeeded"', 1)),
+        InvalidFile,
+        "has no motion",
+    ),
+    "a forged path for a file": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"sha256":"', b'"sha256":"../../', 1)),
+        InvalidFile,
+        "sha256",
+    ),
+    "an unknown field": (lambda b: edit_job(b, lambda d: d.replace(b'"seed":', b'"sead":', 1)), InvalidFile, "seed"),
+    "no JSON": (lambda b: edit_job(b, lambda d: d + b"\x80\x04pickle\n"), InvalidFile, "no record of a backup"),
+    "another job": (
+        lambda b: edit_job(b, lambda d: d.replace(b'{"job":{"id":"0', b'{"job":{"id":"1', 1)),
+        InvalidFile,
+        "holds job",
+    ),
+    "what no text can hold": (
+        lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),
+        InvalidFile,
+        "the database does not take it",
+    ),
+}
+
+
+def test_a_damaged_or_forged_backup_is_refused_and_nothing_is_written(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    studio(engine, folder_store)
+    export_tenant(engine, folder_store, "default", tmp_path / "good")
+    lose_everything(engine, folder_store)
+    for name, (damage, error, words) in DAMAGE.items():
+        folder = tmp_path / name
+        shutil.copytree(tmp_path / "good", folder)
+        damage(folder)
+        with pytest.raises(error, match=words):
+            import_tenant(engine, folder_store, "default", folder)
+        with transaction(engine) as conn:
+            assert list_jobs(conn, "default").rows == (), name
+
+
+def test_the_commands_say_what_they_did(
+    engine: sa.Engine, database_url: str, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    studio(engine, folder_store)
+    environment = {"MAREY_DATABASE_URL": database_url, "MAREY_STORE": str(folder_store.root)}
+    marey = Marey(tmp_path / "home", tmp_path / "models", environment)
+    ran = marey("admin", "export", tmp_path / "b").ok()
+    assert "2 jobs of 6 items in all, 4 files" in ran.err
+    lose_everything(engine, folder_store)
+    ran = marey("admin", "import", tmp_path / "b", "--json").ok()
+    assert (ran.lines[0]["written"], ran.lines[0]["tenant"]) == (2, "default")
+    assert len(contents(folder_store)) == 4
