@@ -20,7 +20,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 
 from shared.errors import Conflict, InvalidFile, InvalidInput, NotFound
 from shared.hashing import sha256_of
-from shared.jobs import asset_key, transaction
+from shared.jobs import asset_key, get_tenant, transaction
 from shared.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
 from shared.motion.files import write_atomically
 from shared.storage import AssetStore
@@ -63,11 +63,12 @@ def export_tenant(
     Raises:
         InvalidInput: the folder holds something, or cannot be written.
         Conflict: a job changed meanwhile.
-        NotFound: the store lacks a file: data loss, told and not passed over.
+        NotFound: no such tenant; or the store lacks a file: data loss, told and not passed over.
     """
-    _prepare(folder)
     with transaction(engine) as conn:
+        get_tenant(conn, tenant)
         jobs, running = ended_jobs(conn, tenant)
+    _prepare(folder)
     entries: dict[UUID, Entry] = {}
     items = 0
     files: dict[str, int] = {}
@@ -99,10 +100,12 @@ def import_tenant(
     Each job is one transaction: broken off, it is run again and goes on.
 
     Raises:
-        NotFound: there is no backup.
+        NotFound: there is no backup, or no such tenant.
         InvalidFile: anything is missing, has another hash, or is none of ours; nothing was written then.
         Conflict: another tenant has a job of it.
     """
+    with transaction(engine) as conn:
+        get_tenant(conn, tenant)
     manifest = read_manifest(folder)
     for job, entry in manifest.jobs.items():
         for sha256, asset in read_job(folder, job, entry).assets().items():

@@ -102,7 +102,7 @@ async def submit_job(
     }
     submission = await run_in_threadpool(_read, kind, body, fields, shared)
     if validate_only:
-        return await run_in_threadpool(_check, shared, submission)
+        return await run_in_threadpool(_check, shared, key, submission)
     sha256 = service.request_sha256(str(request.url.query), body)
     return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
 
@@ -117,9 +117,10 @@ def _read(kind: str, body: bytes, fields: dict[str, Any], shared: Context) -> se
     )
 
 
-def _check(shared: Context, submission: service.Submission) -> JSONResponse:
+def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) -> JSONResponse:
     by_bundle = submission.by_bundle
     with jobs.transaction(shared.engine) as conn:
+        jobs.check_room(conn, key.tenant, submission.count, lock=False)
         estimate = jobs.estimate(conn, by_bundle)
         waiting = jobs.waiting_items(conn)
     checked = CheckedView(
@@ -241,7 +242,9 @@ def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
     What the database holds of them goes at once. Files that hold them are given to nobody any more, and written anew
     within minutes: `files_left` says how many are still to be. There is no way back.
     """
-    return ErasureView(**vars(jobs.erase(conn, key.tenant, job, by=key.name)))
+    erased = jobs.erase(conn, key.tenant, job, by=key.name)
+    note(conn, key, "job.erase", job)
+    return ErasureView(**vars(erased))
 
 
 @router.get("/{job}/items")

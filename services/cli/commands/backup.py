@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from services.cli import console
-from services.cli.database import engine_of, settings_here
+from services.cli.database import engine_of, operator, settings_here
 
 if TYPE_CHECKING:
+    import sqlalchemy as sa
+
     from services.cli.backup import Manifest
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the backup.")]
@@ -23,7 +25,9 @@ def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = F
     from services.cli.backup import export_tenant
     from shared.storage import open_store
 
-    manifest, running = export_tenant(engine_of(config), open_store(config), tenant, folder)
+    engine = engine_of(config)
+    manifest, running = export_tenant(engine, open_store(config), tenant, folder)
+    _note(engine, tenant, "tenant.export", manifest, len(manifest.jobs))
     _tell(manifest, as_json, written=len(manifest.jobs))
     if running:
         console.say(f"{running} jobs have not ended and are not in it; back them up later.")
@@ -35,8 +39,18 @@ def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = 
     from services.cli.backup import import_tenant
     from shared.storage import open_store
 
-    manifest, written = import_tenant(engine_of(config), open_store(config), tenant, folder)
+    engine = engine_of(config)
+    manifest, written = import_tenant(engine, open_store(config), tenant, folder)
+    _note(engine, tenant, "tenant.import", manifest, written)
     _tell(manifest, as_json, written=written)
+
+
+def _note(engine: sa.Engine, tenant: str, verb: str, manifest: Manifest, jobs: int) -> None:
+    from shared.jobs import audit, transaction
+
+    with transaction(engine) as conn:
+        audit(conn, tenant, operator(), verb, tenant, jobs=jobs, files=manifest.files)
+    engine.dispose()
 
 
 def _tell(manifest: Manifest, as_json: bool, *, written: int) -> None:
