@@ -132,7 +132,6 @@ def _roll_again(
         return set()
     _refuse_streams(conn, [item.id for item in sources])
     check_room(conn, job.tenant, len(sources), lock=True)
-    check_room(conn, job.tenant, len(sources), lock=True)
     numbers = _Numbers(conn, job.id, {item.index for item in sources})
     takes = [
         replace(
