@@ -9,6 +9,7 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
+from sqlalchemy import exc
 from sqlalchemy.dialects.postgresql import insert
 
 from shared.errors import Conflict, InvalidFile
@@ -210,7 +211,7 @@ def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
         raise Conflict("another tenant has this job", where=f"job {job.id}")
     try:
         _write_job(conn, tenant, backup)
-    except (sa.exc.DataError, sa.exc.IntegrityError) as error:
+    except (exc.DataError, exc.IntegrityError) as error:
         reason = (str(error.orig).splitlines() or ["?"])[0]
         raise InvalidFile(f"the database does not take it: {reason}", where=f"job {job.id}") from error
     return True
@@ -310,7 +311,7 @@ def _rows(
     return [dict(row) for row in conn.execute(sa.select(*columns).where(*wanted).order_by(table.c[order])).mappings()]
 
 
-def _erasing(job: UUID) -> sa.Select[tuple[int]]:
+def _erasing(job: UUID) -> sa.Select[int]:
     file, motion = schema.motion_file.c, schema.motion.c
     query = sa.select(sa.func.count()).select_from(schema.motion_file).join(schema.motion, motion.id == file.motion_id)
     return query.where(motion.job_id == job, file.erasing)
