@@ -81,6 +81,10 @@ class Client:
         """POST a JSON body, None = none; the answer's JSON. Retried: only for requests that may be repeated."""
         return self._send("POST", path, params=_given(params), json=body).json()
 
+    def post_new(self, path: str, body: Any) -> Any:
+        """POST what is made once however often it is sent: with an idempotency key, which goes with every retry."""
+        return self._send("POST", path, json=body, headers={"Idempotency-Key": str(uuid4())}).json()
+
     def post_once(self, path: str, body: Any) -> Any:
         """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
         return self._send("POST", path, repeatable=False, json=body).json()

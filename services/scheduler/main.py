@@ -23,6 +23,7 @@ from shared.jobs import (
     end_stream,
     remove_stale_assets,
     rewrite_files,
+    remove_unused_prompts,
     sweep,
     transaction,
 )
@@ -115,6 +116,10 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
         removed = remove_stale_assets(engine, store)
         if removed:
             log.info("stale_assets_removed", assets=removed)
+        with transaction(engine) as conn:
+            unused = remove_unused_prompts(conn)
+        if unused:
+            log.info("unused_prompts_removed", sets=unused)
 
     def end_abandoned() -> None:
         with transaction(engine) as conn:

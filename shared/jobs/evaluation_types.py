@@ -8,6 +8,7 @@ from datetime import datetime
 from typing import Any
 from uuid import UUID
 
+from shared.jobs.ids import new_id
 from shared.jobs.states import EvaluationState, ItemState, JobState
 from shared.jobs.types import AssetDigest, Problem
 
@@ -78,6 +79,9 @@ class NewEvaluation:
         prompts: digest of stored prompts (`store_prompts`); None = those of the evaluator's bundle, not looked up yet.
         due: the time of its schedule that it stands for.
         reason: why it is there.
+        idempotency_key: makes a request once, however often it is sent.
+        body_sha256: digest of the request; goes with `idempotency_key`.
+        id: what it is going to be called.
     """
 
     tenant: str
@@ -88,6 +92,9 @@ class NewEvaluation:
     schedule: UUID | None = None
     due: datetime | None = None
     reason: str = "asked for"
+    idempotency_key: str | None = None
+    body_sha256: str | None = None
+    id: UUID = field(default_factory=new_id)
 
 
 @dataclass(frozen=True)

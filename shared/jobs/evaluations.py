@@ -25,7 +25,7 @@ from shared.jobs.evaluation_types import (
     NewEvaluation,
     ReportFile,
 )
-from shared.jobs.ids import new_id
+from shared.jobs.idempotency import take_key
 from shared.jobs.journal import CLOCK, among
 from shared.jobs.operate import cancel
 from shared.jobs.outbox import tell_of_evaluation
@@ -33,6 +33,7 @@ from shared.jobs.pages import cut_page, page_limit, read_cursor
 from shared.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
 from shared.jobs.submit import check_text
 from shared.jobs.types import Page
+from shared.jobs.workers import live_workers
 
 
 def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[EvaluationPrompt]) -> str:
@@ -40,8 +41,27 @@ def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[Evaluation
     sha256 = prompts_sha256(prompts)
     rows = [prompt.as_json() for prompt in prompts]
     new = insert(schema.prompt_set).values(tenant_id=tenant, sha256=sha256, count=len(rows), prompts=rows)
-    conn.execute(new.on_conflict_do_nothing())
+    # The update changes nothing, but locks the row until whoever refers to it has done so: see `remove_unused_prompts`.
+    key = ["tenant_id", "sha256"]
+    conn.execute(new.on_conflict_do_update(index_elements=key, set_={"count": new.excluded.count}))
     return sha256
+
+
+def remove_unused_prompts(conn: sa.Connection) -> int:
+    """Remove prompts that no schedule and no evaluation refers to; how many sets."""
+    table, schedule, evaluation = schema.prompt_set, schema.schedule.c, schema.evaluation.c
+    unused = ~(
+        sa.exists().where(schedule.tenant_id == table.c.tenant_id, schedule.prompts_sha256 == table.c.sha256)
+        | sa.exists().where(evaluation.tenant_id == table.c.tenant_id, evaluation.prompts_sha256 == table.c.sha256)
+    )
+    # Locked first, asked again then: nobody can begin to refer to a row that is locked, and a new statement sees who
+    # did before.
+    lock = sa.select(table.c.tenant_id, table.c.sha256).where(unused).with_for_update(skip_locked=True, of=table)
+    found = [tuple(row) for row in conn.execute(lock)]
+    if not found:
+        return 0
+    ours = sa.tuple_(table.c.tenant_id, table.c.sha256).in_(found)
+    return conn.execute(sa.delete(table).where(ours, unused)).rowcount
 
 
 def load_prompts(conn: sa.Connection, tenant: str, sha256: str) -> tuple[EvaluationPrompt, ...]:
@@ -59,16 +79,20 @@ def load_prompts(conn: sa.Connection, tenant: str, sha256: str) -> tuple[Evaluat
 
 
 def create_evaluation(conn: sa.Connection, new: NewEvaluation) -> UUID | None:
-    """Plan an evaluation; None when its schedule has one for that time already.
+    """Plan an evaluation; None when its schedule has one for that time already. With an idempotency key that was used
+    for the same request within 24 hours, the id of the evaluation that was made then.
 
     Raises:
         InvalidInput: text that the database cannot hold.
+        IdempotencyMismatch: the key was used with another request.
     """
     check_text(new.name, "name")
     check_text(new.comment, "comment")
-    identifier = new_id()
+    earlier = take_key(conn, new.tenant, new.idempotency_key, new.body_sha256, "evaluation_id", new.id)
+    if earlier is not None:
+        return earlier
     row = insert(schema.evaluation).values(
-        id=identifier,
+        id=new.id,
         tenant_id=new.tenant,
         schedule_id=new.schedule,
         due_at=new.due,
@@ -82,7 +106,7 @@ def create_evaluation(conn: sa.Connection, new: NewEvaluation) -> UUID | None:
         row.on_conflict_do_nothing(index_elements=["schedule_id", "due_at"]).returning(schema.evaluation.c.id)
     ).scalar_one_or_none()
     if made is not None:
-        _note(conn, identifier, EvaluationState.PLANNED, new.reason)
+        _note(conn, new.id, EvaluationState.PLANNED, new.reason)
     return made
 
 
@@ -160,6 +184,20 @@ def check_comparable(run: EvaluationRow, *, prompts: str | None, evaluator: str 
         other = f"was measured by {run.request.evaluator}, not by {evaluator}"
     if other is not None:
         raise InvalidInput(f"evaluation {run.id} {other}", where=where, hint="Choose another.")
+
+
+def evaluation_waits_for(conn: sa.Connection, row: EvaluationRow) -> str | None:
+    """What an open evaluation cannot go on without: a queue that holds its work and that no living worker serves."""
+    job = row.scoring if row.state is EvaluationState.SCORING else row.generation
+    if row.state not in OPEN_EVALUATIONS or job is None or job.state in ENDED:
+        return None
+    lane = schema.lane.c
+    queues = conn.execute(
+        sa.select(lane.queue).distinct().where(lane.job_id == job.id, lane.ready + lane.solo > 0)
+    ).scalars()
+    living = live_workers(conn)
+    idle = sorted(queue for queue in queues if queue not in living)
+    return f"a worker of the queue {' and '.join(idle)}: none is running" if idle else None
 
 
 # --- changes of state ---

@@ -114,6 +114,7 @@ def run_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> UUID:
     Raises:
         NotFound: the tenant has no such schedule.
     """
+    _locked(conn, tenant, schedule)  # a change under way comes first, or waits: its request and prompts go together
     row = get_schedule(conn, tenant, schedule)
     made = create_evaluation(conn, _evaluation(row, None, "asked for, beside the times of its schedule"))
     assert made is not None  # only one with a due time can be there already

@@ -328,10 +328,16 @@ idempotency = sa.Table(
         "job_id",
         Id,
         sa.ForeignKey("job.id", ondelete="CASCADE", deferrable=True, initially="DEFERRED"),
-        nullable=False,
         index=True,
     ),
     sa.Column("created_at", Time, nullable=False),
+    sa.Column(
+        "evaluation_id",
+        Id,
+        sa.ForeignKey("evaluation.id", ondelete="CASCADE", deferrable=True, initially="DEFERRED"),
+        index=True,
+    ),
+    sa.CheckConstraint("num_nonnulls(job_id, evaluation_id) = 1", name="made"),
     sa.Index("ix_idempotency_created_at", "created_at"),
 )
 

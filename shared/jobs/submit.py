@@ -12,14 +12,12 @@ from uuid import UUID
 import psycopg
 import sqlalchemy as sa
 from psycopg import sql
-from sqlalchemy.dialects.postgresql import insert
 
 from shared.errors import InvalidInput
 from shared.jobs import schema
-from shared.jobs.errors import IdempotencyMismatch
+from shared.jobs.idempotency import take_key
 from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, Lane, LaneChange, NewEvent, among, change_lanes, interval, lock_job, record
-from shared.jobs.policy import policy
+from shared.jobs.journal import Lane, LaneChange, NewEvent, among, change_lanes, lock_job, record
 from shared.jobs.quotas import check_room
 from shared.jobs.states import JobState, Stage
 from shared.jobs.types import (
@@ -65,7 +63,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
         check_text(text, where)
     identifier = new_id()
-    earlier = _take_key(conn, job, identifier)
+    earlier = _earlier(conn, job, identifier)
     if earlier is not None:
         return earlier
     if job.metered:
@@ -99,39 +97,13 @@ def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:
     record(conn, locked, [NewEvent("submitted", f"submitted with {total} items", data={"to": JobState.QUEUED})])
 
 
-def _take_key(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob | None:
-    """Take the idempotency key for this job, or answer the job that has it. Waits for a submit under way with it."""
-    if job.idempotency_key is None:
+def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob | None:
+    """Take the idempotency key for this job, or answer the job that has it."""
+    made = take_key(conn, job.tenant, job.idempotency_key, job.body_sha256, "job_id", identifier)
+    if made is None:
         return None
-    if job.body_sha256 is None:
-        raise InvalidInput("an idempotency key needs the digest of the body", where="body_sha256")
-    table = schema.idempotency
-    values = {"body_sha256": job.body_sha256, "job_id": identifier, "created_at": CLOCK}
-    forgotten = table.c.created_at < CLOCK - interval(policy().idempotency)
-    ours = conn.execute(
-        insert(table)
-        .values(tenant_id=job.tenant, key=job.idempotency_key, **values)
-        .on_conflict_do_update(
-            index_elements=["tenant_id", "key"],
-            set_=values,
-            where=forgotten,
-        )
-        .returning(table.c.job_id)
-    ).one_or_none()
-    if ours is not None:
-        return None
-    earlier = conn.execute(
-        sa.select(table.c.body_sha256, table.c.job_id, schema.job.c.total)
-        .join(schema.job, schema.job.c.id == table.c.job_id)
-        .where(table.c.tenant_id == job.tenant, table.c.key == job.idempotency_key)
-    ).one()
-    if earlier.body_sha256 != job.body_sha256:
-        raise IdempotencyMismatch(
-            "this idempotency key was used with another body",
-            where=f"idempotency key {job.idempotency_key}",
-            hint="Use a new key for a new submit.",
-        )
-    return SubmittedJob(earlier.job_id, replayed=True, items=earlier.total)
+    total = conn.execute(sa.select(schema.job.c.total).where(schema.job.c.id == made)).scalar_one()
+    return SubmittedJob(made, replayed=True, items=total)
 
 
 def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0) -> Counter[Lane]:

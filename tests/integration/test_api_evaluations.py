@@ -11,6 +11,7 @@ from uuid import uuid4
 import httpx2
 import pytest
 
+from shared.jobs import WorkerBeat, beat, retire, transaction
 from shared.runtime.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR, JUDGE
 from tests.support.live_evaluations import Studio, studio
@@ -85,6 +86,37 @@ def test_an_evaluation_is_accepted_with_exact_bundles_and_waits(http: httpx2.Cli
     assert (request["model"], request["source"], request["repeats"], request["seed"]) == ("toy", "studio.csv", 1, 5)
     assert [event["state"] for event in made["events"]] == ["planned"]
     http.delete(f"/v1/evaluations/{made['id']}")
+
+
+def test_the_same_request_with_its_key_makes_one_evaluation(http: httpx2.Client) -> None:
+    def send(key: str, **changes: object) -> httpx2.Response:
+        return http.post("/v1/evaluations", json={**BODY, **changes}, headers={"Idempotency-Key": key})
+
+    first, again = send("one"), send("one")
+    assert (first.status_code, "idempotency-replayed" in first.headers) == (202, False)
+    assert (again.json()["id"], again.headers["idempotency-replayed"]) == (first.json()["id"], "true")
+    refused(send("one", seed=7), 422, "idempotency-mismatch")
+    other = send("two").json()["id"]
+    assert other != first.json()["id"]
+    job = http.post("/v1/jobs", json={"items": [{"prompt": "walk"}]}, headers={"Idempotency-Key": "one"})
+    refused(job, 422, "idempotency-mismatch")
+    for each in (first.json()["id"], other):
+        http.delete(f"/v1/evaluations/{each}")
+
+
+def test_an_evaluation_whose_queue_nobody_serves_says_so(place: Studio, http: httpx2.Client) -> None:
+    made = begin(http)
+    assert made["waits_for"] is None  # nothing is asked of a worker yet
+    place.scheduler.round()
+    waits = http.get(f"/v1/evaluations/{made['id']}").json()["waits_for"]
+    assert waits == "a worker of the queue text: none is running"
+    with transaction(place.api.engine) as conn:
+        beat(conn, WorkerBeat("w", "text", "host", 1, "cpu", None, None))
+    assert http.get(f"/v1/evaluations/{made['id']}").json()["waits_for"] is None
+    with transaction(place.api.engine) as conn:
+        retire(conn, "w")
+    http.delete(f"/v1/evaluations/{made['id']}")
+    assert http.get(f"/v1/evaluations/{made['id']}").json()["waits_for"] is None
 
 
 def test_one_that_is_done_tells_how_it_got_there_and_what_was_measured(done: dict[str, Any]) -> None:

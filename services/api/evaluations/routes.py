@@ -17,7 +17,7 @@ from services.api.evaluations.schemas import EvaluationDetailView, EvaluationVie
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
 from services.api.guards import limit_of_submit, read_body
 from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, Limit, PageView
+from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs
 from shared.errors import NotFound
 
@@ -32,12 +32,18 @@ def body_of(name: str) -> dict[str, Any]:
 
 @router.post("", status_code=202, openapi_extra=body_of("NewEvaluationBody"))
 async def begin_evaluation(
-    request: Request, response: Response, shared: Shared, key: Submitter
+    request: Request,
+    response: Response,
+    shared: Shared,
+    key: Submitter,
+    idempotency_key: IdempotencyKey = None,
 ) -> EvaluationDetailView:
     """Plan an evaluation: its motions are made in the background, then measured. All bad prompts are told at once."""
     body = await read_body(request, limit_of_submit())
-    view = await run_in_threadpool(service.create, shared, key, body)
+    view, replayed = await run_in_threadpool(service.create, shared, key, body, idempotency_key)
     response.headers["Location"] = f"/v1/evaluations/{view.id}"
+    if replayed:
+        response.headers["Idempotency-Replayed"] = "true"
     return view
 
 

@@ -143,12 +143,15 @@ class EvaluationDetailView(EvaluationView):
     """An evaluation with its history."""
 
     events: list[EvaluationEventView]
+    waits_for: str | None = Field(description="What it cannot go on without: a queue that no living worker serves.")
 
     @classmethod
-    def detail(cls, row: EvaluationRow, events: Sequence[EvaluationEvent]) -> EvaluationDetailView:
-        """From a row and its events."""
+    def detail(
+        cls, row: EvaluationRow, events: Sequence[EvaluationEvent], waits_for: str | None
+    ) -> EvaluationDetailView:
+        """From a row, its events, and what it waits for."""
         told = [EvaluationEventView(state=event.state, reason=event.reason, at=event.at) for event in events]
-        return cls(events=told, **_fields(row))
+        return cls(events=told, waits_for=waits_for, **_fields(row))
 
 
 def _fields(row: EvaluationRow) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from services.api.audit import note
 from services.api.context import Context
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
-from services.api.jobs.service import Fields, read_fields, read_object
+from services.api.jobs.service import Fields, read_fields, read_object, request_sha256
 from shared import jobs
 from shared.errors import InvalidInput, NotFound
 from shared.evaluating import Plan, plan_evaluation
@@ -58,21 +58,34 @@ def read_asked(model: type[Fields], document: Mapping[str, Any]) -> tuple[Fields
     return fields, _asked(fields, raws)
 
 
-def create(shared: Context, key: jobs.ApiKey, body: bytes) -> EvaluationDetailView:
-    """Plan an evaluation.
+def create(
+    shared: Context, key: jobs.ApiKey, body: bytes, idempotency_key: str | None
+) -> tuple[EvaluationDetailView, bool]:
+    """Plan an evaluation, or answer the one that an earlier request with this key and body has planned; whether so.
 
     Raises:
         InvalidItems, InvalidInput, InvalidBundle, Refused: see `read_asked` and `Asked.planned`.
+        IdempotencyMismatch: the key was used with another request.
     """
     fields, asked = read_asked(NewEvaluationBody, read_object(body, hint=HINT))
     plan = asked.planned(shared.config)
     with jobs.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
-        new = jobs.NewEvaluation(key.tenant, plan.request, sha256, name=fields.name, comment=fields.comment)
+        new = jobs.NewEvaluation(
+            key.tenant,
+            plan.request,
+            sha256,
+            name=fields.name,
+            comment=fields.comment,
+            idempotency_key=idempotency_key,
+            body_sha256=request_sha256("evaluations", body) if idempotency_key else None,
+        )
         made = jobs.create_evaluation(conn, new)
         assert made is not None  # only one of a schedule can be there already
-        note(conn, key, "evaluation.begin", made, bundle=plan.request.bundle)
-        return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
+        replayed = made != new.id
+        if not replayed:
+            note(conn, key, "evaluation.begin", made, bundle=plan.request.bundle)
+        return detail(conn, jobs.get_evaluation(conn, key.tenant, made)), replayed
 
 
 def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
@@ -88,7 +101,7 @@ def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
 
 def detail(conn: sa.Connection, row: jobs.EvaluationRow) -> EvaluationDetailView:
     """An evaluation with its history."""
-    return EvaluationDetailView.detail(row, jobs.evaluation_events(conn, row.id))
+    return EvaluationDetailView.detail(row, jobs.evaluation_events(conn, row.id), jobs.evaluation_waits_for(conn, row))
 
 
 def _asked(fields: EvaluationFields, raws: object) -> Asked:

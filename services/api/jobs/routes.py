@@ -31,7 +31,7 @@ from services.api.jobs.schemas import (
 from services.api.motions.routes import Found
 from services.api.motions.schemas import MotionView
 from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, Limit, PageView
+from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs
 from shared.errors import InvalidInput
 from shared.jobs.states import ENDED
@@ -41,17 +41,6 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 NDJSON = "application/x-ndjson"
 JSON = "application/json"
 SSE = "text/event-stream"
-
-IdempotencyKey = Annotated[
-    str | None,
-    Header(
-        alias="Idempotency-Key",
-        min_length=1,
-        max_length=200,
-        pattern=r"^[\x21-\x7e]+$",
-        description="The same key and body within 24 hours give the same job; another body is refused.",
-    ),
-]
 
 
 Reason = Annotated[

@@ -61,7 +61,7 @@ def run(
 
     waits = wait or fail_on_regression
     with Client.here() as client:
-        made = client.post_once("/v1/evaluations", body)
+        made = client.post_new("/v1/evaluations", body)
         if not as_json:
             console.result(made["id"])
         elif not waits:
@@ -106,6 +106,7 @@ def show(run: Run, as_json: console.Json = False) -> None:
         return
     for field in ("id", "name", "comment", "schedule", "due", "state", "reason"):
         _line(field, found[field])
+    _line("waits for", found["waits_for"])
     for field in ("bundle", "evaluator", "source", "repeats", "seed", "baseline"):
         _line(field, found["request"][field])
     _line("prompts", found["prompts"])

@@ -1,0 +1,70 @@
+"""Idempotency keys: the same request again gives what the first one made, for 24 hours."""
+
+from __future__ import annotations
+
+from typing import Literal
+from uuid import UUID
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import insert
+
+from shared.errors import InvalidInput
+from shared.jobs import schema
+from shared.jobs.errors import IdempotencyMismatch
+from shared.jobs.journal import CLOCK, interval
+from shared.jobs.policy import policy
+
+Owner = Literal["job_id", "evaluation_id"]
+
+
+def take_key(
+    conn: sa.Connection, tenant: str, key: str | None, body_sha256: str | None, owner: Owner, identifier: UUID
+) -> UUID | None:
+    """Take a key for what is about to be made, or answer what has it. Waits for a request under way with it.
+
+    Args:
+        key: None = none was sent.
+        body_sha256: digest of the request; digests of different kinds of requests differ.
+        owner: what is made.
+        identifier: its id; the row has to be there when the transaction commits.
+
+    Returns:
+        the id of what an earlier request with this key made; None = go on.
+
+    Raises:
+        InvalidInput: a key without digest.
+        IdempotencyMismatch: the key was used with another request.
+    """
+    if key is None:
+        return None
+    if body_sha256 is None:
+        raise InvalidInput("an idempotency key needs the digest of the body", where="body_sha256")
+    table = schema.idempotency
+    values = {
+        "body_sha256": body_sha256,
+        "job_id": None,
+        "evaluation_id": None,
+        owner: identifier,
+        "created_at": CLOCK,
+    }
+    forgotten = table.c.created_at < CLOCK - interval(policy().idempotency)
+    ours = conn.execute(
+        insert(table)
+        .values(tenant_id=tenant, key=key, **values)
+        .on_conflict_do_update(index_elements=["tenant_id", "key"], set_=values, where=forgotten)
+        .returning(table.c.key)
+    ).one_or_none()
+    if ours is not None:
+        return None
+    earlier = conn.execute(
+        sa.select(table.c.body_sha256, table.c[owner].label("made")).where(
+            table.c.tenant_id == tenant, table.c.key == key
+        )
+    ).one()
+    if earlier.body_sha256 != body_sha256 or earlier.made is None:
+        raise IdempotencyMismatch(
+            "this idempotency key was used with another body",
+            where=f"idempotency key {key}",
+            hint="Use a new key for a new request.",
+        )
+    return earlier.made
