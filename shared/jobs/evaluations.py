@@ -6,7 +6,6 @@ leaves an event with its reason. What makes an evaluation `done` stands in `scor
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Collection, Sequence
 from typing import Any
 from uuid import UUID
@@ -25,8 +24,9 @@ from shared.jobs.evaluation_types import (
     NewEvaluation,
     ReportFile,
 )
+from shared.jobs.files import files_of
 from shared.jobs.idempotency import take_key
-from shared.jobs.journal import CLOCK, among
+from shared.jobs.journal import CLOCK
 from shared.jobs.operate import cancel
 from shared.jobs.outbox import tell_of_evaluation
 from shared.jobs.pages import cut_page, page_limit, read_cursor
@@ -301,7 +301,7 @@ def _evaluations() -> sa.Select[*tuple[Any, ...]]:
 def _read(conn: sa.Connection, query: sa.Select[Any]) -> list[EvaluationRow]:
     """Evaluations with their reports: two queries, however many."""
     rows = conn.execute(query).mappings().all()
-    reports = _reports(conn, [row["id"] for row in rows])
+    reports = files_of(conn, schema.evaluation_report.c.evaluation_id, [row["id"] for row in rows], ReportFile)
     return [_row(row, tuple(reports[row["id"]])) for row in rows]
 
 
@@ -330,17 +330,3 @@ def _job(row: sa.RowMapping, what: str) -> EvaluationJob | None:
         started=row[f"{what}_started_at"],
         finished=row[f"{what}_finished_at"],
     )
-
-
-def _reports(conn: sa.Connection, evaluations: Sequence[UUID]) -> dict[UUID, list[ReportFile]]:
-    report, asset = schema.evaluation_report.c, schema.asset.c
-    rows = conn.execute(
-        sa.select(report.evaluation_id, report.format, asset.sha256, asset.size, asset.media_type)
-        .join(schema.asset, asset.id == report.asset_id)
-        .where(among(report.evaluation_id, evaluations))
-        .order_by(report.format)
-    )
-    found: defaultdict[UUID, list[ReportFile]] = defaultdict(list)
-    for evaluation, *values in rows:
-        found[evaluation].append(ReportFile(*values))
-    return found

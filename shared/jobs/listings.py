@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Collection, Sequence
 from typing import Any
 from uuid import UUID
@@ -11,6 +10,7 @@ import sqlalchemy as sa
 
 from shared.errors import NotFound
 from shared.jobs import schema
+from shared.jobs.files import files_of
 from shared.jobs.journal import among, no_such_job
 from shared.jobs.pages import cut_page, page_limit, read_cursor
 from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
@@ -261,7 +261,8 @@ def _motions(
         .where(wanted)
     )
     rows = conn.execute(query.order_by(motion.id if order is None else order).limit(limit)).mappings().all()
-    files = _files(conn, [row["id"] for row in rows])
+    file = schema.motion_file.c
+    files = files_of(conn, file.motion_id, [row["id"] for row in rows], MotionFile, ~file.erasing)
     return [_motion(row, files[row["id"]]) for row in rows]
 
 
@@ -270,17 +271,3 @@ def _motion(row: sa.RowMapping, files: Sequence[MotionFile]) -> MotionRow:
     review = row["review"]
     values.update(tags=tuple(row["tags"]), review=None if review is None else Review(review))
     return MotionRow(**values, files=tuple(files))
-
-
-def _files(conn: sa.Connection, motions: Sequence[UUID]) -> dict[UUID, list[MotionFile]]:
-    file, asset = schema.motion_file.c, schema.asset.c
-    rows = conn.execute(
-        sa.select(file.motion_id, file.format, asset.sha256, asset.size, asset.media_type)
-        .join(schema.asset, asset.id == file.asset_id)
-        .where(among(file.motion_id, motions), ~file.erasing)
-        .order_by(file.format)
-    )
-    files: defaultdict[UUID, list[MotionFile]] = defaultdict(list)
-    for motion, *values in rows:
-        files[motion].append(MotionFile(*values))
-    return files

@@ -87,7 +87,7 @@ FINISH = sa.text("""
         UPDATE item SET state = 'succeeded', lease_token = NULL, reason = 'committed', finished_at = clock_timestamp()
         WHERE id = ANY(:items)
     )
-    SELECT sha256 FROM ours
+    SELECT id, sha256 FROM ours
 """)
 
 
@@ -281,6 +281,15 @@ def document(problem: Problem) -> dict[str, object]:
     return asdict(problem)
 
 
+def store_assets(conn: sa.Connection, job: LockedJob, digests: Collection[str]) -> dict[str, UUID]:
+    """Announced assets are stored, in the transaction that refers to them; their ids by digest.
+
+    Raises:
+        ValueError: one was not announced by `begin_assets`.
+    """
+    return _store(conn, job, digests)
+
+
 # --- helpers ---
 
 
@@ -305,16 +314,31 @@ def _finish(conn: sa.Connection, job: LockedJob, motions: Sequence[NewMotion]) -
         for name, file in motion.files.items()
     ]
     digests = {file["sha256"] for file in files}
+    _store(conn, job, digests, items=[motion.item for motion in motions], motions=rows, files=files)
+
+
+def _store(
+    conn: sa.Connection,
+    job: LockedJob,
+    digests: Collection[str],
+    *,
+    items: Sequence[UUID] = (),
+    motions: Sequence[Mapping[str, object]] = (),
+    files: Sequence[Mapping[str, object]] = (),
+) -> dict[str, UUID]:
+    """Announced assets are stored, with the motions of items that end so; the assets by digest."""
     values = {
         "tenant": job.tenant,
         "job": job.id,
-        "items": [motion.item for motion in motions],
+        "items": list(items),
         "digests": list(digests),
-        "motions": json.dumps(rows),
+        "motions": json.dumps(motions),
         "files": json.dumps(files),
     }
-    if missing := digests - set(conn.execute(FINISH, values).scalars()):
+    found = {row.sha256: row.id for row in conn.execute(FINISH, values)}
+    if missing := set(digests) - set(found):
         raise ValueError(f"assets committed without begin_assets: {sorted(missing)}")
+    return found
 
 
 def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID], keys: Sequence[str]) -> None:

@@ -21,26 +21,13 @@ from shared.jobs.evaluation_types import (
 )
 from shared.jobs.evaluations import get_evaluation, load_prompts, lock_evaluation, move_evaluation
 from shared.jobs.journal import NewEvent, record
-from shared.jobs.results import Held, document, drop_empty_lease, end_items, hold
+from shared.jobs.results import Held, document, drop_empty_lease, end_items, hold, store_assets
 from shared.jobs.states import Cause, EvaluationState, ItemState
 from shared.jobs.types import AssetDigest, Committed, Problem
 
 OWN = ("index", "variant", "prompt", "seconds", "seed", "frames", "fps", "elapsed", "licence")
 HISTORY = 20
 """Runs that a report may draw a trend of."""
-
-# Assets are locked in the order in which they were announced; those that are missing are missing from the answer.
-STORE = sa.text("""
-    WITH ours AS MATERIALIZED (
-        SELECT id, sha256, state FROM asset
-        WHERE tenant_id = :tenant AND sha256 = ANY(:digests)
-        ORDER BY sha256
-        FOR UPDATE
-    ), stored AS (
-        UPDATE asset SET state = 'stored' FROM ours WHERE asset.id = ours.id AND ours.state = 'writing'
-    )
-    SELECT id, sha256 FROM ours
-""")
 
 EVALUATION_OF_LEASE = sa.text("""
     SELECT evaluation.id FROM evaluation JOIN lease ON lease.job_id = evaluation.score_job_id
@@ -115,10 +102,7 @@ def _write(conn: sa.Connection, held: Held, evaluation: EvaluationRow, score: Ne
     event = NewEvent("progress", score.reason, data={"items": 1})
     record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): 1})
     digests = {file.sha256 for file in score.files.values()}
-    stored = conn.execute(STORE, {"tenant": evaluation.tenant, "digests": sorted(digests)}).all()
-    assets = {row.sha256: row.id for row in stored}
-    if missing := digests - set(assets):
-        raise ValueError(f"assets committed without begin_assets: {sorted(missing)}")
+    assets = store_assets(conn, held.job, digests)
     reports = [
         {"evaluation_id": evaluation.id, "format": name, "asset_id": assets[file.sha256]}
         for name, file in score.files.items()

@@ -7,20 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from shared.bundles import Bundle, BundleWriter, TextSpec
-from shared.errors import InvalidBundle
 from shared.motion.features import layout
-from shared.nn.bundling import NOT_STORED, fill
+from shared.nn.bundling import NOT_STORED
 from workers.evaluator.config import EvaluatorConfig
 from workers.evaluator.model import MotionEncoder, SentenceEncoder
+from workers.evaluator.networks import KIND, open_networks
 from workers.evaluator.reference import Reference
 
 MODEL = "tmr"
-KIND = "evaluator"
 Statistics = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
@@ -30,23 +28,7 @@ def load_networks(bundle: Bundle) -> tuple[EvaluatorConfig, MotionEncoder, Sente
     Raises:
         InvalidBundle: of another kind, model or layout, or its tensors do not fit its configuration.
     """
-    manifest = bundle.manifest
-    if (manifest.kind, manifest.model) != (KIND, MODEL):
-        raise InvalidBundle(
-            f"is a {manifest.kind} of {manifest.model}, not an {KIND} of {MODEL}", where=str(bundle.path)
-        )
-    config = EvaluatorConfig.from_dict(manifest.parameters)
-    if (manifest.layout, manifest.fps) != (config.layout, config.fps):
-        raise InvalidBundle(f"its networks read {config.layout}, not {manifest.layout}", where=str(bundle.path))
-    motion, text = MotionEncoder(config), SentenceEncoder(config)
-    fill(motion, bundle, "motion")
-    fill(text, bundle, "text")
-    mean, std = (torch.from_numpy(values) for values in bundle.statistics())
-    if mean.shape != motion.mean.shape or std.shape != motion.std.shape:
-        raise InvalidBundle(f"statistics have shape {tuple(mean.shape)}", where=str(bundle.path))
-    motion.mean.copy_(mean)
-    motion.std.copy_(std)
-    return config, motion, text
+    return open_networks(bundle, MODEL, EvaluatorConfig.from_dict, MotionEncoder, SentenceEncoder)
 
 
 def write_bundle(

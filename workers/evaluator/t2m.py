@@ -17,9 +17,9 @@ import torch
 
 from shared.bundles import Bundle
 from shared.errors import InvalidBundle, InvalidInput
-from shared.nn.bundling import fill
 from shared.nn.devices import choose_device
 from workers.evaluator.metrics.retrieval import Distance
+from workers.evaluator.networks import open_networks
 from workers.evaluator.port import Embeddings, Motion, check_motions
 from workers.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
 from workers.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
@@ -62,20 +62,7 @@ class T2MEvaluator:
             InvalidBundle: not this evaluator, or damaged.
             InvalidInput: no such device.
         """
-        manifest = bundle.manifest
-        if (manifest.kind, manifest.model) != ("evaluator", MODEL):
-            raise InvalidBundle(f"is a {manifest.kind} of {manifest.model}, not the T2M one", where=str(bundle.path))
-        config = T2MConfig.from_dict(manifest.parameters)
-        if (manifest.layout, manifest.fps) != (config.layout, config.fps):
-            raise InvalidBundle(f"its networks read {config.layout}, not {manifest.layout}", where=str(bundle.path))
-        motion, text = MotionEncoder(config), TextEncoder(config)
-        fill(motion, bundle, "motion")
-        fill(text, bundle, "text")
-        mean, std = (torch.from_numpy(values) for values in bundle.statistics())
-        if mean.shape != motion.mean.shape or std.shape != motion.std.shape:
-            raise InvalidBundle(f"statistics have shape {tuple(mean.shape)}", where=str(bundle.path))
-        motion.mean.copy_(mean)
-        motion.std.copy_(std)
+        config, motion, text = open_networks(bundle, MODEL, T2MConfig.from_dict, MotionEncoder, TextEncoder)
         return cls(bundle, config, motion, text, _words(bundle, config), choose_device(device), tagger)
 
     @property

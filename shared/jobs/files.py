@@ -1,0 +1,43 @@
+"""Files of motions and of reports: rows that join an owner to assets by format."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.jobs import schema
+from shared.jobs.journal import among
+
+F = TypeVar("F")
+
+
+def files_of(
+    conn: sa.Connection,
+    owner: sa.Column[UUID],
+    owners: Sequence[UUID],
+    kind: Callable[[str, str, int, str], F],
+    *where: sa.ColumnElement[bool],
+) -> defaultdict[UUID, list[F]]:
+    """The files of each owner by format; one query, however many.
+
+    Args:
+        owner: the column that names the owner, in a table with `format` and `asset_id`.
+        owners: whose files.
+        kind: makes one of format, sha256, size and media type.
+        where: which files.
+    """
+    file, asset = owner.table.c, schema.asset.c
+    query = (
+        sa.select(owner, file.format, asset.sha256, asset.size, asset.media_type)
+        .join(schema.asset, asset.id == file.asset_id)
+        .where(among(owner, owners), *where)
+        .order_by(file.format)
+    )
+    found: defaultdict[UUID, list[F]] = defaultdict(list)
+    for each, *values in conn.execute(query):
+        found[each].append(kind(*values))
+    return found

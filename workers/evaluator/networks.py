@@ -1,0 +1,72 @@
+"""An evaluator's two networks out of its bundle: what every kind of evaluator does alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, TypeVar
+
+import torch
+from torch import nn
+
+from shared.bundles import Bundle
+from shared.errors import InvalidBundle
+from shared.nn.bundling import fill
+
+KIND = "evaluator"
+
+
+class Readable(Protocol):
+    """A configuration that says what motions its networks read."""
+
+    @property
+    def layout(self) -> str: ...
+    @property
+    def fps(self) -> float: ...
+
+
+C = TypeVar("C", bound=Readable)
+M = TypeVar("M", bound=nn.Module)
+T = TypeVar("T", bound=nn.Module)
+
+
+def open_networks(
+    bundle: Bundle,
+    model: str,
+    read: Callable[[Mapping[str, Any]], C],
+    motion: Callable[[C], M],
+    text: Callable[[C], T],
+) -> tuple[C, M, T]:
+    """Build and fill the encoders of a bundle, float32, in evaluation mode.
+
+    Args:
+        bundle: a verified bundle.
+        model: that it must be of.
+        read: its configuration.
+        motion: builds the motion encoder, whose `mean` and `std` are the bundle's statistics.
+        text: builds the text encoder.
+
+    Raises:
+        InvalidBundle: of another kind, model or layout, or its tensors do not fit its configuration.
+    """
+    manifest = bundle.manifest
+    if (manifest.kind, manifest.model) != (KIND, model):
+        raise InvalidBundle(
+            f"is a {manifest.kind} of {manifest.model}, not an {KIND} of {model}", where=str(bundle.path)
+        )
+    config = read(manifest.parameters)
+    if (manifest.layout, manifest.fps) != (config.layout, config.fps):
+        raise InvalidBundle(f"its networks read {config.layout}, not {manifest.layout}", where=str(bundle.path))
+    encoders = motion(config), text(config)
+    for encoder, part in zip(encoders, ("motion", "text"), strict=True):
+        fill(encoder, bundle, part)
+    _set_statistics(encoders[0], bundle)
+    return config, *encoders
+
+
+def _set_statistics(motion: nn.Module, bundle: Bundle) -> None:
+    known = (motion.get_buffer("mean"), motion.get_buffer("std"))
+    given = tuple(torch.from_numpy(values) for values in bundle.statistics())
+    if [each.shape for each in given] != [each.shape for each in known]:
+        raise InvalidBundle(f"statistics have shape {tuple(given[0].shape)}", where=str(bundle.path))
+    for buffer, values in zip(known, given, strict=True):
+        buffer.copy_(values)
