@@ -317,6 +317,6 @@ def test_the_command_line_tells_what_was_wrong(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_a_bundle_of_another_evaluator_or_layout_is_refused(bundle: Bundle) -> None:
-    for changes, message in (({"model": "tmr"}, "not the T2M one"), ({"layout": "kit-251"}, "not kit-251")):
+    for changes, message in (({"model": "tmr"}, "not an evaluator of t2m"), ({"layout": "kit-251"}, "not kit-251")):
         with pytest.raises(InvalidBundle, match=message):
             T2MEvaluator.load(Bundle(bundle.path, bundle.manifest.model_copy(update=changes)), device="cpu")
