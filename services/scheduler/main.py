@@ -22,8 +22,8 @@ from shared.jobs import (
     delete_expired,
     end_stream,
     remove_stale_assets,
-    rewrite_files,
     remove_unused_prompts,
+    rewrite_files,
     sweep,
     transaction,
 )
