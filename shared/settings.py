@@ -109,6 +109,11 @@ class Settings(BaseSettings):
     audit_days: float = Field(default=400.0, gt=0)
     """The audit log is kept this long."""
 
+    metrics_host: str = "127.0.0.1"
+    metrics_port: int | None = Field(default=None, ge=1, le=65535)
+    """Where workers and the scheduler tell Prometheus their numbers, without a key; unset = nowhere. Each process needs
+    a port of its own: `marey serve` counts up from this one. The API has `/metrics`."""
+
     log_level: str = "INFO"
     log_json: bool = False
 

@@ -11,8 +11,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from services.cli import console
+
+if TYPE_CHECKING:
+    from shared.settings import Settings
 
 TICK = 0.2
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
@@ -87,6 +91,11 @@ class Child:
 def marey(*arguments: str) -> list[str]:
     """The command line of one of our own commands."""
     return [sys.executable, "-m", "services.cli", *arguments]
+
+
+def metrics_port(config: Settings, place: int) -> dict[str, str]:
+    """What a child's environment says of its metrics: two processes cannot have one port, so they count up."""
+    return {} if config.metrics_port is None else {"MAREY_METRICS_PORT": str(config.metrics_port + place)}
 
 
 def keep_all(children: Sequence[Child]) -> None:

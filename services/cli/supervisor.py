@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from io import TextIOWrapper
 
 from services.cli import console
-from services.cli.children import Child, marey, stop_all
+from services.cli.children import Child, marey, metrics_port, stop_all
 from services.cli.place import Server, read_server, write_server
 from services.cli.roles import GENERATORS, SHOWS, role_of, threads_of
 from shared.errors import Conflict, InvalidInput, MareyError
@@ -96,18 +96,14 @@ class Supervisor:
         engine.dispose()
         self._server = Server(self.config.local_url, key, os.getpid())
         environment = self._environment(database_url, queue_url)
-        self._children = [
-            self._child("api", ["api"], environment),
-            self._child("scheduler", ["scheduler"], environment),
-            *(
-                self._child(f"worker-{i}", ["worker", "+".join(queues), "--only", "queue"], environment)
-                for i, queues in enumerate(self.roles, 1)
-            ),
-            *(
-                self._child(f"live-{model}", ["worker", model, "--only", "live"], environment)
-                for model in self._shown()
-            ),
-        ]
+        commands = {
+            "scheduler": ["scheduler"],
+            **{f"worker-{i}": ["worker", "+".join(q), "--only", "queue"] for i, q in enumerate(self.roles, 1)},
+            **{f"live-{model}": ["worker", model, "--only", "live"] for model in self._shown()},
+        }
+        self._children = [self._child("api", ["api"], environment)]
+        for place, (name, command) in enumerate(commands.items()):
+            self._children.append(self._child(name, command, {**environment, **metrics_port(self.config, place)}))
 
     def _start_backings(self) -> tuple[str, str]:
         """URLs of database and queue: those of the settings, else embedded ones."""

@@ -13,6 +13,7 @@ from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import Deliverer
+from shared import metrics
 from shared.errors import InvalidInput
 from shared.jobs import (
     KEPT,
@@ -29,6 +30,7 @@ from shared.jobs import (
 )
 from shared.motion.clip import without_prompt
 from shared.runtime.app import create_app
+from shared.runtime.exposition import expose
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
 from shared.runtime.signals import stop_on_signals
@@ -64,6 +66,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
         )
     if stopping is None:
         configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
+        expose("scheduler", chosen)
         stopping = threading.Event()
         stop_on_signals(stopping)
     database_url = chosen.database_url.get_secret_value()
@@ -109,6 +112,9 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
 
     def sweep_once() -> None:
         report = sweep(engine)
+        metrics.LEASES_LOST.inc(report.leases_lost)
+        metrics.SWEPT.labels("ready").inc(report.items_returned)
+        metrics.SWEPT.labels("dead").inc(report.items_dead)
         if report.leases_lost or report.items_dead:
             log.warning("swept", leases_lost=report.leases_lost, returned=report.items_returned, dead=report.items_dead)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from shared import metrics
 from shared.errors import Unreachable
 from shared.runtime.logs import logger
 
@@ -40,12 +41,16 @@ class Periodic(threading.Thread):
         while not self._stopping.wait(self._seconds):
             try:
                 self.once()
+                outcome = "done"
             except Unreachable as error:
+                outcome = "waiting"
                 if not self.away:
                     log.warning(f"{self.name}_waits", error=error.message)
                 self.away = True
             except Exception:
+                outcome = "failed"
                 log.exception(f"{self.name}_failed")
+            metrics.ROUNDS.labels(self.name, outcome).inc()
 
     def once(self) -> None:
         """One round.

@@ -17,6 +17,7 @@ import redis
 import sqlalchemy as sa
 from celery import Celery
 
+from shared import metrics
 from shared.errors import Unreachable
 from shared.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
 from shared.runtime.app import DRAIN, PUBLISH_RETRY
@@ -60,13 +61,16 @@ class Relay(threading.Thread):
                 with Listener(self._database_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
                         self.round()
+                        metrics.ROUNDS.labels(self.name, "done").inc()
                         if listener.wait(self._interval):
                             self._stopping.wait(LEAST_PAUSE)
                             while listener.wait(0.0):  # a burst of submits is one round
                                 pass
             except Unreachable as error:
+                metrics.ROUNDS.labels(self.name, "waiting").inc()
                 log.warning("relay_waits", error=error.message)
             except Exception:
+                metrics.ROUNDS.labels(self.name, "failed").inc()
                 log.exception("relay_failed")
             self._stopping.wait(self._interval)
 
@@ -93,6 +97,7 @@ class Relay(threading.Thread):
                 self._publish(queue)
             if missing > 0:
                 sent[queue] = missing
+                metrics.HINTS.labels(queue).inc(missing)
         return sent
 
     def _length(self, queue: str) -> int:

@@ -14,6 +14,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from services.scheduler.sending import Sender
+from shared import metrics
 from shared.errors import InvalidInput, Unreachable
 from shared.jobs import (
     Attempt,
@@ -38,6 +39,14 @@ LOOKUPS = 16
 """Names looked up at the same time."""
 STOP_SECONDS = 5.0
 """For tries under way at the end; then they are given back."""
+
+OUTCOMES: dict[DeliveryState | None, str] = {
+    DeliveryState.DELIVERED: "delivered",
+    DeliveryState.PENDING: "retried",
+    DeliveryState.FAILED: "failed",
+    None: "lost",
+}
+"""What metrics call the state after a try; None = somebody else wrote down how it went."""
 
 Given = TypeVar("Given")
 
@@ -77,11 +86,14 @@ class Deliverer(threading.Thread):
                 for due in await self._blocking(self._claim):
                     self._under_way[asyncio.create_task(self._deliver(due))] = due
                 self._away = False
+                metrics.ROUNDS.labels(self.name, "done").inc()
             except Unreachable as error:
                 if not self._away:
                     log.warning("webhooks_wait", error=error.message)
                 self._away = True
+                metrics.ROUNDS.labels(self.name, "waiting").inc()
             except Exception:
+                metrics.ROUNDS.labels(self.name, "failed").inc()
                 log.exception("webhooks_failed")
             await self._pause()
         await self._end()
@@ -158,6 +170,8 @@ class Deliverer(threading.Thread):
 
 
 def _note(due: DueDelivery, attempt: Attempt, state: DeliveryState | None) -> None:
+    metrics.WEBHOOK_SECONDS.observe(attempt.seconds)
+    metrics.WEBHOOKS.labels(OUTCOMES[state]).inc()
     values = {"webhook": str(due.webhook), "event_id": str(due.event), "kind": due.kind, "status": attempt.status}
     if state is DeliveryState.DELIVERED:
         log.info("webhook_delivered", **values)

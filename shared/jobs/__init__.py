@@ -9,7 +9,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
 """
 
 from shared.jobs.audit import audit, list_audit
-from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches, waiting_items
+from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
@@ -152,6 +152,7 @@ from shared.jobs.types import (
     WorkerBeat,
     WorkerRow,
 )
+from shared.jobs.watch import Outbox, QueueDepth, database_now, open_stream_counts, outbox_state, queue_depths
 from shared.jobs.webhook_types import (
     Attempt,
     AttemptRow,
@@ -230,9 +231,11 @@ __all__ = [
     "NewText",
     "NewWebhook",
     "Notification",
+    "Outbox",
     "Page",
     "Policy",
     "Problem",
+    "QueueDepth",
     "QueuePlace",
     "Quotas",
     "ReportFile",
@@ -284,6 +287,7 @@ __all__ = [
     "create_stream",
     "create_tenant",
     "create_webhook",
+    "database_now",
     "delete",
     "delete_expired",
     "delete_schedule",
@@ -330,10 +334,13 @@ __all__ = [
     "motions_of",
     "move_evaluation",
     "open_evaluations",
+    "open_stream_counts",
     "open_streams",
+    "outbox_state",
     "pause",
     "place_of",
     "policy",
+    "queue_depths",
     "record_attempt",
     "reinstate_tenant",
     "release",
@@ -364,5 +371,4 @@ __all__ = [
     "upgrade",
     "usage",
     "waiting_batches",
-    "waiting_items",
 ]

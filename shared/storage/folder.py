@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from shared.errors import Unreachable
+from shared.metrics import STORE_ERRORS
 from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
@@ -252,6 +253,7 @@ def _outages(root: Path, key: str | None = None) -> Generator[None]:
 
 
 def _unreachable(root: Path, error: OSError) -> Unreachable:
+    STORE_ERRORS.labels("folder").inc()
     return Unreachable(
         f"the asset folder cannot be used ({error.strerror or error})",
         where=str(root),

@@ -16,6 +16,7 @@ from minio import Minio
 from minio.error import InvalidResponseError, MinioException, S3Error, ServerError
 
 from shared.errors import Unreachable
+from shared.metrics import STORE_ERRORS
 from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
@@ -186,6 +187,9 @@ class S3Store:
         """Turn errors of the SDK into `NotFound` (of `key`) or `Unreachable`."""
         try:
             yield
+        except Unreachable:
+            STORE_ERRORS.labels("s3").inc()
+            raise
         except S3Error as error:
             if key is not None and error.code in MISSING:
                 raise no_such_object(key) from error
@@ -197,6 +201,7 @@ class S3Store:
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
     def _unreachable(self, cause: str) -> Unreachable:
+        STORE_ERRORS.labels("s3").inc()
         return Unreachable(
             f"the object store does not answer as it should ({cause})",
             where=self._where(),

@@ -1,20 +1,31 @@
-"""What Prometheus reads."""
+"""What Prometheus reads of the API: its own requests, and the queues as they stand in the tables."""
 
 from __future__ import annotations
 
+import threading
 import time
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 
 import sqlalchemy as sa
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client import Gauge, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shared.jobs import live_workers, transaction, waiting_items
+from shared import metrics
+from shared.jobs import (
+    Outbox,
+    QueueDepth,
+    live_workers,
+    open_stream_counts,
+    outbox_state,
+    queue_depths,
+    transaction,
+)
+from shared.metrics import MAX_TENANTS, OTHER_TENANTS
 
-REGISTRY = CollectorRegistry()
-REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", "route", "status"), registry=REGISTRY)
-SECONDS = Histogram("marey_http_seconds", "Time to the end of an answer.", ("method", "route"), registry=REGISTRY)
-WAITING = Gauge("marey_waiting_items", "Ready items, by queue.", ("queue",), registry=REGISTRY)
-WORKERS = Gauge("marey_live_workers", "Workers seen lately, by queue.", ("queue",), registry=REGISTRY)
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+"""Any other is counted as `other`: a client may make up as many as it likes."""
+_rendering = threading.Lock()
 
 
 def render(engine: sa.Engine) -> bytes:
@@ -24,12 +35,58 @@ def render(engine: sa.Engine) -> bytes:
         Unreachable: the database does not answer.
     """
     with transaction(engine) as conn:
-        waiting, workers = waiting_items(conn), live_workers(conn)
-    for gauge, values in ((WAITING, waiting), (WORKERS, workers)):
+        depths, workers = queue_depths(conn), live_workers(conn)
+        streams, outbox = open_stream_counts(conn), outbox_state(conn)
+    with _rendering:  # two scrapes at once would clear each other's gauges
+        _show_queues(bounded(depths))
+        _show(metrics.WORKERS, workers)
+        _show(metrics.STREAMS, streams)
+        _show_outbox(outbox)
+        return generate_latest(metrics.API)
+
+
+def bounded(depths: Iterable[QueueDepth], limit: int = MAX_TENANTS) -> list[QueueDepth]:
+    """The same with at most `limit` tenants by name, those with the most items; the others are summed up, by queue."""
+    rows = list(depths)
+    sizes: defaultdict[str, int] = defaultdict(int)
+    for row in rows:
+        sizes[row.tenant] += row.waiting + row.running
+    named = set(sorted(sizes, key=lambda tenant: (-sizes[tenant], tenant))[:limit])
+    others: dict[str, QueueDepth] = {}
+    for row in rows:
+        if row.tenant not in named:
+            sofar = others.get(row.queue, QueueDepth(row.queue, OTHER_TENANTS, 0, 0, 0.0, 0.0))
+            others[row.queue] = QueueDepth(
+                row.queue,
+                OTHER_TENANTS,
+                sofar.waiting + row.waiting,
+                sofar.running + row.running,
+                max(sofar.oldest, row.oldest),
+                max(sofar.unserved, row.unserved),
+            )
+    return [*(row for row in rows if row.tenant in named), *others.values()]
+
+
+def _show_queues(depths: Iterable[QueueDepth]) -> None:
+    for gauge in (metrics.WAITING, metrics.RUNNING, metrics.OLDEST, metrics.UNSERVED):
         gauge.clear()
-        for queue, value in values.items():
-            gauge.labels(queue).set(value)
-    return generate_latest(REGISTRY)
+    for row in depths:
+        metrics.WAITING.labels(row.queue, row.tenant).set(row.waiting)
+        metrics.RUNNING.labels(row.queue, row.tenant).set(row.running)
+        if row.waiting:
+            metrics.OLDEST.labels(row.queue, row.tenant).set(row.oldest)
+            metrics.UNSERVED.labels(row.queue, row.tenant).set(row.unserved)
+
+
+def _show(gauge: Gauge, values: Mapping[str, int]) -> None:
+    gauge.clear()
+    for label, value in values.items():
+        gauge.labels(label).set(value)
+
+
+def _show_outbox(outbox: Outbox) -> None:
+    metrics.WEBHOOKS_PENDING.set(outbox.pending)
+    metrics.WEBHOOKS_OVERDUE.set(outbox.overdue)
 
 
 class Measure:
@@ -56,5 +113,6 @@ class Measure:
             await self.app(scope, receive, noted)
         finally:
             route = getattr(scope.get("route"), "path", "other")
-            REQUESTS.labels(scope["method"], route, str(status)).inc()
-            SECONDS.labels(scope["method"], route).observe(time.perf_counter() - began)
+            method = scope["method"] if scope["method"] in METHODS else "other"
+            metrics.HTTP_REQUESTS.labels(method, route, str(status)).inc()
+            metrics.HTTP_SECONDS.labels(method, route).observe(time.perf_counter() - began)

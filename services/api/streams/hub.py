@@ -12,6 +12,7 @@ from redis.backoff import NoBackoff
 from redis.retry import Retry
 
 from shared.errors import Busy
+from shared.metrics import SOCKETS as SOCKETS_OPEN
 from shared.runtime.queue import redis_client
 
 Answer = TypeVar("Answer")
@@ -60,10 +61,12 @@ class Hub:
         if not self._places:
             raise Busy(f"{SOCKETS} sockets are open at this process, and no more may be", seconds=RETRY_SECONDS)
         self._places -= 1
+        SOCKETS_OPEN.inc()
         try:
             yield
         finally:
             self._places += 1
+            SOCKETS_OPEN.dec()
 
     def close(self) -> None:
         """Give the connections back."""

@@ -62,7 +62,7 @@ def worker(
     queues = parse_roles(model.replace(",", "+"))[0]
     shown = [queue for queue in queues if queue in SHOWS]
     try:
-        from services.cli.children import Child, keep_all, marey
+        from services.cli.children import Child, keep_all, marey, metrics_port
         from shared.runtime.worker import worker_main
         from shared.settings import settings
     except ImportError as error:
@@ -78,9 +78,10 @@ def worker(
     role = role_of(queues, settings())
     if only is Part.QUEUE or not shown or not settings().live_slots:
         raise typer.Exit(worker_main(role, settings()))
-    parts = [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
-    parts.append((f"{model} queue", [model, "--only", "queue"]))
-    keep_all([Child(name, marey("worker", *arguments), dict(os.environ)) for name, arguments in parts])
+    parts = [(f"{model} queue", [model, "--only", "queue"])]
+    parts += [(f"{queue} live", [queue, "--only", "live"]) for queue in shown]
+    places = [{**os.environ, **metrics_port(settings(), place)} for place in range(len(parts))]
+    keep_all([Child(n, marey("worker", *rest), place) for (n, rest), place in zip(parts, places, strict=True)])
 
 
 def scheduler() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import redis
 import sqlalchemy as sa
 
+from shared import metrics
 from shared.errors import InvalidInput, MareyError, Unreachable
 from shared.jobs import (
     NewItem,
@@ -28,6 +29,7 @@ from shared.jobs import (
     take_stream,
     transaction,
 )
+from shared.runtime.exposition import measure_gpu
 from shared.runtime.faults import as_problem, patiently
 from shared.runtime.live.held import Held
 from shared.runtime.live.loop import LiveLoop, Over
@@ -133,6 +135,7 @@ class Keeper(threading.Thread):
         held.lost = True
         self._held.pop(str(held.row.id), None)
         self._loop.leave(held)
+        metrics.LIVE_LOST.inc()
         log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
 
     # --- taking ---
@@ -229,6 +232,7 @@ class Keeper(threading.Thread):
     # --- writing down ---
 
     def _record(self) -> None:
+        measure_gpu()
         with transaction(self._engine) as conn:
             beat(conn, self._worker)
         now = time.monotonic()

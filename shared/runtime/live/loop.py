@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from shared import metrics
 from shared.errors import MareyError, Unreachable
 from shared.jobs import StreamState
 from shared.runtime.faults import as_problem
@@ -74,6 +75,7 @@ class LiveLoop:
                 due += 1.0 / self.room.fps
                 if self._clock() - due > BEHIND_SECONDS:
                     due = self._clock()
+                    metrics.LIVE_LATE.inc()
         finally:
             self.finished.set()
 
@@ -82,8 +84,12 @@ class LiveLoop:
         self.ticked = self._clock()
         while not self._calls.empty():
             self._calls.get()()
+        metrics.LIVE_STREAMS.set(len(self._held))
         try:
+            began, shown = time.perf_counter(), len(self._held)
             self._frames(self._step())
+            if shown:
+                metrics.LIVE_TICK_SECONDS.observe(time.perf_counter() - began)
         except Exception as error:
             log.exception("room_broke", streams=len(self._held))
             self._rebuild(error)
@@ -188,8 +194,10 @@ class LiveLoop:
         except LeaseLost:
             log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
             held.lost = True
+            metrics.LIVE_LOST.inc()
             self._close(held, "another worker has it")
             return
+        metrics.LIVE_FRAMES.inc(len(held.unwritten))
         held.unwritten.clear()
         held.shown = len(held.tokens)
 

@@ -11,6 +11,7 @@ from typing import cast
 from shared.errors import InvalidInput
 from shared.jobs import WorkerBeat, create_engine
 from shared.runtime.child import wait_for_database
+from shared.runtime.exposition import expose
 from shared.runtime.live.keeper import QUEUE, Keeper
 from shared.runtime.live.loop import LiveLoop
 from shared.runtime.live.port import ShowFactory
@@ -44,6 +45,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
         )
     if stopping is None:
         configure_logging("live", level=chosen.log_level, json=chosen.log_json)
+        expose("live", chosen)
         stopping = threading.Event()
         stop_on_signals(stopping)
     wait_for_database(chosen)

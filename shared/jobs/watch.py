@@ -1,0 +1,91 @@
+"""How the queues stand, for who watches them: a few small queries, however many items there are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+import sqlalchemy as sa
+
+# A lane is a counter row; the age of its oldest item is one probe of `ix_item_ready`, in input order: re-rolls come
+# last. What waits for another try (`run_after`) is in no lane.
+QUEUES = sa.text("""
+    WITH waiting AS (
+        SELECT lane.queue, job.tenant_id, sum(lane.ready + lane.solo)::bigint AS items,
+               min(oldest.created_at) AS since, min(lane.waiting_since) AS unserved
+        FROM lane JOIN job ON job.id = lane.job_id
+             LEFT JOIN LATERAL (
+                 SELECT item.created_at FROM item
+                 WHERE item.job_id = lane.job_id AND item.queue = lane.queue AND item.batch_key = lane.batch_key
+                   AND item.state = 'ready' AND item.run_after IS NULL
+                   AND item.solo = (lane.ready = 0)
+                 ORDER BY item.position LIMIT 1
+             ) AS oldest ON true
+        WHERE lane.ready + lane.solo > 0 AND job.control = 'run'
+        GROUP BY lane.queue, job.tenant_id
+    ), running AS (
+        SELECT lease.queue, job.tenant_id, count(*) AS items
+        FROM lease JOIN job ON job.id = lease.job_id JOIN item ON item.lease_token = lease.token
+        GROUP BY lease.queue, job.tenant_id
+    )
+    SELECT queue, tenant_id AS tenant, coalesce(waiting.items, 0)::bigint AS waiting,
+           coalesce(running.items, 0)::bigint AS running,
+           coalesce(extract(epoch FROM clock_timestamp() - waiting.since), 0)::float8 AS oldest,
+           coalesce(extract(epoch FROM clock_timestamp() - waiting.unserved), 0)::float8 AS unserved
+    FROM waiting FULL JOIN running USING (queue, tenant_id)
+    ORDER BY queue, tenant
+""")
+
+STREAMS = sa.text("SELECT state, count(*) AS streams FROM stream WHERE ended_at IS NULL GROUP BY state")
+
+WEBHOOKS = sa.text("""
+    SELECT count(*) AS pending,
+           coalesce(extract(epoch FROM clock_timestamp() - min(delivery.next_at)), 0)::float8 AS overdue
+    FROM webhook_delivery AS delivery JOIN webhook ON webhook.id = delivery.webhook_id
+    WHERE delivery.state = 'pending' AND NOT webhook.paused
+""")
+
+
+@dataclass(frozen=True)
+class QueueDepth:
+    """What one tenant has in one queue; times in seconds."""
+
+    queue: str
+    tenant: str
+    waiting: int
+    """Ready items of jobs that run."""
+    running: int
+    """Items under a lease."""
+    oldest: float
+    """Since the oldest of the ready ones was submitted; a retry does not begin anew."""
+    unserved: float
+    """Since any of the ready ones' kind was last claimed, at most."""
+
+
+@dataclass(frozen=True)
+class Outbox:
+    """What webhooks are still to be told, and how late the next one is, in seconds."""
+
+    pending: int
+    overdue: float
+
+
+def queue_depths(conn: sa.Connection) -> list[QueueDepth]:
+    """Every queue and tenant that has something waiting or running."""
+    return [QueueDepth(**row) for row in conn.execute(QUEUES).mappings()]
+
+
+def open_stream_counts(conn: sa.Connection) -> dict[str, int]:
+    """How many live streams are open, by state."""
+    return {row.state: row.streams for row in conn.execute(STREAMS)}
+
+
+def outbox_state(conn: sa.Connection) -> Outbox:
+    """The deliveries that are pending, of webhooks that are not paused."""
+    row = conn.execute(WEBHOOKS).one()
+    return Outbox(row.pending, max(0.0, row.overdue))
+
+
+def database_now(conn: sa.Connection) -> datetime:
+    """The database's clock."""
+    return conn.execute(sa.text("SELECT clock_timestamp()")).scalar_one()

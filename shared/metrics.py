@@ -1,0 +1,119 @@
+"""Every metric of the product; a process shows those of its part. `docs/operations.md` says what each is for.
+
+Labels are names from short lists: queues, states, stages, parts, routes. Tenants are the one label that grows with use;
+`MAX_TENANTS` of them have series of their own. Nothing here is an identifier of a job, an item or a key.
+"""
+
+from __future__ import annotations
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+
+
+def _part() -> CollectorRegistry:
+    """What one kind of process shows, and what all show. A gauge that nobody sets is nowhere as a nought."""
+    registry = CollectorRegistry()
+    registry.register(COMMON)
+    return registry
+
+
+COMMON = CollectorRegistry()
+ProcessCollector(registry=COMMON)  # memory, CPU time, open files
+API, WORKER, LIVE, SCHEDULER = _part(), _part(), _part(), _part()
+PARTS = {"api": API, "worker": WORKER, "live": LIVE, "scheduler": SCHEDULER}
+
+MAX_TENANTS = 50
+"""Tenants with series of their own, those that wait most; the rest is summed up."""
+OTHER_TENANTS = "(other)"
+"""No tenant has this name: parentheses are not allowed in one."""
+
+FAST = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0)
+"""Seconds: from a claim to the run of a large batch on a slow machine."""
+
+# --- the API: what it answers ---
+
+HTTP_REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", "route", "status"), registry=API)
+HTTP_SECONDS = Histogram("marey_http_seconds", "Time to the end of an answer.", ("method", "route"), registry=API)
+SOCKETS = Gauge("marey_open_sockets", "Clients that watch a live stream.", registry=API)
+
+# --- the API: how the tables stand, asked at each scrape ---
+
+QUEUE = ("queue", "tenant")
+WAITING = Gauge("marey_waiting_items", "Ready items of jobs that run.", QUEUE, registry=API)
+RUNNING = Gauge("marey_running_items", "Items under a lease.", QUEUE, registry=API)
+OLDEST = Gauge("marey_oldest_waiting_seconds", "Age of the oldest ready item.", QUEUE, registry=API)
+UNSERVED = Gauge("marey_unserved_seconds", "Longest time that ready items waited for any claim.", QUEUE, registry=API)
+WORKERS = Gauge("marey_live_workers", "Workers seen lately, by queue.", ("queue",), registry=API)
+STREAMS = Gauge("marey_streams", "Open live streams, by state.", ("state",), registry=API)
+WEBHOOKS_PENDING = Gauge("marey_webhooks_pending", "Deliveries still to be made.", registry=API)
+WEBHOOKS_OVERDUE = Gauge("marey_webhooks_overdue_seconds", "How late the next delivery is.", registry=API)
+CANCELLED = Counter("marey_cancelled_items", "Items that operators cancelled.", registry=API)
+
+# --- workers ---
+
+BATCH_ITEMS = Histogram(
+    "marey_batch_items", "Items of a claim.", ("queue",), buckets=(1, 2, 4, 8, 16, 32, 64), registry=WORKER
+)
+STAGE_SECONDS = Histogram(
+    "marey_stage_seconds",
+    "Time of a stage of a batch: claim, load, run (a bucket), export (an item), store, commit.",
+    ("queue", "stage"),
+    buckets=FAST,
+    registry=WORKER,
+)
+ITEMS = Counter(
+    "marey_items",
+    "Items that came out of a worker, by the state they went to: ready are tried again.",
+    ("queue", "state"),
+    registry=WORKER,
+)
+THROWN_AWAY = Counter(
+    "marey_results_thrown_away", "Results that nobody wanted: lease lost or cancelled.", ("queue",), registry=WORKER
+)
+OUTAGES = Counter("marey_outages", "Times a worker gave items back uncounted.", ("queue",), registry=WORKER)
+GPU_MEMORY = Gauge(
+    "marey_gpu_memory_bytes",
+    "Memory of the device: allocated and reserved by this worker, free and total of all.",
+    ("device", "kind"),
+    registry=WORKER,
+)
+LIVE.register(GPU_MEMORY)
+
+# --- live workers ---
+
+LIVE_STREAMS = Gauge("marey_live_streams", "Streams that this worker shows.", registry=LIVE)
+LIVE_FRAMES = Counter("marey_live_frames", "Frames that Redis has got.", registry=LIVE)
+LIVE_TICK_SECONDS = Histogram(
+    "marey_live_tick_seconds",
+    "Time to make one frame of every stream.",
+    buckets=(0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.075, 0.1, 0.2, 0.5, 1.0),
+    registry=LIVE,
+)
+LIVE_LATE = Counter("marey_live_late", "Times the clock of the frames was set anew: too slow.", registry=LIVE)
+LIVE_LOST = Counter("marey_live_leases_lost", "Streams that went to another worker.", registry=LIVE)
+
+# --- the scheduler ---
+
+ROUNDS = Counter(
+    "marey_scheduler_rounds",
+    "Rounds of a part of the scheduler: done, waiting (something is away) or failed.",
+    ("part", "outcome"),
+    registry=SCHEDULER,
+)
+HINTS = Counter("marey_hints", "Hints that the relay sent, by queue.", ("queue",), registry=SCHEDULER)
+LEASES_LOST = Counter("marey_leases_lost", "Leases of workers that fell silent, taken back.", registry=SCHEDULER)
+SWEPT = Counter(
+    "marey_swept_items",
+    "Items of lost leases, by the state they went to: ready or dead.",
+    ("state",),
+    registry=SCHEDULER,
+)
+WEBHOOKS = Counter(
+    "marey_webhook_tries", "Tries to tell a webhook: delivered, retried or failed.", ("outcome",), registry=SCHEDULER
+)
+WEBHOOK_SECONDS = Histogram("marey_webhook_seconds", "Time of a try.", registry=SCHEDULER)
+
+# --- everywhere ---
+
+STORE_ERRORS = Counter(
+    "marey_store_errors", "Times the asset store could not be used, by kind: folder or s3.", ("store",), registry=COMMON
+)

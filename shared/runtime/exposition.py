@@ -1,0 +1,55 @@
+"""Where a worker or the scheduler tells Prometheus its numbers. The API has a route for that."""
+
+from __future__ import annotations
+
+import sys
+
+from prometheus_client import start_http_server
+
+from shared import metrics
+from shared.errors import Conflict
+from shared.runtime.logs import logger
+from shared.settings import Settings
+
+log = logger(__name__)
+
+
+def expose(part: str, chosen: Settings) -> None:
+    """Answer at `MAREY_METRICS_HOST` and `MAREY_METRICS_PORT` until the process ends; where no port is set, nowhere.
+
+    A worker's child does so, not its parent: the numbers are where the work is, and stand there once.
+
+    Args:
+        part: whose numbers: a name of `metrics.PARTS`.
+
+    Raises:
+        Conflict: the port is taken.
+    """
+    if chosen.metrics_port is None:
+        return
+    try:
+        start_http_server(chosen.metrics_port, chosen.metrics_host, metrics.PARTS[part])
+    except OSError as error:
+        raise Conflict(
+            f"port {chosen.metrics_port} of {chosen.metrics_host} cannot be used: {error.strerror}",
+            where="MAREY_METRICS_PORT",
+            hint="Each worker and the scheduler need one of their own.",
+        ) from error
+    log.info("metrics_served", host=chosen.metrics_host, port=chosen.metrics_port)
+
+
+def measure_gpu() -> None:
+    """Note how full the device is; nothing where torch was not imported, or uses none."""
+    torch = sys.modules.get("torch")
+    if torch is None or not torch.cuda.is_available() or not torch.cuda.is_initialized():
+        return
+    device = torch.cuda.current_device()
+    free, total = torch.cuda.mem_get_info(device)
+    kinds = {
+        "allocated": torch.cuda.memory_allocated(device),
+        "reserved": torch.cuda.memory_reserved(device),
+        "free": free,
+        "total": total,
+    }
+    for kind, size in kinds.items():
+        metrics.GPU_MEMORY.labels(f"cuda:{device}", kind).set(size)
