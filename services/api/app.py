@@ -34,6 +34,7 @@ from services.api.streams.hub import Hub
 from services.api.streams.routes import router as streams_router
 from services.api.streams.wire import StreamProtocol
 from services.api.tailer import Tailer
+from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
 from services.text.routes import router as texts_router
 from shared.errors import InvalidInput
@@ -41,6 +42,7 @@ from shared.jobs import create_engine
 from shared.runtime.logs import configure_logging
 from shared.settings import Settings, settings
 from shared.storage import open_store
+from shared.tracing import configure_tracing
 from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
@@ -80,6 +82,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         app.include_router(router)
     app.add_middleware(BodyGuard)
     app.add_middleware(HostGuard, allowed=config.allowed_hosts)
+    app.add_middleware(Trace)
     app.add_middleware(Measure)
     app.openapi = lambda: openapi(app)
     return app
@@ -151,6 +154,7 @@ def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
     config = settings()
     configure_logging("api", level=config.log_level, json=config.log_json)
+    configure_tracing("api")
     uvicorn.run(
         create_app(config, routers),
         host=config.host,

@@ -13,6 +13,7 @@ from uuid import uuid4
 import httpx2
 
 from services.cli.place import Server, find_server
+from shared import tracing
 from shared.errors import (
     Busy,
     Conflict,
@@ -150,7 +151,7 @@ class Client:
         pause = FIRST_PAUSE
         for attempt in range(1, ATTEMPTS + 1):
             try:
-                response = self._http.request(method, path, **request)
+                response = self._request(method, path, request)
             except httpx2.TransportError as error:
                 never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
                 if (
@@ -169,6 +170,16 @@ class Client:
             time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
             pause = min(pause * 2, LONGEST_PAUSE)
         raise AssertionError("unreachable: the last attempt returns or raises")
+
+    def _request(self, method: str, path: str, request: Mapping[str, Any]) -> httpx2.Response:
+        """One attempt, as a span where traces are on; the server goes on from it."""
+        with tracing.span(f"{method} {path.partition('?')[0]}", kind="client") as span:
+            headers = dict(request.get("headers") or {})
+            if span.traceparent is not None:
+                headers[tracing.HEADER] = span.traceparent
+            response = self._http.request(method, path, **{**request, "headers": headers})
+            span.set(**{"http.response.status_code": response.status_code})
+            return response
 
 
 def error_of(response: httpx2.Response) -> MareyError:

@@ -27,9 +27,13 @@ from services.cli.commands import (
     train,
     webhooks,
 )
+from shared import tracing
 from shared.errors import MareyError
 
 INTERRUPTED = 130
+SERVING = frozenset({"serve", "worker", "scheduler", "api", "text", "train", "data"})
+PATIENCE = 2.0
+"""Seconds that a command waits at its end for a collector that does not answer."""
 
 HELP = """Text in, 3D human motion out.
 
@@ -45,6 +49,8 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except MareyError as error:
+            if isinstance(ctx.obj, tracing.Span):
+                ctx.obj.fail(error)
             console.say(f"marey: {error}")
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
@@ -73,11 +79,27 @@ def _version(wanted: bool) -> None:
         raise typer.Exit(0)
 
 
+def _trace(ctx: typer.Context) -> None:
+    """Make the command the root of a trace, where traces are wanted; a server's processes begin traces of their own."""
+    command = ctx.invoked_subcommand
+    if command is None or command in SERVING or not tracing.wanted():
+        return
+    try:
+        tracing.configure_tracing("cli", patience=PATIENCE)
+    except MareyError as error:
+        console.say(f"marey: this command is not traced: {error}")  # and runs: it is not what was asked for
+        return
+    ctx.call_on_close(tracing.end_tracing)
+    ctx.obj = ctx.with_resource(tracing.span(f"marey {command}"))
+
+
 @app.callback()
 def root(
+    ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Show it.")] = False,
 ) -> None:
-    """Nothing of its own: the help stands in `HELP`."""
+    """Nothing but the trace: the help stands in `HELP`."""
+    _trace(ctx)
 
 
 app.command("generate")(generate.generate)

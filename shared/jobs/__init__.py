@@ -9,7 +9,7 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
 """
 
 from shared.jobs.audit import audit, list_audit
-from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches
+from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches, waiting_items
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
@@ -371,4 +371,5 @@ __all__ = [
     "upgrade",
     "usage",
     "waiting_batches",
+    "waiting_items",
 ]

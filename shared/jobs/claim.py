@@ -178,6 +178,20 @@ def waiting_batches(conn: sa.Connection, batch_sizes: Mapping[str, int]) -> dict
     return {row.queue: row.batches for row in conn.execute(WAITING, sizes)}
 
 
+def waiting_items(conn: sa.Connection) -> dict[str, int]:
+    """How many items of running jobs are ready, by queue. Only queues with some."""
+    lane, job = schema.lane, schema.job
+    count = sa.func.sum(lane.c.ready + lane.c.solo)
+    query = (
+        sa.select(lane.c.queue, count.label("items"))
+        .join(job, job.c.id == lane.c.job_id)
+        .where(job.c.control == JobControl.RUN)
+        .group_by(lane.c.queue)
+        .having(count > 0)
+    )
+    return {row.queue: int(row.items) for row in conn.execute(query)}
+
+
 def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, rules: Policy) -> list[_Lane]:
     """The lanes in the order to try: one that fits what is loaded first, unless the next in order lost its patience."""
     ordered = list(lanes)

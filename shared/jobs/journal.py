@@ -53,6 +53,7 @@ class LockedJob:
     cancelled: int
     erased: bool = False
     """Its prompts are gone: nothing of it can be made again."""
+    traceparent: str | None = None
 
     @property
     def state(self) -> JobState:
@@ -96,6 +97,7 @@ def lock_job(
         table.total,
         *(table[str(state)] for state in ItemState),
         table.erased_at.is_not(None).label("erased"),
+        table.traceparent,
     ).where(table.id == job)
     if tenant is not None:
         query = query.where(table.tenant_id == tenant)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -158,19 +159,19 @@ def fail_items(
     held = hold(conn, lease_token, [failure.item for failure in failures])
     if held is None:
         return Committed((), tuple(failure.item for failure in failures))
-    ends: dict[tuple[ItemState, ItemState], int] = {}
+    states: dict[UUID, ItemState] = {}
     events: list[NewEvent] = []
     for failure in failures:
         row = held.items.get(failure.item)
         if row is not None:
-            after, event = _fail(conn, row, failure, rules)
-            ends[ItemState.LEASED, after] = ends.get((ItemState.LEASED, after), 0) + 1
+            states[failure.item], event = _fail(conn, row, failure, rules)
             events.append(event)
     if events:
-        job = record(conn, held.job, events, moved=ends)
+        moved = {(ItemState.LEASED, state): count for state, count in Counter(states.values()).items()}
+        job = record(conn, held.job, events, moved=moved)
         drop_empty_lease(conn, lease_token)
         _fail_early(conn, job)
-    return held.committed([failure.item for failure in failures])
+    return replace(held.committed([failure.item for failure in failures]), states=states)
 
 
 def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence[UUID] | None = None) -> Committed:

@@ -103,6 +103,7 @@ job = sa.Table(
     sa.Column("finished_at", Time),
     sa.Column("keep_days", sa.Integer),  # deleted this long after it ended; null = by hand alone
     sa.Column("erased_at", Time),  # its prompts are gone
+    sa.Column("traceparent", sa.Text),  # of the request that submitted it: what is done for it goes on from there
     sa.CheckConstraint(_one_of("control", list(JobControl)), name="control"),
     sa.CheckConstraint("priority BETWEEN -1000 AND 1000", name="priority"),
     sa.CheckConstraint("fail_early BETWEEN 0 AND 1", name="fail_early"),
@@ -112,6 +113,7 @@ job = sa.Table(
         name="counters",
     ),
     sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
+    sa.CheckConstraint("traceparent ~ '^00-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}$'", name="traceparent"),
     sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),
     sa.Index("ix_job_keep_days", "id", postgresql_where=sa.text("keep_days IS NOT NULL")),
     # For counting what a tenant has in the queue. Its predicate changes once in a job's life.

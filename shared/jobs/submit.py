@@ -77,6 +77,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
             priority=job.priority,
             fail_early=job.fail_early,
             keep_days=job.keep_days,
+            traceparent=job.traceparent,
         )
     )
     lanes = write_items(conn, identifier, job.items)

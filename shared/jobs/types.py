@@ -98,6 +98,8 @@ class NewJob:
     idempotency_key: str | None = None
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
+    traceparent: str | None = None
+    """Of the request, as `shared.tracing` writes it."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,8 @@ class Claim:
     solo: bool
     """The single item of this claim was in a batch whose lease was lost; losing this one costs it an attempt."""
     items: tuple[ClaimedItem, ...]
+    traceparent: str | None = None
+    """Of the request that submitted the job."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +245,8 @@ class Committed:
     """Written now."""
     lost: tuple[UUID, ...]
     """Not ours any more (lease lost, cancelled, or committed before): the result is thrown away."""
+    states: Mapping[UUID, ItemState] = field(default_factory=dict[UUID, ItemState])
+    """Of items that could not be made: `failed`, `dead`, or `ready` for another try."""
 
 
 # --- rows ---

@@ -18,6 +18,7 @@ from shared.errors import InvalidInput, Unreachable
 from shared.jobs import Heartbeat as Answer
 from shared.jobs import WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
 from shared.runtime.committer import Committer
+from shared.runtime.exposition import expose, measure_gpu
 from shared.runtime.faults import patiently
 from shared.runtime.handler import Handler, HandlerFactory, Role
 from shared.runtime.lease import Heartbeat
@@ -26,6 +27,7 @@ from shared.runtime.loop import Drain
 from shared.runtime.status import WorkerStatus, status_file, write_status
 from shared.settings import Settings, settings
 from shared.storage import open_store
+from shared.tracing import configure_tracing, end_tracing
 
 log = logger(__name__)
 
@@ -100,6 +102,8 @@ class Child:
         Raises: whatever a handler raises on loading.
         """
         configure_logging(f"worker-{self._role.name}", level=self._settings.log_level, json=self._settings.log_json)
+        configure_tracing(f"worker-{self._role.name}")
+        expose("worker", self._settings)
         signal.signal(signal.SIGTERM, self._on_sigterm)
         self._tell_status()  # the parent finds us by it
         self._heartbeat.start()
@@ -131,6 +135,7 @@ class Child:
                     retire(conn, self._worker(queue))
         except Unreachable as error:
             log.warning("not_retired", error=error.message)  # the row says by its age that nobody is there
+        end_tracing()  # billiard ends this process without what runs at an ordinary exit
 
     def _on_sigterm(self, _signal: int, _frame: FrameType | None) -> None:
         self._stopping.set()
@@ -155,6 +160,7 @@ class Child:
 
     def _present(self) -> None:
         """Tell the relay (by row) and probes (by file) that this worker lives."""
+        measure_gpu()
         try:
             if self._ready and not self._stopping.is_set():
                 self._beat()

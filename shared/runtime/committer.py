@@ -35,6 +35,7 @@ from shared.runtime.faults import as_problem, patiently
 from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
 from shared.runtime.lease import Heartbeat, HeldLease
 from shared.runtime.logs import logger
+from shared.runtime.watching import ids_of
 from shared.storage import AssetStore, NewObject
 
 log = logger(__name__)
@@ -43,6 +44,14 @@ GROUP = 64  # outcomes of one transaction, at most: a commit costs an fsync and 
 GROUP_SECONDS = 2.0  # but what a killed child would lose is kept small
 STORE_PATIENCE = 60.0  # seconds; rides out a restart of the store, after that the items are given back
 DATABASE_PATIENCE = 120.0
+WENT = {
+    "motions": "succeeded",
+    "score": "succeeded",
+    "texts": "parsed",
+    "failures": "failed",
+    "release": "released",
+}
+"""Where items go by a write, if it does not say of each; as metrics call it."""
 
 
 @dataclass(frozen=True)
@@ -123,17 +132,22 @@ class Committer(threading.Thread):
     def run(self) -> None:
         while (message := self._next()) is not None:
             lease, first = message
-            try:
-                if isinstance(first, _Finish):
-                    self._give_back(lease, lease.open, first.reason)
-                else:
-                    self._write_or_fail(lease, self._group(lease, first))
-            except Exception as error:  # the thread must live; what is not written runs again when the lease is swept
-                problem = as_problem(error)
-                log.exception("not_written", job=str(lease.claim.job), error=problem.problem_type)
+            with lease.work.bound():
+                self._take(lease, first)
             if isinstance(first, _Finish):
+                lease.work.end()
                 self._heartbeat.let_go(lease)
                 self.dismiss()
+
+    def _take(self, lease: HeldLease, first: Outcome | _Finish) -> None:
+        try:
+            if isinstance(first, _Finish):
+                self._give_back(lease, lease.open, first.reason)
+            else:
+                self._write_or_fail(lease, self._group(lease, first))
+        except Exception as error:  # the thread must live; what is not written runs again when the lease is swept
+            problem = as_problem(error)
+            log.exception("not_written", error=problem.problem_type)
 
     def _next(self) -> tuple[HeldLease, Outcome | _Finish] | None:
         message, self._held_back = self._held_back, None
@@ -163,7 +177,8 @@ class Committer(threading.Thread):
         if not isinstance(outcome, Done):
             return outcome
         try:
-            export = outcome.export()
+            with lease.work.stage("export", item=outcome.item):
+                export = outcome.export()
         except MareyError as error:
             return Failed(outcome.item, error, retryable=isinstance(error, Unreachable))
         except Exception as error:
@@ -180,7 +195,7 @@ class Committer(threading.Thread):
         except Unreachable:
             raise  # given back when the lease is finished
         except Exception as error:
-            log.exception("write_failed", job=str(lease.claim.job), items=len(group))
+            log.exception("write_failed", items=len(group), item_ids=ids_of(outcome.item for outcome in group))
             problem = Problem.of(as_problem(error))
             failures = [ItemFailure(outcome.item, problem, retryable=True) for outcome in group]
             lease.settle(outcome.item for outcome in group)
@@ -237,7 +252,8 @@ class Committer(threading.Thread):
 
         if not patiently(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
             lease.settle(items)
-            log.info("results_thrown_away", job=str(lease.claim.job), items=len(items))
+            lease.work.wrote((), lost=len(items))
+            log.info("results_thrown_away", items=len(items), item_ids=ids_of(items))
             return False
         left = {asset_key(lease.claim.tenant, digest.sha256): file for file, digest in files}
 
@@ -248,9 +264,11 @@ class Committer(threading.Thread):
                 lease.progress(0, 0)
 
         try:
-            patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
+            with lease.work.stage("store", items=items):
+                patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
         except Unreachable as error:
-            log.error("store_away", job=str(lease.claim.job), error=error.message)
+            lease.work.outage()
+            log.error("store_away", items=len(items), error=error.message)
             self._give_back(lease, items, "the asset store does not answer")
             return False
         return True
@@ -261,15 +279,14 @@ class Committer(threading.Thread):
                 return write(conn, lease.claim.lease_token)
 
         # A commit whose answer got lost is repeated: its items then count as `lost`, their rows stand.
-        committed = patiently(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
+        with lease.work.stage("commit") as span:
+            committed = patiently(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
+            span.set(what=what, items=len(committed.items), item=",".join(ids_of(committed.items)))
         lease.settle([*committed.items, *committed.lost])
-        log.info(
-            "committed",
-            what=what,
-            job=str(lease.claim.job),
-            items=len(committed.items),
-            thrown_away=len(committed.lost),
-        )
+        lease.work.wrote((committed.states.get(item, WENT[what]) for item in committed.items), lost=len(committed.lost))
+        for item, state in committed.states.items():
+            log.warning("item_not_made", item=str(item), state=state)
+        log.info("committed", what=what, items=len(committed.items), thrown_away=len(committed.lost))
 
     def _give_back(self, lease: HeldLease, items: Iterable[UUID], reason: str) -> None:
         open_items = [item for item in items if item in lease.open]

@@ -11,6 +11,7 @@ from shared.errors import Unreachable
 from shared.jobs import Claim
 from shared.jobs import Heartbeat as Answer
 from shared.runtime.logs import logger
+from shared.runtime.watching import Work
 
 log = logger(__name__)
 
@@ -29,6 +30,7 @@ class HeldLease:
 
     def __init__(self, claim: Claim, stopping: threading.Event) -> None:
         self.claim = claim
+        self.work = Work(claim)
         self._stopping = stopping
         self._everything = frozenset(item.id for item in claim.items)
         self._open = self._everything
@@ -171,4 +173,5 @@ class Heartbeat(threading.Thread):
             if answer.gone or answer.lost:
                 lease.learn(answer)
                 if lease.open != items:  # not merely committed in between
-                    log.info("items_taken_away", job=str(lease.claim.job), lost=answer.lost, items=len(answer.gone))
+                    with lease.work.bound():
+                        log.info("items_taken_away", lost=answer.lost, items=len(answer.gone))

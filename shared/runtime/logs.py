@@ -1,6 +1,7 @@
 """Structured logs: JSON lines for machines, readable lines for people, never a prompt or a secret.
 
-Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
+Lines about work carry its `job`, `lease` and `trace` by themselves (`shared.runtime.watching`); those of a request its
+`trace`. Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import TextIO
 import structlog
 from structlog.stdlib import BoundLogger
 from structlog.typing import EventDict, ExcInfo, Processor, WrappedLogger
+
+from shared import tracing
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
 """Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""
@@ -48,11 +51,19 @@ def _write_traceback(stream: TextIO, exc_info: ExcInfo) -> None:
     stream.write("\n" + _brief_traceback(exc_info))
 
 
+def _add_trace(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
+    trace = tracing.trace_id(tracing.current())
+    if trace is not None:
+        event.setdefault("trace", trace)
+    return event
+
+
 def configure_logging(service: str, *, level: str = "INFO", json: bool = False) -> None:
     """Send structlog and the standard library's loggers to stderr, one line an event, with `service` in each."""
     shared: list[Processor] = [
         structlog.contextvars.merge_contextvars,
         _add_service(service),
+        _add_trace,
         structlog.stdlib.add_log_level,
         structlog.processors.TimeStamper(fmt="iso", utc=True),
         _drop_forbidden,

@@ -22,6 +22,7 @@ from shared.runtime.handler import Batch, Failed, Handler
 from shared.runtime.lease import Heartbeat, HeldLease
 from shared.runtime.logs import logger
 from shared.runtime.scoring import score_input
+from shared.runtime.watching import ids_of
 from shared.storage import AssetStore
 
 log = logger(__name__)
@@ -121,6 +122,7 @@ class Drain:
         taken: Claim | None = None
         try:
             self._ticked()
+            began = time.perf_counter()
             taken = patiently(self._claim, seconds=CLAIM_PATIENCE, stopping=self._stopping)
         finally:
             if taken is None:
@@ -128,13 +130,19 @@ class Drain:
         if taken is None:
             return 0
         lease = self._heartbeat.hold(taken)
-        log.info("claimed", queue=taken.queue, job=str(taken.job), items=len(taken.items), solo=taken.solo)
+        lease.work.claimed(time.perf_counter() - began)
+        with lease.work.bound():
+            self._work(lease)
+        return len(taken.items)
+
+    def _work(self, lease: HeldLease) -> None:
+        items = lease.claim.items
+        log.info("claimed", items=len(items), solo=lease.claim.solo, item_ids=ids_of(item.id for item in items))
         reason = "the worker gave no result"
         try:
             reason = self._run_claim(lease)
         finally:
             self._committer.finish(lease, "the worker was stopped" if self._stopping.is_set() else reason)
-        return len(taken.items)
 
     def _claim(self) -> Claim | None:
         for queue in list(self._turns):
@@ -161,11 +169,12 @@ class Drain:
             fresh = taken.queue not in self.loaded or self.loaded[taken.queue].bundle != taken.bundle
             if fresh:
                 lease.exempt()  # loading, and the compile of the first batch, are silent for minutes
-            self.load(taken.queue, taken.bundle, taken.batch_key)
-            batch = self._batch(lease)
+            with lease.work.stage("load"):
+                self.load(taken.queue, taken.bundle, taken.batch_key)
+                batch = self._batch(lease)
             buckets = handler.buckets(batch)
         except Unreachable as error:
-            return self._pause(error)
+            return self._pause(lease, error)
         except Exception as error:
             self._fail_all(lease, taken.items, error, retryable=not isinstance(error, MareyError))
             return "failed"
@@ -173,11 +182,12 @@ class Drain:
             try:
                 self._run_bucket(lease, handler, replace(batch, items=tuple(bucket)))
             except Unreachable as error:
-                return self._pause(error)
+                return self._pause(lease, error)
         self._ticked()
         return "the worker gave no result"
 
-    def _pause(self, error: Unreachable) -> str:
+    def _pause(self, lease: HeldLease, error: Unreachable) -> str:
+        lease.work.outage()
         log.warning("outage", error=error.message)
         self._stopping.wait(OUTAGE_PAUSE)
         return error.message
@@ -210,10 +220,11 @@ class Drain:
             return
         answered: set[UUID] = set()
         try:
-            for outcome in handler.run(batch, lease):
-                answered.add(outcome.item)
-                self._committer.put(lease, outcome)
-                self._ticked()
+            with lease.work.stage("run", items=(item.id for item in batch.items)):
+                for outcome in handler.run(batch, lease):
+                    answered.add(outcome.item)
+                    self._committer.put(lease, outcome)
+                    self._ticked()
         except Unreachable:
             raise
         except Exception as error:
@@ -239,6 +250,6 @@ class Drain:
     def _fail_all(self, lease: HeldLease, items: Sequence[ClaimedItem], error: Exception, *, retryable: bool) -> None:
         problem = as_problem(error)
         if problem is not error:
-            log.error("handler_failed", items=len(items), exc_info=error)
+            log.error("handler_failed", items=len(items), item_ids=ids_of(i.id for i in items), exc_info=error)
         for item in items:
             self._committer.put(lease, Failed(item.id, problem, retryable))

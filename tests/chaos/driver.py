@@ -55,24 +55,26 @@ class Cluster:
 
     # --- starting ---
 
-    def start_scheduler(self, name: str = "scheduler") -> None:
-        """Start a scheduler."""
-        self._start(name, "scheduler")
+    def start_scheduler(self, name: str = "scheduler", **environment: str) -> None:
+        """Start a scheduler; `environment` adds settings of its own."""
+        self._start(name, environment, "scheduler")
 
-    def start_worker(self, name: str, *, queue: str = QUEUE, reference: str = REFERENCE, bundle: str = "") -> None:
+    def start_worker(
+        self, name: str, *, queue: str = QUEUE, reference: str = REFERENCE, bundle: str = "", **environment: str
+    ) -> None:
         """Start a worker and return at once; `wait_ready` waits for it."""
-        self._start(name, "worker", name, queue, reference, bundle)
+        self._start(name, environment, "worker", name, queue, reference, bundle)
 
     def wait_ready(self, name: str) -> None:
         """Wait until the worker `name` serves."""
         self.wait(lambda: (status := read_status(self.home, name)) is not None and status.ready, f"{name} is ready")
 
-    def _start(self, name: str, *arguments: str) -> None:
+    def _start(self, name: str, environment: Mapping[str, str], *arguments: str) -> None:
         with (self.home / f"{name}.log").open("ab") as log:
             self.processes[name] = subprocess.Popen(
                 [sys.executable, "-m", "tests.chaos.process", *arguments],
                 cwd=REPOSITORY,
-                env=self._environment,
+                env={**self._environment, **environment},
                 stdout=log,
                 stderr=log,
             )

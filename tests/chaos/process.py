@@ -1,4 +1,5 @@
-"""A process of the product for the driver: `scheduler`, or `worker NAME QUEUE REFERENCE BUNDLE`.
+"""A process of the product for the driver: `scheduler`, or `worker NAME QUEUE REFERENCE BUNDLE`; with commas, a worker
+of several queues.
 
 It is what `marey scheduler` and `marey worker` call, with a toy in place of a model; it dies with the test.
 """
@@ -21,7 +22,8 @@ def main(what: str, *arguments: str) -> int:
     if what == "scheduler":
         return scheduler_main(settings())
     name, queue, reference, bundle = arguments
-    role = Role("toy", {queue: reference}, {queue: bundle} if bundle else {})
+    handlers = dict(zip(queue.split(","), reference.split(","), strict=True))
+    role = Role("toy", handlers, {queue: bundle} if bundle else {})
     return worker_main(role, settings(), name=name)
 
 

@@ -13,10 +13,11 @@ from enum import StrEnum
 
 from shared.errors import InvalidInput, NotFound, Unreachable
 from shared.jobs import ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome
+from shared.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome, TextDone
 
 QUEUE = "toy"
 REFERENCE = "tests.support.toy:ToyHandler"
+TEXT_REFERENCE = "tests.support.toy:ToyTextHandler"
 FITS = 4  # items of `Deed.MEMORY` that fit into one batch
 
 
@@ -99,6 +100,23 @@ class ToyHandler:
             case _:
                 pass
         return Done(item.id, lambda: export(item), elapsed)
+
+
+class ToyTextHandler:
+    """Reads no prompt: its features are the same for all."""
+
+    queue = "text"
+    batch_size = 64
+
+    def load(self, bundle: str) -> None:
+        pass
+
+    def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
+        return [batch.items]
+
+    def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
+        for item in batch.items:
+            yield TextDone(item.id, item.text_key, b"toy")
 
 
 def deed(item: ClaimedItem) -> Deed:

@@ -32,9 +32,12 @@ from services.api.motions.routes import Found
 from services.api.motions.schemas import MotionView
 from services.api.problems import RESPONSES
 from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
-from shared import jobs
+from shared import jobs, metrics, tracing
 from shared.errors import InvalidInput
 from shared.jobs.states import ENDED
+from shared.runtime.logs import logger
+
+log = logger(__name__)
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], responses=RESPONSES)
 
@@ -129,15 +132,18 @@ def _write(
         items=submission.new_items(),
         tenant=key.tenant,
         count=submission.count,
+        traceparent=tracing.current(),
         idempotency_key=idempotency_key,
         body_sha256=sha256 if idempotency_key else None,
         **submission.fields.model_dump(),
     )
-    with jobs.transaction(shared.engine) as conn:
+    with tracing.span("submit", tenant=key.tenant) as span, jobs.transaction(shared.engine) as conn:
         submitted = jobs.submit(conn, new)
         row = jobs.get_job(conn, key.tenant, submitted.id)
         if not submitted.replayed:
             note(conn, key, "job.submit", row.id, items=row.total, priority=row.priority)
+        span.set(job=str(submitted.id), items=submitted.items, replayed=submitted.replayed)
+    log.info("submitted", job=str(submitted.id), tenant=key.tenant, items=submitted.items, replayed=submitted.replayed)
     headers = {"Location": f"/v1/jobs/{submitted.id}"}
     if submitted.replayed:
         headers["Idempotency-Replayed"] = "true"
@@ -206,8 +212,11 @@ def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 @router.post("/{job}/cancel")
 def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Cancel what is not done yet."""
+    before = jobs.get_job(conn, key.tenant, job).cancelled
     note(conn, key, "job.cancel", job, reason=reason)
-    return JobView.of(jobs.cancel(conn, key.tenant, job, reason or f"cancelled by {key.name}"))
+    row = jobs.cancel(conn, key.tenant, job, reason or f"cancelled by {key.name}")
+    metrics.CANCELLED.inc(max(0, row.cancelled - before))
+    return JobView.of(row)
 
 
 @router.post("/{job}/retry")

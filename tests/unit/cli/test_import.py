@@ -5,7 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = ("torch", "numpy", "pydantic", "sqlalchemy", "fastapi", "celery", "psycopg", "redis", "httpx2")
+HEAVY = (
+    *("torch", "numpy", "pydantic", "sqlalchemy", "fastapi", "celery", "psycopg", "redis", "structlog"),
+    *("opentelemetry", "httpx2"),
+)
 
 
 def test_the_command_line_imports_no_server_and_no_numbers() -> None:

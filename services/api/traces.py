@@ -1,0 +1,45 @@
+"""Each request is a span: of the trace its caller sent, or of one of its own. Its log lines say which."""
+
+from __future__ import annotations
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from shared import tracing
+
+UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
+"""Asked every few seconds by machines."""
+
+
+class Trace:
+    """ASGI middleware: a span a request, named by its route once that is known."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on within a span."""
+        if scope["type"] != "http" or scope["path"] in UNTRACED:
+            await self.app(scope, receive, send)
+            return
+        parent = tracing.accepted(Headers(scope=scope).get(tracing.HEADER))
+        with tracing.under(parent or (None if tracing.is_on() else tracing.made_up())):
+            await self._answer(scope, receive, send)
+
+    async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
+        status = 500
+
+        async def noted(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+            await send(message)
+
+        with tracing.span("request", kind="server") as span:
+            try:
+                await self.app(scope, receive, noted)
+            finally:
+                route = getattr(scope.get("route"), "path", "other")
+                span.rename(f"{scope['method']} {route}")
+                named = {"http.request.method": scope["method"], "http.route": route}
+                span.set(**named, **{"http.response.status_code": status})
