@@ -1,45 +1,73 @@
-"""What `marey doctor` looks at."""
+"""What `marey doctor` looks at. Each check stands alone: what is broken in one hides no other."""
 
 from __future__ import annotations
 
 import importlib.util
+import os
 import platform
 import shutil
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from shared.errors import MareyError
 
-SMALLEST_FREE = 2 * 2**30
+if TYPE_CHECKING:
+    from shared.bundles import Bundle
+    from shared.settings import Settings
+
+SMALLEST_FREE, LITTLE_FREE = 2 * 2**30, 10 * 2**30
 """Bytes: Postgres stops at a full disk, and 1,000 motions take 200 MB."""
+State = Literal["ok", "warn", "bad"]
 
 
 @dataclass(frozen=True)
 class Check:
-    """One finding. `missing` is no fault: a client needs no server's packages."""
+    """One finding. `warn` works, or is not needed for all that this machine could do; `bad` has to be mended."""
 
     name: str
-    state: Literal["ok", "missing", "broken"]
+    state: State
     message: str
+    hint: str | None = None
+    """What to do; None where nothing is to be done."""
 
 
 def check_all() -> Iterator[Check]:
-    """Every check, each on its own: a broken one hides no other."""
-    yield Check("python", "ok" if sys.version_info >= (3, 11) else "broken", platform.python_version())
+    """Every check, in the order in which one would mend them."""
+    old = sys.version_info < (3, 11)
+    yield Check("python", "bad" if old else "ok", platform.python_version(), "Install Python 3.11." if old else None)
     yield _extra("motion", "numpy", "convert, render")
     yield _extra("server", "fastapi", "serve, api, scheduler")
     yield _extra("worker", "torch", "generate, worker, train")
     yield _home()
     yield _server()
-    yield from _models()
+    if _installed("fastapi"):
+        from services.cli.checkup_backing import check_backing
+
+        yield from check_backing()
+    if _installed("pydantic_settings") and _installed("safetensors"):
+        from shared.settings import settings
+
+        yield from models(settings())
+        if _installed("torch"):
+            yield from device(settings())
+
+
+def broken(name: str, error: MareyError) -> Check:
+    """A check that ended with an expected error."""
+    return Check(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
+
+
+def _installed(package: str) -> bool:
+    return importlib.util.find_spec(package) is not None
 
 
 def _extra(name: str, package: str, commands: str) -> Check:
-    if importlib.util.find_spec(package) is not None:
+    if _installed(package):
         return Check(f"marey[{name}]", "ok", commands)
-    return Check(f"marey[{name}]", "missing", f"pip install 'marey[{name}]' for {commands}")
+    hint = f"pip install 'marey[{name}]', if this machine is to run {commands}."
+    return Check(f"marey[{name}]", "warn", "not installed; a client needs no server's packages", hint)
 
 
 def _home() -> Check:
@@ -50,10 +78,16 @@ def _home() -> Check:
     try:
         check_folder(folder)
     except MareyError as error:
-        return Check("home", "broken", str(error))
+        return broken("home", error)
+    return free_space("home", folder)
+
+
+def free_space(name: str, folder: os.PathLike[str]) -> Check:
+    """How full the disk of a folder is."""
     free = shutil.disk_usage(folder).free
-    state = "ok" if free > SMALLEST_FREE else "broken"
-    return Check("home", state, f"{folder}, {free / 2**30:.1f} GiB free")
+    state = "bad" if free < SMALLEST_FREE else "warn" if free < LITTLE_FREE else "ok"
+    hint = None if state == "ok" else "Make room: `marey admin gc` removes what nothing refers to."
+    return Check(name, state, f"{os.fspath(folder)}, {free / 2**30:.1f} GiB free", hint)
 
 
 def _server() -> Check:
@@ -64,33 +98,81 @@ def _server() -> Check:
     try:
         server = find_server()
     except Unreachable as error:
-        return Check("server", "missing", f"{error.message}. {error.hint}")
+        return Check("server", "warn", error.message, error.hint)
     except MareyError as error:
-        return Check("server", "broken", str(error))
+        return broken("server", error)
     try:
         with Client(server) as client:
             client.get("/v1/jobs", limit=1)
     except MareyError as error:
-        return Check("server", "broken", str(error))
+        return broken("server", error)
     return Check("server", "ok", server.url)
 
 
-def _models() -> Iterator[Check]:
-    if importlib.util.find_spec("pydantic_settings") is None:
-        return
+def models(config: Settings) -> Iterator[Check]:
+    """Every bundle that is here: whole, and with what reads its prompts."""
     from shared.bundles import find_bundle, list_bundles
 
     try:
-        names = [bundle.manifest.name for bundle in list_bundles()]
+        names = [bundle.manifest.name for bundle in list_bundles(config=config)]
     except MareyError as error:
-        yield Check("models", "broken", str(error))
+        yield broken("models", error)
         return
     if not names:
-        yield Check("models", "missing", "no bundle here; MAREY_MODELS names their folder")
+        yield Check("models", "warn", "no bundle here", "Put one into the folder that MAREY_MODELS names.")
     for name in names:
         try:
-            bundle = find_bundle(name)
+            bundle = find_bundle(name, config=config)
         except MareyError as error:
-            yield Check("models", "broken", str(error))
+            yield broken("models", error)
+            continue
+        yield Check("models", "ok", f"{bundle.reference}, {bundle.manifest.licence}, every hash right")
+        if bundle.manifest.text is not None and _installed("onnxruntime"):
+            yield _reads(bundle, config)
+
+
+def _reads(bundle: Bundle, config: Settings) -> Check:
+    """Whether what reads prompts for a bundle is here, and what it was trained with."""
+    from shared.bundles import find_bundle
+    from shared.text.encoders import find_weights, weights_sha256
+    from shared.text.keys import NO_LABELLER, labeller_bundle
+
+    spec, name = bundle.manifest.text, "text"
+    assert spec is not None  # the caller looked
+    try:
+        if spec.encoder_sha256 not in (None, weights_sha256(find_weights(spec.encoder, config=config))):
+            here = find_weights(spec.encoder, config=config)
+            message = f"{bundle.manifest.name} was trained with other weights of {spec.encoder!r} than those in {here}"
+            return Check(name, "bad", message, "Fetch those again, or train the bundle anew: docs/training.md.")
+        if spec.labeller != NO_LABELLER:
+            labeller = find_bundle(labeller_bundle(spec.labeller), config=config)
+            if spec.labeller_sha256 not in (None, labeller.weights_sha256):
+                message = f"{bundle.manifest.name} was trained with another {spec.labeller!r} than {labeller.reference}"
+                return Check(name, "bad", message, "Restore that labeller's bundle.")
+    except MareyError as error:
+        return broken(name, error)
+    return Check(name, "ok", f"{bundle.manifest.name} reads by {spec.encoder} and {spec.labeller}, the right weights")
+
+
+def device(config: Settings) -> Iterator[Check]:
+    """What computes."""
+    import torch
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    able = torch.backends.cpu.get_cpu_capability()
+    slow = able in ("DEFAULT", "NO AVX")
+    hint = "Expect several times the time: this build of torch or this processor has no vector instructions."
+    message = f"torch {torch.__version__}, {cores} cores, {able}"
+    yield Check("cpu", "warn" if slow else "ok", message, hint if slow else None)
+    wanted = config.device
+    if not torch.cuda.is_available():
+        if wanted.startswith("cuda"):
+            hint = "Install a CUDA build of torch and the driver, or set MAREY_DEVICE=cpu."
+            yield Check("gpu", "bad", f"MAREY_DEVICE is {wanted}, and torch finds no GPU", hint)
         else:
-            yield Check("models", "ok", f"{bundle.reference}, {bundle.manifest.licence}, every hash right")
+            yield Check("gpu", "ok", "none; motions are made by the processor")
+        return
+    for index in range(torch.cuda.device_count()):
+        free, total = torch.cuda.mem_get_info(index)
+        name = torch.cuda.get_device_name(index)
+        yield Check("gpu", "ok", f"cuda:{index}, {name}, {free / 2**30:.1f} of {total / 2**30:.1f} GiB free")

@@ -152,7 +152,16 @@ from shared.jobs.types import (
     WorkerBeat,
     WorkerRow,
 )
-from shared.jobs.watch import Outbox, QueueDepth, database_now, open_stream_counts, outbox_state, queue_depths
+from shared.jobs.watch import (
+    Outbox,
+    QueueDepth,
+    database_now,
+    open_stream_counts,
+    outbox_state,
+    overdue_leases,
+    queue_depths,
+    server_version,
+)
 from shared.jobs.webhook_types import (
     Attempt,
     AttemptRow,
@@ -337,6 +346,7 @@ __all__ = [
     "open_stream_counts",
     "open_streams",
     "outbox_state",
+    "overdue_leases",
     "pause",
     "place_of",
     "policy",
@@ -358,6 +368,7 @@ __all__ = [
     "rotate_key",
     "run_schedule",
     "send_test",
+    "server_version",
     "set_comment",
     "set_priority",
     "set_quotas",

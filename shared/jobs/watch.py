@@ -86,6 +86,17 @@ def outbox_state(conn: sa.Connection) -> Outbox:
     return Outbox(row.pending, max(0.0, row.overdue))
 
 
+def overdue_leases(conn: sa.Connection, seconds: float) -> int:
+    """Leases that ran out so long ago and still stand: no sweeper runs."""
+    query = sa.text("SELECT count(*) FROM lease WHERE expires_at < clock_timestamp() - make_interval(secs => :seconds)")
+    return conn.execute(query, {"seconds": seconds}).scalar_one()
+
+
+def server_version(conn: sa.Connection) -> str:
+    """Which Postgres it is, as `18.4`."""
+    return str(conn.execute(sa.text("SHOW server_version")).scalar_one()).split()[0]
+
+
 def database_now(conn: sa.Connection) -> datetime:
     """The database's clock."""
     return conn.execute(sa.text("SELECT clock_timestamp()")).scalar_one()

@@ -86,18 +86,23 @@ def audit(
 
 
 def doctor(as_json: console.Json = False) -> None:
-    """Check this machine: what is installed, the server, the models. Exits 1 if something is broken."""
+    """Check this machine and what its server needs, and say what to do. Exits 1 if something is bad.
+
+    What is installed, home and disk, server, database, clock, workers, scheduler, queue, store, models, texts, device.
+    """
     from services.cli.checkup import check_all
 
-    broken = False
+    bad = False
     for check in check_all():
-        broken = broken or check.state == "broken"
+        bad = bad or check.state == "bad"
         if as_json:
             console.result_json(vars(check))
         else:
-            console.result(f"{check.state:<8} {check.name:<12} {check.message}")
+            console.result(f"{check.state:<5} {check.name:<14} {check.message}")
+            if check.hint:
+                console.result(f"{'':<20} → {check.hint}")
     sys.stdout.flush()
-    if broken:
+    if bad:
         raise typer.Exit(1)
 
 

@@ -1,0 +1,207 @@
+"""What a server stands on: database, queue, store, workers; for `marey doctor` on a machine that reaches them."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+from services.cli.checkup import Check, broken, free_space
+from services.cli.database import engine_of, settings_here
+from services.cli.place import read_server
+from shared.errors import MareyError, Unreachable
+
+if TYPE_CHECKING:
+    import sqlalchemy as sa
+
+    from shared.settings import Settings
+    from shared.storage import AssetStore
+
+SKEW_WARN, SKEW_BAD = 2.0, 60.0
+"""Seconds. Leases and retries go by the database's clock alone; signed URLs and webhooks' signatures by the machine's:
+receivers allow five minutes, object stores fifteen."""
+UNSWEPT = 30.0
+"""Seconds after which a lease that ran out should have been taken back many times over."""
+
+
+def check_backing() -> Iterator[Check]:
+    """Each thing by itself; nothing but the port where no server is named and none runs here."""
+    from shared.settings import settings
+
+    config = settings_here()
+    runs_here = read_server(config.home.expanduser().absolute()) is not None
+    if not runs_here and not os.environ.get("MAREY_SERVER"):
+        yield _port(config)
+    if not runs_here and settings().database_url is None:
+        return
+    engine = engine_of(config)
+    try:
+        found = database(engine)
+        yield found
+        if found.state != "bad":
+            yield from _guarded("clock", lambda: _clock(engine))
+            yield from _guarded("workers", lambda: workers(engine))
+            yield from _guarded("scheduler", lambda: scheduler(engine))
+    finally:
+        engine.dispose()
+    yield from _queues(config)
+    yield from store(config)
+
+
+def _guarded(name: str, check: Callable[[], Check]) -> Iterator[Check]:
+    try:
+        yield check()
+    except MareyError as error:
+        yield broken(name, error)
+
+
+def _port(config: Settings) -> Check:
+    family = socket.AF_INET6 if ":" in config.host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((config.host, config.port))
+        except OSError as error:
+            message = f"{config.port} of {config.host} cannot be used: {error.strerror}"
+            return Check("port", "warn", message, "`marey serve --port` and MAREY_PORT name another.")
+    return Check("port", "ok", f"{config.port} of {config.host} is free for `marey serve`")
+
+
+def database(engine: sa.Engine) -> Check:
+    """It answers, and its tables are those this version needs."""
+    from shared.jobs import check_revision, server_version, transaction
+
+    try:
+        with transaction(engine) as conn:
+            version = server_version(conn)
+        check_revision(engine)
+    except MareyError as error:
+        return broken("database", error)
+    return Check("database", "ok", f"PostgreSQL {version}, at the newest revision")
+
+
+def _clock(engine: sa.Engine) -> Check:
+    from shared.jobs import database_now, transaction
+
+    with transaction(engine) as conn:
+        before = datetime.now(UTC)
+        there = database_now(conn)
+        after = datetime.now(UTC)
+    return clock_check(there, before, after)
+
+
+def clock_check(there: datetime, before: datetime, after: datetime) -> Check:
+    """How far the database's clock is from this machine's, which was read before and after it."""
+    skew = max(before - there, there - after, timedelta()).total_seconds()
+    state = "bad" if skew > SKEW_BAD else "warn" if skew > SKEW_WARN else "ok"
+    hint = None if state == "ok" else "Let both machines take the time from one source (NTP)."
+    return Check("clock", state, f"{skew:.1f} s between this machine and the database", hint)
+
+
+def workers(engine: sa.Engine) -> Check:
+    from shared.jobs import list_workers, queue_depths, transaction
+
+    with transaction(engine) as conn:
+        known, depths = list_workers(conn), queue_depths(conn)
+    live = sorted({worker.queue for worker in known if worker.live})
+    alone = sorted({row.queue for row in depths if row.waiting} - set(live))
+    if alone:
+        message = f"items wait in {', '.join(alone)}, and no worker serves that"
+        return Check("workers", "bad", message, f"Start one: `marey worker {'+'.join(alone)}`; `marey models list`.")
+    if not live:
+        return Check("workers", "warn", "none was heard of lately", "`marey serve` or `marey worker hgm3` starts one.")
+    silent = [f"{worker.id} on {worker.host}" for worker in known if not worker.live]
+    if silent:
+        message = f"{', '.join(silent[:3])} fell silent, last heard of {known[-1].seen:%H:%M} UTC"
+        return Check("workers", "warn", message, "See its log; what it held goes to others by itself.")
+    return Check("workers", "ok", f"{len([w for w in known if w.live])} live, for {', '.join(live)}")
+
+
+def scheduler(engine: sa.Engine) -> Check:
+    from shared.jobs import overdue_leases, transaction
+
+    with transaction(engine) as conn:
+        unswept = overdue_leases(conn, UNSWEPT)
+    if unswept:
+        message = f"{unswept} leases ran out over {UNSWEPT:g} s ago, and nobody took them back"
+        return Check("scheduler", "bad", message, "Start `marey scheduler`, or see its log.")
+    return Check("scheduler", "ok", "no lease is overdue")
+
+
+def _queues(config: Settings) -> Iterator[Check]:
+    from shared.runtime.embedded import valkey_url
+
+    named = config.queue_url
+    url = valkey_url(config.home.expanduser().absolute()) if named is None else named.get_secret_value()
+    yield queue("queue", url)
+    if config.streams_url is not None:
+        yield queue("streams", config.streams_url.get_secret_value())
+
+
+def queue(name: str, url: str) -> Check:
+    """A Redis that answers and throws nothing away."""
+    import redis
+
+    from shared.runtime.queue import redis_client
+
+    try:
+        with redis_client(url) as client:
+            client.ping()
+            version = client.info("server").get("redis_version", "unknown")  # pyright: ignore[reportAttributeAccessIssue]
+            policy = _memory_policy(client)
+    except (redis.RedisError, ValueError) as error:
+        hint = "Is it running, and is MAREY_QUEUE_URL (MAREY_STREAMS_URL) right? Embedded: `marey serve` starts it."
+        return Check(name, "bad", f"it does not answer ({type(error).__name__})", hint)
+    if policy is None:
+        message = f"Redis {version}; it does not tell its maxmemory-policy"
+        return Check(name, "warn", message, "See that it is noeviction.")
+    if policy != "noeviction":
+        message = f"Redis {version}, maxmemory-policy {policy}: it may throw away hints and frames"
+        return Check(name, "bad", message, "Set maxmemory-policy noeviction.")
+    return Check(name, "ok", f"Redis {version}, noeviction")
+
+
+def _memory_policy(client: object) -> str | None:
+    """None where the server does not say: hosted ones often refuse CONFIG."""
+    import redis
+
+    try:
+        return client.config_get("maxmemory-policy").get("maxmemory-policy")  # pyright: ignore[reportAttributeAccessIssue]
+    except redis.ResponseError:
+        return None
+
+
+def store(config: Settings) -> Iterator[Check]:
+    """It takes, gives and deletes."""
+    from shared.storage import FolderStore, open_store
+
+    try:
+        assets = open_store(config)
+        assets.check()
+        _try_store(assets)
+    except MareyError as error:
+        yield broken("store", error)
+        return
+    yield Check("store", "ok", f"{config.store or config.home / 'assets'} takes, gives and deletes objects")
+    if isinstance(assets, FolderStore):
+        yield free_space("store", assets.root)
+
+
+def _try_store(store: AssetStore) -> None:
+    """Write, read and delete an object.
+
+    Raises:
+        Unreachable: one of these does not work.
+    """
+    content = os.urandom(32)
+    key = f"doctor/probe-{content.hex()[:16]}"
+    store.put(key, content)
+    try:
+        if store.get(key) != content:
+            raise Unreachable("it gave other bytes than it was given", where=key, hint="Check its disks.")
+    finally:
+        store.delete(key)
+    if store.exists(key):
+        raise Unreachable("what was deleted is still there", where=key, hint="Check what the keys may do.")

@@ -1,0 +1,112 @@
+"""What `marey doctor` finds: each thing that can be wrong, on the real thing, and what it says to do."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+from pydantic import SecretStr
+
+from services.cli import checkup_backing as backing
+from services.cli.checkup import Check, models
+from shared.jobs import WorkerBeat, beat, downgrade, transaction
+from shared.runtime.queue import redis_client
+from shared.settings import Settings
+from shared.storage import FolderStore
+from tests.servers.jobs import claim_some, parse_texts, submit_items
+from tests.support.live_api import BUNDLE, write_bundle
+
+
+def bad(check: Check, *said: str, state: str = "bad") -> None:
+    """It is bad, and its words hold all of `said`, with something to do."""
+    assert check.state == state, check
+    assert check.hint
+    for part in said:
+        assert part in f"{check.message} {check.hint}"
+
+
+def test_a_database_of_an_older_revision_wants_migrating(engine: sa.Engine) -> None:
+    assert backing.database(engine).state == "ok"
+    downgrade(engine, "-1")
+    bad(backing.database(engine), "revision", "marey admin migrate")
+
+
+def test_items_that_nobody_serves_are_told_with_the_worker_to_start(engine: sa.Engine) -> None:
+    bad(backing.workers(engine), "none", "marey serve", state="warn")
+    submit_items(engine, 2)
+    parse_texts(engine)
+    bad(backing.workers(engine), "items wait in hgm3", "marey worker hgm3")
+    with transaction(engine) as conn:
+        beat(conn, WorkerBeat("one", "hgm3", "here", 1, "cpu"))
+    assert backing.workers(engine) == Check("workers", "ok", "1 live, for hgm3")
+    with transaction(engine) as conn:
+        beat(conn, WorkerBeat("two", "hgm3", "there", 2, "cpu"))
+        conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 hour' WHERE id = 'two'"))
+    bad(backing.workers(engine), "two on there fell silent", state="warn")
+
+
+def test_leases_that_nobody_takes_back_mean_that_no_scheduler_runs(engine: sa.Engine) -> None:
+    submit_items(engine, 1)
+    claim_some(engine, "text")
+    assert backing.scheduler(engine).state == "ok"
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE lease SET expires_at = now() - interval '1 minute'"))
+    bad(backing.scheduler(engine), "1 leases", "marey scheduler")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "state"), [(0.0, "ok"), (1.9, "ok"), (-5.0, "warn"), (5.0, "warn"), (-90.0, "bad"), (90.0, "bad")]
+)
+def test_clocks_apart_are_told_either_way_round(seconds: float, state: str) -> None:
+    now = datetime(2026, 11, 23, tzinfo=UTC)
+    there = now + timedelta(seconds=seconds)
+    assert backing.clock_check(there, now, now).state == state
+    slow = backing.clock_check(now, now - timedelta(minutes=5), now + timedelta(minutes=5))
+    assert slow.state == "ok"  # an answer that took long says nothing of the clocks
+
+
+def test_a_queue_that_may_evict_or_is_away_is_bad(queue_url: str, tmp_path: Path) -> None:
+    assert backing.queue("queue", queue_url).state == "ok"
+    with redis_client(queue_url) as client:
+        client.config_set("maxmemory-policy", "allkeys-lru")
+        try:
+            bad(backing.queue("queue", queue_url), "allkeys-lru", "noeviction")
+        finally:
+            client.config_set("maxmemory-policy", "noeviction")
+    bad(backing.queue("queue", f"redis+socket://{tmp_path}/nobody.sock"), "does not answer", "MAREY_QUEUE_URL")
+
+
+def test_a_store_is_tried_and_left_as_it_was(tmp_path: Path) -> None:
+    config = Settings(home=tmp_path, store=str(tmp_path / "assets"))
+    FolderStore(tmp_path / "assets").prepare()
+    takes, room = backing.store(config)
+    assert (takes.state, room.name) == ("ok", "store")
+    assert list(FolderStore(tmp_path / "assets").keys()) == []
+    (tmp_path / "file").write_text("not a folder")
+    (refused,) = backing.store(Settings(home=tmp_path, store=str(tmp_path / "file")))
+    bad(refused, "file", "MAREY_STORE")
+
+
+def test_a_store_without_its_keys_or_server_is_bad(tmp_path: Path) -> None:
+    (keyless,) = backing.store(Settings(home=tmp_path, store="s3://marey"))
+    bad(keyless, "MAREY_S3_ACCESS_KEY")
+    key = SecretStr("k")
+    away = Settings(home=tmp_path, store="s3://marey", s3_endpoint="127.0.0.1:9", s3_access_key=key, s3_secret_key=key)
+    (unreachable,) = backing.store(away)
+    bad(unreachable, "does not answer", "MAREY_S3_ENDPOINT")
+
+
+def test_a_bundle_that_was_changed_is_bad_and_one_whose_encoder_is_another_too(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "models")
+    config = Settings(home=tmp_path, models=tmp_path / "models")
+    whole, reads = models(config)
+    assert whole.state == "ok"
+    bad(reads, "other weights", "minilm")  # it names an encoder of noughts
+    shard = next((tmp_path / "models" / BUNDLE).glob("*.safetensors"))
+    content = bytearray(shard.read_bytes())
+    content[-1] ^= 1
+    shard.write_bytes(content)
+    (broken,) = models(config)
+    bad(broken, "sha256", "again")
