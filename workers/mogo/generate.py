@@ -19,7 +19,7 @@ from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.packed_model import PackedModel, sessions_of_product
-from workers.mogo.streaming import Streams
+from workers.mogo.streaming import NEVER, Streams
 from workers.mogo.tokenizer import Tokenizer
 
 MAX_SESSIONS = 32
@@ -174,14 +174,12 @@ class _Drawing:
         recorded: Mapping[int, torch.Tensor],
     ) -> None:
         self.requests = requests
-        self.limit = generator.config.max_frames
         self.columns: list[list[torch.Tensor] | None] = [  # None: dropped
             list(recorded[row].unbind()) if row in recorded else [] for row in range(len(requests))
         ]
-        self.total = sum(
-            len(recorded[row]) if row in recorded else request.frames or self.limit
-            for row, request in enumerate(requests)
-        )
+        self.lasts = [self._lasts(generator, request) for request in requests]
+        self.frames = [sum(lasts) for lasts in self.lasts]
+        self.total = sum(len(recorded[row]) if row in recorded else self.frames[row] for row in range(len(requests)))
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
         self.streams = Streams(generator.packed, max(1, min(MAX_SESSIONS, len(requests))), inference)
@@ -197,7 +195,7 @@ class _Drawing:
         self._leave_out(dropped)
         while self.waiting and len(self.playing) < self.streams.capacity:
             row = self.waiting.pop()
-            self.playing[self._start(self.requests[row])] = row
+            self.playing[self._start(self.requests[row], self.lasts[row])] = row
         if not self.playing:
             return False
         for session, column in self.streams.step().items():
@@ -207,7 +205,7 @@ class _Drawing:
             ended = bool(column[0] < 0)
             if not ended:
                 columns.append(column)
-            if ended or len(columns) == (self.requests[row].frames or self.limit):
+            if ended or len(columns) == self.frames[row]:
                 self._stop(session)
         return True
 
@@ -219,11 +217,18 @@ class _Drawing:
         for row in dropped:
             self.columns[row] = None
 
-    def _start(self, request: Request) -> int:
+    def _start(self, request: Request, lasts: Sequence[int]) -> int:
         acts = torch.from_numpy(request.text.act_vectors.astype(np.float32)).to(self._device)
-        if request.frames is not None:
-            return self.streams.start(acts, request.seed, limit=request.frames)
-        return self.streams.start(acts, request.seed, ends_from=self._ends_from, limit=self.limit)
+        ends_from = NEVER if request.frames is not None else self._ends_from
+        return self.streams.start(acts, request.seed, ends_from=ends_from, lasts=lasts)
+
+    @staticmethod
+    def _lasts(generator: Generator, request: Request) -> list[int]:
+        """Frames of each act: as many as is natural, together as many as are asked for or can be made at most."""
+        acts = torch.from_numpy(request.text.act_vectors.astype(np.float32)).to(generator.device)
+        natural = np.array(generator.transformer.natural_frames(acts))
+        whole = request.frames or min(int(natural.sum()), generator.config.max_frames)
+        return np.diff(np.round(np.cumsum([0, *natural]) * whole / natural.sum())).astype(int).tolist()
 
     def _stop(self, session: int) -> None:
         self.streams.stop(session)

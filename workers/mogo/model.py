@@ -29,6 +29,9 @@ from workers.mogo.depth import DepthHead
 
 NOT_ASKED = -1
 """Target that counts in no loss."""
+RIDGE = 100.0
+TRANSITION = 10
+"""Frames that joined clips of the training data blend over."""
 STRETCHES = (1, 1, 8, 24)
 """Frames that are hidden together in training."""
 
@@ -58,7 +61,7 @@ class Prompt(nn.Module):
     def forward(self, sentence: Tensor, dropped: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """p + q_emb: (B, W) -> (B, L, w), the null prompt where `dropped` (B,) bool; and what is added to every frame
         (B, w), nothing there."""
-        x = (sentence.float() - self.mean) / self.std
+        x = self.standardised(sentence)
         if self.training and self.noise > 0:
             x = x + self.noise * torch.randn_like(x)
         prompt = self.project(x)
@@ -67,6 +70,41 @@ class Prompt(nn.Module):
             prompt = torch.where(dropped[:, None], self.null.to(prompt.dtype), prompt)
             told = told.masked_fill(dropped[:, None], 0)
         return prompt[:, None] + self.level.weight, told
+
+    def standardised(self, sentence: Tensor) -> Tensor:
+        """(…, W) to zero mean and unit deviation over the training captions."""
+        return (sentence.float() - self.mean) / self.std
+
+
+class Pace(nn.Module):
+    """How long an act takes, from its sentence alone (ours): ridge regression of the logarithm of its frames.
+
+    Where a clip should end no local look at the motion tells: an arm that came down again looks like one that has not
+    been raised yet.
+    """
+
+    weight: Tensor  # (W,) of standardised features
+    bias: Tensor  # ()
+
+    def __init__(self, config: MOGOConfig) -> None:
+        super().__init__()
+        self.least, self.most = config.min_frames, config.max_frames
+        self.register_buffer("weight", torch.zeros(config.condition.text_width))
+        self.register_buffer("bias", torch.tensor(4 * config.fps).log())
+
+    def fit(self, features: Tensor, frames: Tensor) -> None:
+        """Learn from standardised features (N, W) of acts that take so many frames (N,)."""
+        x, y = F.pad(features.double(), (0, 1), value=1.0), frames.double().log()
+        ridge = RIDGE * torch.eye(x.shape[1], dtype=x.dtype, device=x.device)
+        ridge[-1, -1] = 0
+        found = torch.linalg.solve(x.T @ x + ridge, x.T @ y)
+        self.weight.copy_(found[:-1])
+        self.bias.copy_(found[-1])
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Frames (A,), whole numbers, of acts with standardised features (A, W)."""
+        frames = (features @ self.weight + self.bias).exp()
+        return frames.round().clamp(self.least, self.most).long()
 
 
 class TrunkBlock(nn.Module):
@@ -144,6 +182,7 @@ class RQHCTransformer(nn.Module):
         self.levels, self.lanes = levels, lanes(config)
         self.codes = config.tokenizer.codes
         self.prompt = Prompt(config)
+        self.pace = Pace(config)
         self.embedding = nn.Embedding(self.codes, width)  # one for all levels (Alg. 2)
         # residuals get smaller from level to level
         gains = 2.0 ** (-0.5 * torch.arange(levels))[:, None].repeat(1, width)
@@ -201,6 +240,11 @@ class RQHCTransformer(nn.Module):
         states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
         states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
         return states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)
+
+    def natural_frames(self, acts: Tensor) -> list[int]:
+        """How many frames each act (A, W) of a prompt usually takes, with the way there from the one before."""
+        first, *others = self.pace(self.prompt.standardised(acts)).tolist()
+        return [first, *(TRANSITION + frames for frames in others)]
 
     def columns(self, tokens: Tensor) -> Tensor:
         """Inputs (B, L, n, w) of frames (B, n, V): lane l gets the sum over levels up to l, a single lane that over

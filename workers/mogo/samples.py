@@ -129,6 +129,20 @@ class Samples:
         )  # fmt: skip
         return self._cut(whole, rng)
 
+    def acts_said(self, clips: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
+        """Captions (N,) of all acts of some clips, and the frames (N,) of each act."""
+        said: list[tuple[int, int]] = []
+        for clip in clips.tolist():
+            first, count = int(self.captions.first[clip]), int(self.captions.count[clip])
+            edges = [0, *self.clips[clip].seams, int(self.lengths[clip])]
+            acts = np.diff(edges).tolist()
+            if len(acts) > 1:
+                said += [(first + count + act, frames) for act, frames in enumerate(acts)]
+            else:
+                said += [(first + k, acts[0]) for k in range(count)]
+        captions, frames = torch.tensor(said, device=self.tokens.device).unbind(1)
+        return captions, frames
+
     def collate(self, stretches: Sequence[Stretch]) -> Sample:
         """Tokens and prompts of stretches."""
         device = self.tokens.device

@@ -44,6 +44,8 @@ class TransformerStage:
         mean, std = text_statistics(captions.strings, spoken)
         self.module.prompt.mean.copy_(mean)
         self.module.prompt.std.copy_(std)
+        acts, frames = self.samples.acts_said(self.pairs.train)
+        self.module.pace.fit(self.module.prompt.standardised(captions.sentences(acts)), frames)
         with torch.no_grad():  # the head starts at how often codes occur
             self.module.head.bias[: self.module.codes] = tokens.log_shares(self.module.codes).logsumexp(0)
 

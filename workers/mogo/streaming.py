@@ -9,7 +9,7 @@ beside one are, nor on how many there are (`shared.nn.sampling.uniform`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import torch
@@ -25,8 +25,10 @@ from workers.mogo.packed_model import PackedModel
 
 NEVER = 2**62
 """More frames than any session makes."""
-TOKEN_STREAM = 4
+TOKEN_STREAM, END_STREAM = 4, 5
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""
+EARLIEST = 0.75
+"""Share of its usual frames after which an act may end."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class StreamState:
         return {**rows, "memory": self.memory[:, :, index]}
 
 
-PLAN = ("acts", "by")
+PLAN = ("acts", "lasts")
 
 
 @dataclass
@@ -75,30 +77,33 @@ class _Plan:
     """The acts that a session has still to come."""
 
     acts: Tensor  # (A, W)
-    by: list[int]  # frames by which each of them begins at the latest
+    lasts: list[int]  # frames that each of them usually takes
+    until: int  # frames of the session by which the act that plays is over
     ends_from: int  # of the last one
+    earliest: int = 0  # frames of the session after which the act that plays may end
 
     @classmethod
-    def of(cls, sentence: Tensor, ends_from: int, limit: int | None) -> _Plan:
+    def of(cls, sentence: Tensor, ends_from: int, lasts: Sequence[int] | None) -> _Plan:
         """Of a sentence (W,) or of acts (A, W); see `Streams.start`."""
         acts = torch.atleast_2d(sentence)
-        by = [NEVER if limit is None else limit * act // len(acts) for act in range(len(acts))]
-        return cls(acts, by, ends_from)
+        return cls(acts, [NEVER] * len(acts) if lasts is None else list(lasts), 0, ends_from)
 
-    def take(self) -> Tensor:
-        """The next act (W,)."""
-        act, self.acts, self.by = self.acts[0], self.acts[1:], self.by[1:]
+    def take(self, made: int) -> Tensor:
+        """The next act (W,), from frame `made` on."""
+        act, self.until = self.acts[0], made + self.lasts[0]
+        self.earliest = made + (0 if self.lasts[0] == NEVER else int(EARLIEST * self.lasts[0]))
+        self.acts, self.lasts = self.acts[1:], self.lasts[1:]
         return act
 
     def save(self) -> dict[str, Tensor]:
         """As tensors named `PLAN`."""
-        return {"acts": self.acts.clone(), "by": torch.tensor([*self.by, self.ends_from])}
+        return {"acts": self.acts.clone(), "lasts": torch.tensor([*self.lasts, self.until, self.ends_from])}
 
     @classmethod
     def load(cls, saved: Mapping[str, Tensor]) -> _Plan:
         """From what `save` gave."""
-        *by, ends_from = saved["by"].tolist()
-        return cls(saved["acts"], by, ends_from)
+        *lasts, until, ends_from = saved["lasts"].tolist()
+        return cls(saved["acts"], lasts, until, ends_from)
 
 
 class Streams:
@@ -140,7 +145,7 @@ class Streams:
         seed: int,
         *,
         ends_from: int = NEVER,
-        limit: int | None = None,
+        lasts: Sequence[int] | None = None,
         past: Tensor | None = None,
         skipped: int = 0,
     ) -> int:
@@ -150,8 +155,8 @@ class Streams:
             sentence: (W,) sentence features, or (A, W) of acts in order: where END is drawn the next one is steered to.
             seed: of its random numbers.
             ends_from: END of the last act may be drawn after so many frames (no length was asked for).
-            limit: frames of the session, where that is known: each act gets its share of them at least. None = an act
-                goes on until END is drawn.
+            lasts: frames (A,) that each act usually takes: where another comes it is over then although END was not
+                drawn, and END may be drawn near it only. None = an act goes on until END is drawn.
             past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
                 What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
             skipped: frames that were made before `past`.
@@ -172,14 +177,14 @@ class Streams:
         mine["skipped"].fill_(skipped + before - len(past))
         mine["made"].fill_(skipped + before)
         mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
-        plan = self._plans[self.sessions[row]] = _Plan.of(sentence, ends_from, limit)
+        plan = self._plans[self.sessions[row]] = _Plan.of(sentence, ends_from, lasts)
         self._begin(row, plan, past)
         return self.sessions[row]
 
-    def steer(self, session: int, sentence: Tensor) -> None:
-        """Another prompt, (W,) or (A, W) as in `start`, from the next frame on: position 0 alone is computed anew, on
-        each level; what the frames so far were told stays."""
-        plan = self._plans[session] = _Plan.of(sentence, NEVER, None)
+    def steer(self, session: int, sentence: Tensor, lasts: Sequence[int] | None = None) -> None:
+        """Another prompt, (W,) or (A, W) with `lasts` as in `start`, from the next frame on: position 0 alone is
+        computed anew, on each level; what the frames so far were told stays."""
+        plan = self._plans[session] = _Plan.of(sentence, NEVER, lasts)
         self._begin(self._row(session), plan)
 
     def stop(self, session: int) -> None:
@@ -198,7 +203,7 @@ class Streams:
         if not self.sessions:
             return {}
         for row, plan in self._unfinished():
-            if int(self.state.made[row]) >= plan.by[0]:
+            if int(self.state.made[row]) >= plan.until:
                 self._begin(row, plan)
         column = self._draw(self.states())
         while due := [(row, plan) for row, plan in self._unfinished() if self.state.ended[row]]:
@@ -254,10 +259,10 @@ class Streams:
 
     def _begin(self, row: int, plan: _Plan, past: Tensor | None = None) -> None:
         """Tell a row the next act of its plan."""
-        self._read(row, plan.take(), self.state.last.new_zeros(0, self.model.levels) if past is None else past)
         made = int(self.state.made[row])
-        shortest = made + self.model.config.min_frames if made or plan.acts.size(0) else 0
-        ends_from = max(shortest, 0 if len(plan.acts) else plan.ends_from)
+        self._read(row, plan.take(made), self.state.last.new_zeros(0, self.model.levels) if past is None else past)
+        shortest = made + self.model.config.min_frames if made or len(plan.acts) else 0
+        ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
         self.state.ends_from[row] = ends_from
         self.state.ended[row] = False
 
@@ -303,18 +308,31 @@ class Streams:
         states = states.view(active, self.branches, model.lanes, -1)
         if model.depth is None:
             logits = model.head(states.flatten(1, 2)).view(*states.shape[:3], -1)
+            ending = self._ends(logits[:, 0, 0])
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
         else:
             assert self.packed.depth is not None
-            frame, drawn = DepthFrame(model.depth, self.packed.depth, states), list[Tensor]()
+            frame, drawn, ending = DepthFrame(model.depth, self.packed.depth, states), list[Tensor](), None
             for level in range(levels):
                 below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
                 logits = model.head(frame.next(below))[:, :, None]
+                ending = self._ends(logits[:, 0, 0]) if ending is None else ending
                 drawn.append(self._pick(logits, noise[:, level : level + 1], level))
         codes = torch.cat(drawn, 1)
         ended = self.state.ended[:active]
-        ended |= codes[:, 0] == model.end
+        ended |= ending
         return codes.masked_fill(ended[:, None], -1)
+
+    def _ends(self, logits: Tensor) -> Tensor:
+        """Whether END comes (s,), from level 0's logits (s, K + 1) under the prompt.
+
+        It is drawn apart from the codes, with its own chance: temperatures below 1 and guidance, which sharpen codes,
+        all but forbid what has a small chance at each of many frames.
+        """
+        made = self.state.made[: len(logits)]
+        chance = 1 - (1 - logits.float().softmax(-1)[:, self.model.end]) ** self.config.end_rate
+        drawn = uniform(self.state.seeds[: len(logits)], END_STREAM, 0, made).diagonal()
+        return (drawn < chance) & (made >= self.state.ends_from[: len(logits)])
 
     def _noise(self, active: int) -> Tensor:
         """A number (s, V) for each session's seed, frame and level."""
@@ -329,8 +347,7 @@ class Streams:
         random numbers (s, n)."""
         config = self.config
         guided = logits[:, 0] if self.branches == 1 else guide(logits[:, 0], logits[:, 1], config.guidance)
-        barred = self.state.made[: len(logits)] < (NEVER if level else self.state.ends_from[: len(logits)])
-        guided[..., self.model.end].masked_fill_(barred[:, None], -torch.inf)
+        guided[..., self.model.end] = -torch.inf  # drawn apart
         return sample_top_k(
             guided,
             noise,

@@ -11,7 +11,7 @@ import torch
 from shared.errors import InvalidInput
 from workers.mogo.attention import RelativeAttention
 from workers.mogo.config import PAPER, STARTER, TINY, MOGOConfig
-from workers.mogo.model import NOT_ASKED, RQHCTransformer, Trunk, corrupt, in_force, next_targets
+from workers.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
 
 from .networks import columns, prompts, transformer
 
@@ -251,3 +251,13 @@ def test_the_trunk_has_the_size_it_is_named_for(config: MOGOConfig, millions: fl
         trunk = Trunk(config.transformer, config.max_frames)
     read = sum(p.numel() for n, p in trunk.named_parameters() if "relative" not in n)  # φ is computed once
     assert read / 1e6 == pytest.approx(millions, rel=0.01)
+
+
+def test_an_act_takes_as_long_as_acts_that_were_said_alike() -> None:
+    torch.manual_seed(0)
+    pace, features = Pace(TINY), torch.randn(2000, TINY.condition.text_width)
+    assert pace(features[:2]).tolist() == [TINY.max_frames] * 2  # 4 s, before it has learnt; no longer than is trained
+    pace.fit(features, 20 * torch.exp(0.1 * features[:, 0]))
+    said = torch.zeros(3, TINY.condition.text_width)
+    said[:, 0] = torch.tensor([0.0, -1.0, 50.0])
+    assert pace(said).tolist() == [20, 18, TINY.max_frames]

@@ -293,11 +293,11 @@ def test_the_next_act_begins_where_the_model_says_that_one_is_over() -> None:
     assert torch.equal(found[beside], run(streams, 2 * least + 2)[lonely])
 
 
-def test_where_the_length_is_known_each_act_gets_its_share() -> None:
+def test_an_act_that_does_not_end_by_itself_is_over_after_its_frames() -> None:
     model = transformer()
     model.head.bias.data[-1] = -100.0  # END never comes
     streams = opened(model, 1)
-    session = streams.start(torch.stack([said(1), said(2)]), 9, limit=20)
+    session = streams.start(torch.stack([said(1), said(2)]), 9, lasts=[10, 10])
     assert torch.equal(run(streams, 20)[session], steered(model, 10, 20))
 
 
@@ -305,7 +305,7 @@ def test_a_saved_session_still_has_its_acts_to_come_and_a_steer_drops_them() -> 
     model = transformer()
     model.head.bias.data[-1] = -100.0
     streams = opened(model, 1)
-    session = streams.start(torch.stack([said(1), said(2)]), 9, limit=20)
+    session = streams.start(torch.stack([said(1), said(2)]), 9, lasts=[10, 10])
     run(streams, 4)
     saved = streams.save(session)
     streams.stop(session)
