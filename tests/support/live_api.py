@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from pathlib import Path
 import httpx2
 import numpy as np
 import sqlalchemy as sa
+import structlog
 import uvicorn
 
 from services.api.app import SOCKETS, create_app
@@ -143,9 +145,10 @@ def settings_of(home: Path, database_url: str, queue_url: str) -> Settings:
 
 
 class ApiThread:
-    """Serves an application until the end of the block."""
+    """Serves an application until the end of the block; its log lines go to stderr, as those of a server of its own."""
 
     def __init__(self, config: Settings) -> None:
+        structlog.configure(logger_factory=structlog.PrintLoggerFactory(sys.__stderr__))
         self.config = config
         self._server = uvicorn.Server(
             uvicorn.Config(
