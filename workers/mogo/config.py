@@ -79,7 +79,6 @@ class InferenceConfig:
     upper_temperature: float = 0.6  # of all other levels: against jitter
     upper_top_k: float = 0.1
     guidance: float = 1.0  # 1 = off; anything else doubles the cost
-    end_rate: float = 1.0  # how many times a frame END is asked for, at the chance that the model gives it
     window: int = 196  # frames that attention reaches back, at most `max_frames`
 
 

@@ -312,11 +312,12 @@ class Streams:
             drawn = [self._pick(logits[:, :, :1], noise[:, :1]), self._pick(logits[:, :, 1:], noise[:, 1:], 1)]
         else:
             assert self.packed.depth is not None
-            frame, drawn, ending = DepthFrame(model.depth, self.packed.depth, states), list[Tensor](), None
+            frame, drawn = DepthFrame(model.depth, self.packed.depth, states), list[Tensor]()
+            ending = self.state.ended[:active]
             for level in range(levels):
                 below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
                 logits = model.head(frame.next(below))[:, :, None]
-                ending = self._ends(logits[:, 0, 0]) if ending is None else ending
+                ending = ending if level else self._ends(logits[:, 0, 0])
                 drawn.append(self._pick(logits, noise[:, level : level + 1], level))
         codes = torch.cat(drawn, 1)
         ended = self.state.ended[:active]
@@ -330,7 +331,7 @@ class Streams:
         all but forbid what has a small chance at each of many frames.
         """
         made = self.state.made[: len(logits)]
-        chance = 1 - (1 - logits.float().softmax(-1)[:, self.model.end]) ** self.config.end_rate
+        chance = logits.float().softmax(-1)[:, self.model.end]
         drawn = uniform(self.state.seeds[: len(logits)], END_STREAM, 0, made).diagonal()
         return (drawn < chance) & (made >= self.state.ends_from[: len(logits)])
 
