@@ -9,7 +9,7 @@ away, motion in full swing. Seams teach steering: between the acts of joined cli
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -69,10 +69,19 @@ class Stretch:
 
     def cropped(self, by: int) -> Stretch:
         """Without its first frames."""
-        seam = max(self.seam - by, 0)
-        return Stretch(
-            self.first + by, self.frames - by, self.skipped + by, self.before, self.after, seam, self.ends
-        )  # fmt: skip
+        return replace(
+            self,
+            first=self.first + by,
+            frames=self.frames - by,
+            skipped=self.skipped + by,
+            seam=max(self.seam - by, 0),
+        )
+
+    def shortened(self, most: int) -> Stretch:
+        """Its first `most` frames; a seam behind them is left out too."""
+        if self.frames <= most:
+            return self
+        return replace(self, frames=most, seam=self.seam if self.seam <= most else 0, ends=False)
 
 
 class Samples:
@@ -95,7 +104,8 @@ class Samples:
         self._starts = tokens.starts[:, 0].cpu().numpy()
         self._steered_from = len(tokens.tokens)
         self.tokens = tokens.tokens if steers is None else torch.cat([tokens.tokens, steers.tokens])
-        self._columns = None if steers is None else {n: getattr(steers, n).cpu().numpy() for n in Stretched}
+        columns = {} if steers is None else vars(steers)
+        self._columns = {name: column.cpu().numpy() for name, column in columns.items() if name != "tokens"}
 
     def draw(self, clips: NDArray[np.int64], rng: np.random.Generator) -> list[Stretch]:
         """A stretch a clip (B,); some are of any steered motion instead."""
@@ -120,7 +130,6 @@ class Samples:
 
     def anytime(self, rng: np.random.Generator) -> Stretch:
         """One of the steered motions."""
-        assert self._columns is not None
         row = int(rng.integers(len(self._columns["starts"])))
         about = {name: int(column[row]) for name, column in self._columns.items()}
         whole = Stretch(
@@ -174,12 +183,4 @@ class Samples:
             last = whole.seam - BEFORE_SEAM if whole.seam else whole.frames - MIN_FRAMES
             if last > 0:
                 whole = whole.cropped(int(rng.integers(1, last + 1)))
-        if whole.frames <= self.most:
-            return whole
-        return Stretch(
-            whole.first, self.most, whole.skipped, whole.before, whole.after, whole.seam % (self.most + 1), False
-        )  # fmt: skip
-
-
-Stretched = ("starts", "lengths", "seams", "left", "entered", "ends")
-"""Columns of `Steers`."""
+        return whole.shortened(self.most)

@@ -14,7 +14,7 @@ from tests.support.prepared import farthest_move, write_prepared
 from workers.mogo.assembly import assemble, take_apart
 from workers.mogo.config import TINY, MOGOConfig
 from workers.mogo.model import NOT_ASKED, next_targets
-from workers.mogo.samples import MIN_FRAMES
+from workers.mogo.samples import MIN_FRAMES, Stretch
 from workers.mogo.stage_transformer import TransformerStage
 from workers.mogo.steers import load_steers
 from workers.mogo.tokenizer import Tokenizer
@@ -134,6 +134,13 @@ def test_a_single_act_has_one_of_its_captions_and_is_sometimes_cut(stage: Transf
     assert any(not s.skipped for s in found)
     assert all(s.first == start + s.skipped for s in found)
     assert all(s.ends == (s.skipped + s.frames == length) for s in found)
+
+
+def test_a_stretch_that_is_too_long_loses_its_end_and_a_seam_behind_it() -> None:
+    whole = Stretch(first=7, frames=40, skipped=0, before=1, after=2, seam=30, ends=True)
+    assert whole.shortened(40) == whole
+    assert whole.shortened(35) == replace(whole, frames=35, ends=False)
+    assert whole.shortened(24) == replace(whole, frames=24, seam=0, ends=False)
 
 
 def test_what_is_drawn_becomes_tokens_prompts_and_seams(stage: TransformerStage) -> None:
