@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from shared.bundles import Bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
+from shared.text.features import TextFeatures
 from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
 from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
@@ -123,6 +124,11 @@ class Generator:
         """One for all: sessions of any length go side by side."""
         return 1
 
+    def acts(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
+        """The acts of a prompt (A, W), and the frames that each usually takes (A,)."""
+        acts = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.device)
+        return acts, self.transformer.natural_frames(acts)
+
     @torch.inference_mode()
     def generate(
         self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
@@ -173,17 +179,16 @@ class _Drawing:
         inference: InferenceConfig,
         recorded: Mapping[int, torch.Tensor],
     ) -> None:
-        self.requests = requests
+        self._generator, self.requests = generator, requests
         self.columns: list[list[torch.Tensor] | None] = [  # None: dropped
             list(recorded[row].unbind()) if row in recorded else [] for row in range(len(requests))
         ]
-        self.lasts = [self._lasts(generator, request) for request in requests]
+        self.lasts = [self._lasts(request) for request in requests]
         self.frames = [sum(lasts) for lasts in self.lasts]
         self.total = sum(len(recorded[row]) if row in recorded else self.frames[row] for row in range(len(requests)))
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
         self.streams = Streams(generator.packed, max(1, min(MAX_SESSIONS, len(requests))), inference)
-        self._device, self._ends_from = generator.device, generator.config.min_frames
 
     @property
     def done(self) -> int:
@@ -218,16 +223,14 @@ class _Drawing:
             self.columns[row] = None
 
     def _start(self, request: Request, lasts: Sequence[int]) -> int:
-        acts = torch.from_numpy(request.text.act_vectors.astype(np.float32)).to(self._device)
-        ends_from = NEVER if request.frames is not None else self._ends_from
+        acts, _ = self._generator.acts(request.text)
+        ends_from = NEVER if request.frames is not None else self._generator.config.min_frames
         return self.streams.start(acts, request.seed, ends_from=ends_from, lasts=lasts)
 
-    @staticmethod
-    def _lasts(generator: Generator, request: Request) -> list[int]:
+    def _lasts(self, request: Request) -> list[int]:
         """Frames of each act: as many as is natural, together as many as are asked for or can be made at most."""
-        acts = torch.from_numpy(request.text.act_vectors.astype(np.float32)).to(generator.device)
-        natural = np.array(generator.transformer.natural_frames(acts))
-        whole = request.frames or min(int(natural.sum()), generator.config.max_frames)
+        natural = np.array(self._generator.acts(request.text)[1])
+        whole = request.frames or min(int(natural.sum()), self._generator.config.max_frames)
         return np.diff(np.round(np.cumsum([0, *natural]) * whole / natural.sum())).astype(int).tolist()
 
     def _stop(self, session: int) -> None:

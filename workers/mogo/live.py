@@ -135,7 +135,7 @@ class LiveRoom:
             columns = self.generator.columns(past)
             features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
             body = self._motion.after(features[0].cpu().numpy())
-        acts, lasts = self._acts(text)
+        acts, lasts = self.generator.acts(text)
         stream = self._streams.start(acts, seed, lasts=lasts, past=columns)
         self._started += 1
         self._sessions[self._started] = _Session(0 if columns is None else len(columns), prompt, stream)
@@ -150,7 +150,7 @@ class LiveRoom:
         """
         self.generator.limits.check(Request(text, 0))
         about = self._playing(session)
-        self._streams.steer(about.stream, *self._acts(text))
+        self._streams.steer(about.stream, *self.generator.acts(text))
         about.prompt += 1
 
     def stop(self, session: int) -> None:
@@ -242,11 +242,6 @@ class LiveRoom:
         self._rows = [self._rows[row] for row in kept]
         self._decoded = self._decoded.select(torch.tensor(kept, dtype=torch.long))
         self._body = self._body.take(kept)
-
-    def _acts(self, text: TextFeatures) -> tuple[torch.Tensor, list[int]]:
-        """Acts (A, W), and the frames that each usually takes (A,)."""
-        acts = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.generator.device)
-        return acts, self.generator.transformer.natural_frames(acts)
 
 
 def create_show() -> Show:
