@@ -6,7 +6,6 @@ Splices of the prepared folder leave an act when it is done, as sequences do. Wh
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,17 +13,15 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from shared.errors import InvalidInput
 from shared.motion.features import HeadingLayout
-from shared.nn import distributed
 from workers.mogo.config import MOGOConfig
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.data.prepared import PreparedData
 from workers.training.data.splice import join_clips, seam_costs, seam_features
-from workers.training.motions import MotionData, fingerprint
+from workers.training.motions import MotionData, fingerprint, made_once
 
 FILE = "steers.safetensors"
 LEAST_LEFT, MOST_LEFT, LEAST_ENTERED = 8, 110, 12
@@ -66,21 +63,12 @@ def load_steers(
         clips: (C,) those that may be joined: single acts.
         weights: (C,) how often each is drawn.
     """
-    key = hashlib.sha256(f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}".encode())
-    file = run / FILE
-    if file.is_file():
-        values = load_file(file, device=str(data.features.device))
-        if bytes(values.pop("key").cpu().numpy().tobytes()) == key.digest():
-            ends = values.pop("ends").bool()
-            return Steers(**{name: value.long() for name, value in values.items()}, ends=ends)
-    steers = _make(config, tokenizer, data, np.asarray(clips), np.asarray(weights))
-    if distributed.rank() == 0:
-        kept = {name: value.int() for name, value in vars(steers).items()}
-        kept |= {"tokens": steers.tokens.to(torch.int16), "key": torch.tensor(list(key.digest()), dtype=torch.uint8)}
-        temporary = file.with_suffix(".part")
-        save_file({name: value.cpu().contiguous() for name, value in kept.items()}, temporary)
-        temporary.replace(file)
-    return steers
+    key = f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}"
+    chosen, often = np.asarray(clips), np.asarray(weights)
+    values = made_once(
+        run / FILE, key, data.features.device, lambda: vars(_make(config, tokenizer, data, chosen, often))
+    )  # fmt: skip
+    return Steers(**{**values, "ends": values["ends"].bool()})
 
 
 @torch.no_grad()

@@ -6,6 +6,7 @@ Choices of data come from a numpy generator that the loop seeds from (seed, step
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,24 +129,28 @@ class TokenData:
 
 def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> TokenData:
     """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
-    file = run / TOKENS
     key = f"{data.sha256}:{fingerprint(tokenizer)}"
+    device = data.features.device
+    return TokenData(**made_once(run / TOKENS, key, device, lambda: vars(TokenData.encode(tokenizer, data))))
+
+
+def made_once(
+    file: Path, key: str, device: torch.device, make: Callable[[], Mapping[str, Tensor]]
+) -> Mapping[str, Tensor]:
+    """Whole numbers, int64, among them `tokens`: read from a file that has this key, else made, and kept there."""
     if file.is_file():
-        values = load_file(file, device=str(data.features.device))
-        if bytes(values.pop("key").cpu().numpy().tobytes()).decode() == key:
-            return TokenData(**{name: value.long() for name, value in values.items()})
-    tokens = TokenData.encode(tokenizer, data)
+        values = load_file(file, device=str(device))
+        if values.pop("key").cpu().numpy().tobytes() == key.encode():
+            return {name: value.long() for name, value in values.items()}
+    made = {name: value.long() for name, value in make().items()}
     if distributed.rank() == 0:
-        values = {
-            "tokens": tokens.tokens.to(torch.int16),
-            "starts": tokens.starts.int(),
-            "lengths": tokens.lengths.int(),
-            "key": torch.tensor(list(key.encode()), dtype=torch.uint8),
-        }
+        values = {name: value.int() for name, value in made.items()}
+        values["tokens"] = made["tokens"].to(torch.int16)
+        values["key"] = torch.tensor(list(key.encode()), dtype=torch.uint8)
         temporary = file.with_suffix(".part")
         save_file({name: value.cpu().contiguous() for name, value in values.items()}, temporary)
         temporary.replace(file)
-    return tokens
+    return made
 
 
 def fingerprint(tokenizer: MotionTokenizer) -> str:
