@@ -11,27 +11,23 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import shutil
 import sys
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from statistics import mean, stdev
 
 from shared.bundles import find_bundle
 from shared.errors import InvalidBundle, MareyError
-from shared.text.features import TextFeatures
 from shared.text.pipeline import TextPipeline
 from workers.hgm3.assembly import assemble, take_apart
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.generate import Generator, Settings
 from workers.hgm3.train import train_stage
+from workers.training.ablation import judge, table
 from workers.training.budget import Budget
-from workers.training.checks.obedience import measure
 from workers.training.checks.prompts import evaluation_prompts
-from workers.training.checks.rates import mean_quality
 from workers.training.motions import TOKENS
 from workers.training.staging import TrainOptions
 
@@ -55,29 +51,6 @@ def train_variant(
     shutil.copy(folder / "run" / TOKENS, encoded)
     assemble(data, folder / "run", folder / "bundle", config)
     return found
-
-
-def judge(generator: Generator, texts: Sequence[TextFeatures], settings: Settings) -> dict[str, float]:
-    """Shares of obeyed evaluation prompts, foot skate and jerk of one bundle."""
-    report = measure(generator, texts, evaluation_prompts(), seeds=[0], settings=settings)
-    physical = mean_quality(t.quality for t in report.trials)
-    rates = {name: rate.share for name, rate in report.summary.items()}
-    return rates | {"foot skate": physical.skate, "jerk": physical.jerk}
-
-
-def table(results: Mapping[str, Sequence[Mapping[str, float]]]) -> str:
-    """Means over training seeds with 95 % intervals (normal, 1.96 s/√n) as Markdown; one row a variant."""
-    names = list(next(iter(results.values()))[0])
-    lines = ["| variant | seeds | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
-    for variant, rows in results.items():
-        cells = [_interval([row[name] for row in rows]) for name in names]
-        lines.append(f"| {variant} | {len(rows)} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def _interval(values: Sequence[float]) -> str:
-    half = 1.96 * stdev(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
-    return f"{mean(values):.3f} ± {half:.3f}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -228,18 +228,22 @@ class RQHCTransformer(nn.Module):
             skipped: (B,) frames that were cut off between the prompt and the first column, None = 0.
             seam: (B,) frames made when the second prompt replaced the first, at least 1; needed where P = 2.
         """
-        batch, size, _ = tokens.shape
+        size, number = tokens.shape[1], prompts.shape[1]
+        first, frames = self.inputs(prompts, tokens, seam)
+        x = torch.cat([first, frames], 2).flatten(0, 1)  # (B · L, P + n, w)
+        states = self.trunk(x, self.reach(size, number, skipped, seam))
+        states = torch.cat([states[:, :1], states[:, number:]], 1)  # a second prompt predicts nothing
+        return states.view(len(tokens), self.lanes, size + 1, -1).transpose(1, 2)
+
+    def inputs(self, prompts: Tensor, tokens: Tensor, seam: Tensor | None) -> tuple[Tensor, Tensor]:
+        """Position 0 of each prompt (B, L, P, w) and the frames (B, L, n, w); arguments as in `states`."""
         training = self.training
-        dropped = torch.rand(batch, device=tokens.device) < self.config.condition.drop if training else None
+        dropped = torch.rand(len(tokens), device=tokens.device) < self.config.condition.drop if training else None
         inputs = corrupt(tokens, self.codes, self.config.corruption) if training else tokens
         read = [self.prompt(p, dropped) for p in prompts.unbind(1)]
-        first = torch.stack([opening for opening, _ in read], 2)  # (B, L, P, w)
-        told = in_force([told for _, told in read], size, seam)
-        frames = self.columns(inputs).to(first.dtype) + told[:, None]
-        x = torch.cat([first, frames], 2).flatten(0, 1)  # (B · L, P + n, w)
-        states = self.trunk(x, self.reach(size, prompts.shape[1], skipped, seam))
-        states = torch.cat([states[:, :1], states[:, prompts.shape[1] :]], 1)  # a second prompt predicts nothing
-        return states.view(batch, self.lanes, size + 1, -1).transpose(1, 2)
+        first = torch.stack([opening for opening, _ in read], 2)
+        told = in_force([told for _, told in read], tokens.shape[1], seam)
+        return first, self.columns(inputs).to(first.dtype) + told[:, None]
 
     def natural_frames(self, acts: Tensor) -> list[int]:
         """How many frames each act (A, W) of a prompt usually takes, with the way there from the one before."""

@@ -34,10 +34,11 @@ class TransformerStage:
         tokens: TokenData,
         captions: SentenceData,
         steers: Steers | None = None,
+        network: type[RQHCTransformer] = RQHCTransformer,
     ) -> None:
         self.config = config
         self.optimisation = config.train_transformer
-        self.module = RQHCTransformer(config).to(tokens.tokens.device)
+        self.module = network(config).to(tokens.tokens.device)
         self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
         self.samples = Samples(clips, tokens, captions, steers, config.max_frames)
         spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import torch
 
@@ -11,6 +9,7 @@ from shared.nn.devices import choose_device
 from workers.mogo.assembly import RECIPE
 from workers.mogo.config import MOGOConfig
 from workers.mogo.losses import scale_penalty
+from workers.mogo.model import RQHCTransformer
 from workers.mogo.samples import MIN_FRAMES
 from workers.mogo.stage_transformer import TransformerStage
 from workers.mogo.steers import Steers, load_steers
@@ -36,12 +35,11 @@ def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float
     RECIPE.check_name(name)
     start_process_group()
     use_threads(options.threads)
-    data = MotionData.load(options.prepared, choose_device(options.device))
-    torch.manual_seed(options.seed)
-    return _train_tokenizer(options, data) if name == "tokenizer" else _train_transformer(options, data)
+    return _train_tokenizer(options) if name == "tokenizer" else _train_transformer(options)
 
 
-def _train_tokenizer(options: TrainOptions[MOGOConfig], data: MotionData) -> dict[str, float]:
+def _train_tokenizer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    data = _data(options)
     tokenizer = Tokenizer(options.config)
     config = options.config
     stage = TokenizerStage(config, data, tokenizer, lambda: scale_penalty(tokenizer, config.tokenizer))
@@ -50,7 +48,21 @@ def _train_tokenizer(options: TrainOptions[MOGOConfig], data: MotionData) -> dic
     return metrics
 
 
-def _train_transformer(options: TrainOptions[MOGOConfig], data: MotionData) -> dict[str, float]:
+def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    stage, sha256 = transformer_stage(options)
+    metrics = RECIPE.train(stage, options)
+    finish(stage.module, options, stage.name, metrics, sha256)
+    return metrics
+
+
+def transformer_stage(
+    options: TrainOptions[MOGOConfig], network: type[RQHCTransformer] = RQHCTransformer
+) -> tuple[TransformerStage, str]:
+    """The transformer's stage on the tokens of the run, made where they are missing, and the hash of the data.
+
+    Features are read for that alone: their memory is free again behind it.
+    """
+    data = _data(options)
     device = data.features.device
     tokenizer = Tokenizer(options.config).to(device)
     tokenizer.load_state_dict(RECIPE.part("tokenizer", options.config, options.run).state)
@@ -58,13 +70,14 @@ def _train_transformer(options: TrainOptions[MOGOConfig], data: MotionData) -> d
     texts, width = CaptionTexts.load(data.prepared), options.config.condition.text_width
     captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
     torch.manual_seed(options.seed)
-    clips, sha256 = data.prepared.clips, data.sha256
+    clips = data.prepared.clips
     steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES))
-    data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
-    stage = TransformerStage(options.config, clips, tokens, captions, steers)
-    metrics = RECIPE.train(stage, options)
-    finish(stage.module, options, stage.name, metrics, sha256)
-    return metrics
+    return TransformerStage(options.config, clips, tokens, captions, steers, network), data.sha256
+
+
+def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
+    torch.manual_seed(options.seed)
+    return MotionData.load(options.prepared, choose_device(options.device))
 
 
 def _steers(options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs) -> Steers | None:

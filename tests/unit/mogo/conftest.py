@@ -1,11 +1,19 @@
-"""One thread for small networks."""
+"""One thread for small networks; a small prepared folder."""
 
 from __future__ import annotations
 
 import pytest
 import torch
 
+from tests.support.prepared import write_prepared
+from workers.training.data.prepared import PreparedData
+
 
 @pytest.fixture(autouse=True, scope="session")
 def _one_thread() -> None:
     torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
+    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("mogo") / "prepared"))

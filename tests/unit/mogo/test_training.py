@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from shared.errors import InvalidInput, NotFound
-from tests.support.prepared import farthest_move, write_prepared
+from tests.support.prepared import farthest_move
 from workers.mogo.assembly import assemble, take_apart
 from workers.mogo.config import TINY, MOGOConfig
 from workers.mogo.model import NOT_ASKED, next_targets
@@ -29,11 +29,6 @@ from workers.training.staging import TrainOptions
 from workers.training.texts import CaptionTexts
 
 CPU = torch.device("cpu")
-
-
-@pytest.fixture(scope="session")
-def prepared(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
-    return PreparedData.open(write_prepared(tmp_path_factory.mktemp("mogo") / "prepared"))
 
 
 @pytest.fixture(scope="session")

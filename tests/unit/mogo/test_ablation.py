@@ -1,0 +1,91 @@
+"""Variants differ in what they are about alone; a level token is read by its lane and no other."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from workers.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
+from workers.mogo.assembly import assemble
+from workers.mogo.config import TINY
+from workers.mogo.train import train_stage
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+from workers.training.motions import TOKENS
+from workers.training.staging import TrainOptions
+
+from .networks import columns, prompts
+
+FLAT = replace(TINY, depth=replace(TINY.depth, layers=0))
+
+
+@pytest.fixture(scope="module")
+def options(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> TrainOptions:
+    """A trained run and its bundle."""
+    run = tmp_path_factory.mktemp("ablation") / "run"
+    options = TrainOptions(prepared.path, run, TINY, Budget(steps=2), device="cpu", bf16=False, quiet=True)
+    for stage in ("tokenizer", "transformer"):
+        train_stage(stage, options)
+    assemble(prepared.path, run, run / "bundle", TINY)
+    return options
+
+
+def test_a_quantizer_without_scales_is_trained_and_measured_alike(options: TrainOptions, tmp_path: Path) -> None:
+    found = train_tokenizer("none", replace(options, run=tmp_path))
+    assert {"local_mm", "error_mm", "perplexity/0"} <= set(found)
+    part = json.loads((tmp_path / "tokenizer" / "part" / "part.json").read_text())
+    assert part["config"]["tokenizer"]["scale"] == "none"
+
+
+def test_variants_of_the_transformer_share_tokens_and_steers(options: TrainOptions, tmp_path: Path) -> None:
+    names = ("a lane a level, level token, independent levels", "a lane a level, PnQ, independent levels")
+    variants = [replace(VARIANTS[name], network=LevelToken) for name in names]
+    bundle = str(options.run / "bundle")
+    found = []
+    for number, variant in enumerate(variants):
+        (tmp_path / str(number)).mkdir()
+        found.append(train_transformer(bundle, variant, replace(options, run=tmp_path / str(number))))
+    assert found[0] == found[1]  # the same variant twice: same data, same seed
+    assert set(found[0]) == {"accuracy/0", *(f"loss/{level}" for level in range(TINY.tokenizer.levels))}
+    assert (tmp_path / "0" / TOKENS).read_bytes() == (tmp_path / "1" / TOKENS).read_bytes()
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_variant_changes_lanes_and_depth_alone(name: str) -> None:
+    changed = VARIANTS[name].of(TINY)
+    kept = replace(changed, transformer=replace(changed.transformer, joint=False), depth=TINY.depth)
+    assert kept == TINY
+
+
+def test_a_level_token_is_read_by_its_own_lane_from_the_first_frame_on() -> None:
+    torch.manual_seed(0)
+    model = LevelToken(FLAT).eval().requires_grad_(False)
+    told, tokens = prompts(2), columns(5, 2)
+    before = model.states(told, tokens)
+    assert before.shape == (2, 6, TINY.tokenizer.levels, TINY.transformer.width)
+    model.level_token[1] += torch.randn(TINY.transformer.width)
+    changed = (model.states(told, tokens) - before).abs().amax((0, 3))  # (n + 1, L)
+    assert (changed[:, 1] > 1e-4).all()
+    assert (changed[:, [0, 2]] == 0).all()
+
+
+def test_behind_a_level_token_frames_still_read_the_past_alone_and_the_prompt_in_force() -> None:
+    torch.manual_seed(0)
+    model = LevelToken(FLAT).eval().requires_grad_(False)
+    told, tokens = torch.cat([prompts(1), prompts(1) + 1], 1), columns(6)
+    seam = torch.tensor([3])
+    before = model.states(told, tokens, seam=seam)
+    other = tokens.clone()
+    other[:, 4] = (other[:, 4] + 1) % TINY.tokenizer.codes
+    changed = (model.states(told, other, seam=seam) - before).abs().amax((0, 2, 3))
+    assert (changed[:5] == 0).all()
+    assert (changed[5:] > 1e-5).all()
+    second = told.clone()
+    second[:, 1] += 1
+    changed = (model.states(second, tokens, seam=seam) - before).abs().amax((0, 2, 3))
+    assert (changed[:3] == 0).all()  # frames 1 to 3 come before the steer
+    assert (changed[3:] > 1e-5).all()
