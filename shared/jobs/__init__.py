@@ -29,6 +29,7 @@ from shared.jobs.deliveries import (
     send_test,
 )
 from shared.jobs.errors import IdempotencyMismatch
+from shared.jobs.estimate_types import Estimate, QueuePlace, Speed
 from shared.jobs.estimates import estimate, place_of
 from shared.jobs.evaluation_types import (
     BUNDLE_SOURCES,
@@ -68,6 +69,19 @@ from shared.jobs.evaluations import (
 )
 from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets, remove_unused_assets
 from shared.jobs.keys import SCOPES, authenticate, check_key, create_key, list_keys, revoke_key, rotate_key
+from shared.jobs.lease_types import (
+    AssetDigest,
+    Claim,
+    ClaimedItem,
+    Committed,
+    Heartbeat,
+    ItemFailure,
+    NewMotion,
+    NewText,
+    SweepReport,
+    WorkerBeat,
+    WorkerRow,
+)
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_priority
@@ -88,6 +102,7 @@ from shared.jobs.schedules import (
 )
 from shared.jobs.scoring import commit_score, load_score
 from shared.jobs.states import EvaluationState, ItemState, JobControl, JobState, Review, Stage, StreamState
+from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamRow
 from shared.jobs.streams import (
     abandoned_streams,
     add_chunk,
@@ -101,7 +116,7 @@ from shared.jobs.streams import (
 )
 from shared.jobs.submit import submit
 from shared.jobs.sweep import sweep
-from shared.jobs.tenant_types import Actor, AuditRow, Quotas, TenantRow, Usage
+from shared.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, TenantRow, Usage
 from shared.jobs.tenants import (
     create_tenant,
     get_tenant,
@@ -117,40 +132,20 @@ from shared.jobs.types import (
     PRIORITY_LIMIT,
     SEED_LIMIT,
     TEXT_QUEUE,
-    ApiKey,
-    AssetDigest,
-    Claim,
-    ClaimedItem,
-    Committed,
     Erasure,
-    Estimate,
     EventRow,
     GarbageReport,
-    Heartbeat,
-    ItemFailure,
     ItemRow,
     JobRow,
     MotionFile,
     MotionFilter,
     MotionRow,
-    NewApiKey,
     NewItem,
     NewJob,
-    NewMotion,
-    NewStream,
-    NewText,
     Page,
     Problem,
-    QueuePlace,
     Reroll,
-    Speed,
-    StreamChunk,
-    StreamPast,
-    StreamRow,
     SubmittedJob,
-    SweepReport,
-    WorkerBeat,
-    WorkerRow,
 )
 from shared.jobs.watch import (
     Outbox,

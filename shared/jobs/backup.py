@@ -17,8 +17,9 @@ from shared.jobs import schema
 from shared.jobs.evaluation_types import EVALUATOR_QUEUE
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, among
+from shared.jobs.lease_types import AssetDigest
 from shared.jobs.states import ENDED, JobControl, Review, Stage
-from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE, AssetDigest
+from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
 
 CHUNK = 1000  # rows of one statement
 Row = TypeVar("Row")

@@ -11,10 +11,10 @@ import sqlalchemy as sa
 
 from shared.jobs import schema
 from shared.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
+from shared.jobs.lease_types import Claim, ClaimedItem, Heartbeat
 from shared.jobs.policy import Policy, policy
 from shared.jobs.quotas import room_to_run
 from shared.jobs.states import ItemState, JobControl, Stage
-from shared.jobs.types import Claim, ClaimedItem, Heartbeat
 
 LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 

@@ -17,8 +17,8 @@ from shared.errors import Conflict, NotFound
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
 from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.schema import webhook_attempt, webhook_delivery, webhook_event
 from shared.jobs.types import Page
-from shared.jobs.webhook_schema import webhook_attempt, webhook_delivery, webhook_event
 from shared.jobs.webhook_types import (
     TEST_KIND,
     Attempt,

@@ -8,9 +8,10 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from shared.jobs import schema
+from shared.jobs.estimate_types import Estimate, QueuePlace, Speed
 from shared.jobs.listings import get_job
 from shared.jobs.states import ENDED, OPEN, JobControl
-from shared.jobs.types import TEXT_QUEUE, Estimate, QueuePlace, Speed
+from shared.jobs.types import TEXT_QUEUE
 from shared.jobs.workers import live_workers
 
 MEASURED = 2000

@@ -9,8 +9,9 @@ from typing import Any
 from uuid import UUID
 
 from shared.jobs.ids import new_id
+from shared.jobs.lease_types import AssetDigest
 from shared.jobs.states import EvaluationState, ItemState, JobState
-from shared.jobs.types import AssetDigest, Problem
+from shared.jobs.types import Problem
 
 EVALUATOR_QUEUE = "evaluator"
 """The queue of score items."""

@@ -17,8 +17,9 @@ from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unauthentic
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
+from shared.jobs.tenant_types import ApiKey, NewApiKey
 from shared.jobs.tenants import get_tenant
-from shared.jobs.types import DEFAULT_TENANT, ApiKey, NewApiKey
+from shared.jobs.types import DEFAULT_TENANT
 from shared.rates import check_rates
 
 SCOPES = frozenset({"read", "submit", "operate", "admin", "metrics"})

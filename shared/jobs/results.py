@@ -25,10 +25,11 @@ from shared.jobs.journal import (
     record,
     returned,
 )
+from shared.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
 from shared.jobs.operate import cancel_open_items
 from shared.jobs.policy import Policy, policy
 from shared.jobs.states import Cause, ItemState, Stage
-from shared.jobs.types import AssetDigest, Committed, ItemFailure, NewMotion, NewText, Problem
+from shared.jobs.types import Problem
 
 # The lease stays until the announcement stands; heartbeats may go on.
 HOLD_LEASE = sa.text("""

@@ -21,18 +21,10 @@ from shared.jobs.journal import CLOCK, interval
 from shared.jobs.listings import cut_page, page_limit, read_cursor
 from shared.jobs.outbox import tell_of_stream
 from shared.jobs.states import OPEN_STREAMS, StreamState
+from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamRow
 from shared.jobs.submit import check_text, submit
 from shared.jobs.tenants import get_tenant
-from shared.jobs.types import (
-    NewItem,
-    NewJob,
-    NewStream,
-    Page,
-    Problem,
-    StreamChunk,
-    StreamPast,
-    StreamRow,
-)
+from shared.jobs.types import NewItem, NewJob, Page, Problem
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
 RETRY_SECONDS = 10

@@ -1,4 +1,4 @@
-"""What tenants are to the rest: quotas and what is used of them, and who did what."""
+"""What tenants are to the rest: their keys, quotas and what is used of them, and who did what."""
 
 from __future__ import annotations
 
@@ -44,6 +44,34 @@ class TenantRow:
     created: datetime
     suspended: datetime | None
     quotas: Quotas
+
+
+@dataclass(frozen=True)
+class ApiKey:
+    """An API key without its secret."""
+
+    id: UUID
+    tenant: str
+    name: str
+    prefix: str
+    scopes: tuple[str, ...]
+    created: datetime
+    last_used: datetime | None
+    """Within a minute."""
+    expires: datetime | None
+    revoked: datetime | None
+    replaced_by: UUID | None
+    """The key it was rotated to."""
+    rates: Mapping[str, str]
+    """Rate limits of its own, by class of request: {"submit": "60/minute"}."""
+
+
+@dataclass(frozen=True)
+class NewApiKey:
+    """A key just made; `secret` is shown once and stored nowhere."""
+
+    key: ApiKey
+    secret: str
 
 
 @dataclass(frozen=True)

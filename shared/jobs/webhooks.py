@@ -12,9 +12,9 @@ from shared.errors import Conflict, InvalidInput, NotFound
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.schema import webhook, webhook_delivery
 from shared.jobs.submit import check_text
 from shared.jobs.types import Page
-from shared.jobs.webhook_schema import webhook, webhook_delivery
 from shared.jobs.webhook_types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
 
 MAX_WEBHOOKS = 20

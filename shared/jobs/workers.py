@@ -7,8 +7,8 @@ from sqlalchemy.dialects.postgresql import insert
 
 from shared.jobs import schema
 from shared.jobs.journal import CLOCK, interval
+from shared.jobs.lease_types import WorkerBeat, WorkerRow
 from shared.jobs.policy import Policy, policy
-from shared.jobs.types import WorkerBeat, WorkerRow
 
 
 def beat(conn: sa.Connection, worker: WorkerBeat) -> None:

@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeAlias
 from uuid import UUID
 
 from shared.errors import MareyError
-from shared.jobs.types import Claim, ClaimedItem
+from shared.jobs.lease_types import Claim, ClaimedItem
 from shared.runtime.scoring import ScoreInput
 
 

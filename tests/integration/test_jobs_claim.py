@@ -34,7 +34,7 @@ from shared.jobs import (
     transaction,
     waiting_batches,
 )
-from shared.jobs.types import Claim, ItemFailure
+from shared.jobs.lease_types import Claim, ItemFailure
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

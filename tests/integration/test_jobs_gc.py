@@ -24,7 +24,7 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.types import Claim, NewMotion
+from shared.jobs.lease_types import Claim, NewMotion
 from shared.storage import AssetStore, FolderStore
 from tests.servers.jobs import claim_some, let_expire, motion_of, parse_texts, submit_items
 

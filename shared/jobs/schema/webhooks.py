@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema import NOW, Id, Time, metadata
+from shared.jobs.schema.base import NOW, Id, Time, metadata
 
 webhook = sa.Table(
     "webhook",

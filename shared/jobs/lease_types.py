@@ -1,0 +1,156 @@
+"""What a worker claims, says and gives back, and what a sweep takes back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from uuid import UUID
+
+from shared.jobs.states import ItemState, Stage
+from shared.jobs.types import JsonObject, Problem
+
+
+@dataclass(frozen=True)
+class ClaimedItem:
+    """An item as its worker sees it."""
+
+    id: UUID
+    position: int
+    index: int
+    variant: int
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    text_key: str
+    seed: int
+    seconds: float | None
+    settings: JsonObject
+    tags: tuple[str, ...]
+    attempts: int
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A batch under one lease: items of one job, one stage and one batch key, in input order."""
+
+    lease_token: UUID
+    tenant: str
+    job: UUID
+    queue: str
+    stage: Stage
+    batch_key: str
+    bundle: str
+    solo: bool
+    """The single item of this claim was in a batch whose lease was lost; losing this one costs it an attempt."""
+    items: tuple[ClaimedItem, ...]
+    traceparent: str | None = None
+    """Of the request that submitted the job."""
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """What the database says to a worker's heartbeat."""
+
+    lost: bool
+    """The lease is gone (expired and swept, or all its items taken away): stop, throw the batch away."""
+    gone: frozenset[UUID]
+    """Items, of those asked about, that the lease no longer holds: cancelled. Drop their rows."""
+
+
+@dataclass(frozen=True)
+class WorkerBeat:
+    """A worker says that it lives."""
+
+    id: str
+    queue: str
+    host: str
+    pid: int
+    device: str
+    bundle: str | None = None
+    """Bundle it has loaded."""
+    batch_key: str | None = None
+
+
+@dataclass(frozen=True)
+class WorkerRow:
+    """A worker that said it lives."""
+
+    id: str
+    queue: str
+    host: str
+    pid: int
+    device: str
+    bundle: str | None
+    started: datetime
+    seen: datetime
+    live: bool
+
+
+@dataclass(frozen=True)
+class AssetDigest:
+    """Content to store: its digest and size."""
+
+    sha256: str
+    size: int
+    media_type: str = "application/octet-stream"
+
+
+@dataclass(frozen=True)
+class NewMotion:
+    """A finished item: its files lie in the asset store already."""
+
+    item: UUID
+    files: Mapping[str, AssetDigest]
+    """By format ("npz", "bvh")."""
+    frames: int
+    fps: float
+    licence: str
+    """SPDX name or short text of the terms of the weights."""
+    elapsed: float
+    """Seconds of work on it."""
+    metadata: JsonObject = field(default_factory=dict[str, object])
+
+
+@dataclass(frozen=True)
+class NewText:
+    """Text features of one item's prompt."""
+
+    item: UUID
+    key: str
+    blob: bytes
+
+
+@dataclass(frozen=True)
+class ItemFailure:
+    """An item that could not be made."""
+
+    item: UUID
+    problem: Problem
+    retryable: bool
+
+
+@dataclass(frozen=True)
+class Committed:
+    """What became of a write under a lease."""
+
+    items: tuple[UUID, ...]
+    """Written now."""
+    lost: tuple[UUID, ...]
+    """Not ours any more (lease lost, cancelled, or committed before): the result is thrown away."""
+    states: Mapping[UUID, ItemState] = field(default_factory=dict[UUID, ItemState])
+    """Of items that could not be made: `failed`, `dead`, or `ready` for another try."""
+
+
+@dataclass(frozen=True)
+class SweepReport:
+    """What a sweep did."""
+
+    leases_lost: int = 0
+    items_returned: int = 0
+    items_dead: int = 0
+    items_due: int = 0
+    """Items whose `run_after` has passed."""
+    stale_assets: int = 0
+    """Assets still `writing` an hour after their lease went; `collect_garbage` removes them."""
