@@ -17,7 +17,7 @@ import shutil
 import sys
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -26,8 +26,9 @@ from torch import Tensor, nn
 
 from shared.bundles import find_bundle
 from shared.errors import MareyError
+from shared.nn.scaled_quantizer import Scale
 from workers.mogo.assembly import RECIPE, assemble, take_apart
-from workers.mogo.config import MOGOConfig, TokenizerConfig
+from workers.mogo.config import MOGOConfig
 from workers.mogo.generate import Generator
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.train import train_stage, transformer_stage
@@ -89,12 +90,16 @@ VARIANTS = {
 }
 
 
-SCALES = {"elementwise scales (shipped)": "elementwise", "one scale a level": "scalar", "no scale": "none"}
+SCALES: dict[str, Scale] = {
+    "elementwise scales (shipped)": "elementwise",
+    "one scale a level": "scalar",
+    "no scale": "none",
+}
 
 
-def train_tokenizer(scale: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+def train_tokenizer(scale: Scale, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
     """Train one tokenizer; its errors on captured test clips, in millimetres, and how many codes it uses."""
-    tokenizer = TokenizerConfig(**asdict(options.config.tokenizer) | {"scale": scale})
+    tokenizer = replace(options.config.tokenizer, scale=scale)
     found = train_stage("tokenizer", replace(options, config=replace(options.config, tokenizer=tokenizer)))
     return {name.removeprefix("test/"): value for name, value in found.items() if name.startswith("test/")}
 
