@@ -82,6 +82,14 @@ class Unreachable(MareyError):
     problem_type = "unreachable"
 
 
+class TooSlow(MareyError):
+    """A request came slower than the server waits for one; sending it again may work."""
+
+    exit_code = 4
+    status = 408
+    problem_type = "too-slow"
+
+
 class Refused(MareyError):
     """Not allowed: the key lacks the scope, or a quota or rate is used up."""
 

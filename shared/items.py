@@ -183,9 +183,21 @@ def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None =
         InvalidItems: at least one is wrong.
         TooLarge: more than `MAX_ITEMS` with their variants.
     """
-    items = collect(raws, read_item, where=where)
-    check_count(items, where=where)
-    return items
+    count = 0
+
+    def read(raw: object, line: int | None) -> tuple[Item | None, list[Problem]]:
+        nonlocal count
+        item, problems = read_item(raw, line)
+        count += 0 if item is None else item.variants
+        if count > MAX_ITEMS:  # what is far too long is not read to its end
+            raise TooLarge(
+                f"is over the limit of {MAX_ITEMS:,} motions (prompts times variants) a job",
+                where=where if line is None else ", ".join(filter(None, (where, f"line {line}"))),
+                hint="Submit them as several jobs.",
+            )
+        return item, problems
+
+    return collect(raws, read, where=where)
 
 
 def collect(
@@ -214,22 +226,6 @@ def collect(
     if not made:
         raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
     return made
-
-
-def check_count(items: Iterable[Item], *, where: str | None = None) -> int:
-    """Items with their variants.
-
-    Raises:
-        TooLarge: more than `MAX_ITEMS`.
-    """
-    count = sum(item.variants for item in items)
-    if count > MAX_ITEMS:
-        raise TooLarge(
-            f"{count} motions (prompts times variants) are over the limit of {MAX_ITEMS} a job",
-            where=where,
-            hint="Submit them as several jobs.",
-        )
-    return count
 
 
 def _name(value: object) -> str:

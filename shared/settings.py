@@ -54,6 +54,13 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"
     port: int = 8400
     allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
+    idle_seconds: float = Field(default=20.0, gt=0)
+    """A connection to the API that asks for nothing for so long is closed, and so is one whose request has no whole
+    head by then."""
+    body_seconds: float = Field(default=600.0, gt=0)
+    """The body of a request must be here after this long: 64 MiB at 110 KiB a second."""
+    body_pause_seconds: float = Field(default=20.0, gt=0)
+    """It may be slower than 4 KiB a second for this long in all."""
     rates: dict[str, str] = {}
     """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
     is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""

@@ -15,11 +15,13 @@ from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
 from services.api import problems
+from services.api.bodies import BodyGuard, Patience
 from services.api.catalogue import Catalogue
+from services.api.connections import connection_options
 from services.api.context import Context
 from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from services.api.evaluations.routes import router as evaluations_router
-from services.api.guards import BodyGuard, HostGuard
+from services.api.guards import HostGuard
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
 from services.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
@@ -32,7 +34,6 @@ from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
 from services.api.streams.routes import router as streams_router
-from services.api.streams.wire import StreamProtocol
 from services.api.tailer import Tailer
 from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
@@ -50,12 +51,6 @@ CONNECTIONS = 10
 """Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams and sockets end at once."""
-SOCKETS: dict[str, Any] = {
-    "ws": StreamProtocol,
-    "ws_max_size": 64 * 2**10,  # what is too long for us is answered; what is over this is not even read
-    "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
-}
-"""What uvicorn must know of WebSockets."""
 ROUTERS = (
     *(health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router),
     *(evaluations_router, schedules_router, webhooks_router),
@@ -80,8 +75,8 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
     problems.install(app)
     for router in routers:
         app.include_router(router)
-    app.add_middleware(BodyGuard)
     app.add_middleware(HostGuard, allowed=config.allowed_hosts)
+    app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
     app.add_middleware(Trace)
     app.add_middleware(Measure)
     app.openapi = lambda: openapi(app)
@@ -163,5 +158,5 @@ def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=GRACE_SECONDS,
-        **SOCKETS,
+        **connection_options(config),
     )

@@ -1,4 +1,4 @@
-"""ASGI middleware: which Host is answered, and how large a body may be."""
+"""ASGI middleware: which Host is answered."""
 
 from __future__ import annotations
 
@@ -6,18 +6,11 @@ from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
-from starlette.requests import Request
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from services.api.problems import problem_response
-from shared.errors import InvalidInput, MareyError, Refused, TooLarge
-from shared.items import MAX_BODY_BYTES
-
-MAX_OTHER_BODY = 2**20
-"""Bytes of any body but those that hold many prompts."""
-PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
-"""Where such bodies go; their routes read them."""
+from shared.errors import MareyError, Refused
 
 
 class HostGuard:
@@ -52,68 +45,6 @@ class HostGuard:
         return None
 
 
-class BodyGuard:
-    """Reads bodies up to their limit before a route sees them; larger ones are refused. Routes that take many
-    prompts read their own."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on with the whole body, or refuse."""
-        if scope["type"] != "http" or _holds_prompts(scope):
-            await self.app(scope, receive, send)
-            return
-        try:
-            body = await read_body(Request(scope, receive), MAX_OTHER_BODY)
-        except MareyError as error:
-            await _refuse(error, scope, receive, send)
-            return
-        sent = False
-
-        async def replay() -> Message:
-            nonlocal sent
-            if sent:
-                return await receive()
-            sent = True
-            return {"type": "http.request", "body": body, "more_body": False}
-
-        await self.app(scope, replay, send)
-
-
-async def read_body(request: Request, limit: int) -> bytes:
-    """The body of a request.
-
-    Raises:
-        TooLarge: over `limit` bytes; it is not read further.
-        InvalidInput: the length it declares is not a number.
-    """
-    declared = request.headers.get("content-length", "0")
-    if not declared.isdecimal():
-        raise InvalidInput("is not a number", where="Content-Length")
-    if int(declared) > limit:
-        raise _too_large(limit)
-    parts: list[bytes] = []
-    size = 0
-    async for part in request.stream():
-        size += len(part)
-        if size > limit:
-            raise _too_large(limit)
-        parts.append(part)
-    return b"".join(parts)
-
-
-def limit_of_submit() -> int:
-    """Bytes of a body that holds many prompts."""
-    return MAX_BODY_BYTES
-
-
-def _holds_prompts(scope: Scope) -> bool:
-    if scope["method"] == "PATCH":
-        return scope["path"].startswith("/v1/schedules/")
-    return scope["method"] == "POST" and scope["path"] in PROMPTS_PATHS
-
-
 def _without_port(host: str) -> str:
     return host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
 
@@ -128,10 +59,6 @@ def _host_of(origin: str) -> str:
 
 def _foreign(message: str, where: str) -> Refused:
     return Refused(message, where=where[:100], hint="MAREY_ALLOWED_HOSTS names those it does.")
-
-
-def _too_large(limit: int) -> TooLarge:
-    return TooLarge(f"the body is over {limit / 2**20:g} MiB", where="body", hint="Send it in several requests.")
 
 
 async def _refuse(error: MareyError, scope: Scope, receive: Receive, send: Send) -> None:

@@ -26,6 +26,7 @@ from shared.errors import (
     Refused,
     TimedOut,
     TooLarge,
+    TooSlow,
     Unauthenticated,
     Unreachable,
 )
@@ -44,7 +45,7 @@ _ERRORS: dict[str, type[MareyError]] = {
     kind.problem_type: kind
     for kind in (
         InvalidInput, TooLarge, InvalidFile, InvalidBundle, Conflict, NotFound, Unreachable, Refused, Unauthenticated,
-        TimedOut,
+        TimedOut, TooSlow,
     )
 }  # fmt: skip
 

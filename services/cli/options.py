@@ -28,7 +28,10 @@ class InputFormat(StrEnum):
 
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="What the person does.")]
 PromptFile = Annotated[
-    str | None, typer.Option("-f", "--file", help="CSV, JSONL or text file of prompts; - is stdin.", show_default=False)
+    str | None,
+    typer.Option(
+        "-f", "--file", help="CSV, JSONL or text file of prompts, also as .gz; - is stdin.", show_default=False
+    ),
 ]
 PromptFormat = Annotated[
     InputFormat | None, typer.Option("--input-format", help="Format of -f where its ending does not tell.")

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import csv
-import io
-import sys
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Literal
 
-from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from services.cli.text_files import GZIP_ENDING, open_text, where_of
+from shared.errors import InvalidInput
 from shared.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
 from shared.evaluation_prompts import EvaluationPrompt, read_prompts
 from shared.items import COLUMNS, MAX_BODY_BYTES, InvalidItems, Item, Problem, Unreadable, read_items, read_json
 
 Format = Literal["csv", "jsonl", "txt"]
 Rows = Iterator[tuple[int | None, object]]
+Lines = Iterator[tuple[int, str]]
+"""With their numbers, from 1."""
 
-UTF8_BOM = b"\xef\xbb\xbf"
-UTF16_BOMS = (b"\xff\xfe", b"\xfe\xff")
 TAG_SEPARATOR = ";"
 
 
@@ -32,37 +31,38 @@ def items_from_file(path: str, file_format: Format | None = None) -> list[Item]:
     """Items of a file, or of stdin for `-`.
 
     Args:
-        path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, or `-`.
+        path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also packed
+            as `.gz`, or `-`.
         file_format: for `-` and other endings; stdin is otherwise guessed from its first line.
 
     Raises:
         InvalidItems: with every problem of every line.
         InvalidFile: not UTF-8, or not of that format at all.
+        TooLarge: over `MAX_BODY_BYTES` of text, or over `MAX_ITEMS` motions; it is not read further.
         NotFound, InvalidInput: no such file, or no way to tell its format.
     """
-    return read_items(rows_of_file(path, file_format), where=_where(path))
+    return read_items(rows_of_file(path, file_format), where=where_of(path))
 
 
 def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
     """Prompts of an evaluation; columns `prompt`, `seconds` and `expected`. Raises as `items_from_file`."""
-    return read_prompts(rows_of_file(path, columns=EVALUATION_COLUMNS), where=_where(path))
+    return read_prompts(rows_of_file(path, columns=EVALUATION_COLUMNS), where=where_of(path))
 
 
 def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence[str] = COLUMNS) -> Rows:
-    """The lines of a file with their numbers, not checked further than that a table has known columns.
+    """The lines of a file with their numbers, as they are read; only that a table has known columns is checked.
 
     Raises:
-        InvalidItems, InvalidFile, NotFound, InvalidInput: as `items_from_file`.
+        InvalidItems, InvalidFile, NotFound, TooLarge, InvalidInput: as `items_from_file`.
     """
-    text = _decode(_read(path), _where(path))
-    chosen = file_format or (_guess(text) if path == "-" else _by_ending(path))
-    if chosen == "csv":
-        return _csv(text, _where(path), columns)
-    return _jsonl(text) if chosen == "jsonl" else _txt(text)
-
-
-def _where(path: str) -> str:
-    return "stdin" if path == "-" else path
+    with open_text(path, limit=MAX_BODY_BYTES) as text:
+        lines = enumerate(text, 1)
+        chosen, first = (file_format or _by_ending(path), []) if file_format or path != "-" else _guess(lines)
+        lines = itertools.chain(first, lines)
+        if chosen == "csv":
+            yield from _csv(lines, where_of(path), columns)
+        else:
+            yield from _jsonl(lines) if chosen == "jsonl" else _txt(lines)
 
 
 def with_defaults(
@@ -85,61 +85,45 @@ def with_defaults(
     return read_items([(None, item.as_json()) for item in changed])
 
 
-def _read(path: str) -> bytes:
-    try:
-        content = sys.stdin.buffer.read(MAX_BODY_BYTES + 1) if path == "-" else _read_file(Path(path))
-    except FileNotFoundError:
-        raise NotFound("there is no such file", where=path, hint="Check the path of -f.") from None
-    except OSError as error:
-        raise InvalidFile(f"cannot be read: {error.strerror}", where=path) from error
-    if len(content) > MAX_BODY_BYTES:
-        raise TooLarge(f"is over {MAX_BODY_BYTES // 2**20} MiB", where=path, hint="Submit it in parts.")
-    return content
-
-
-def _read_file(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return stream.read(MAX_BODY_BYTES + 1)
-
-
-def _decode(content: bytes, where: str) -> str:
-    if content.startswith(UTF16_BOMS):
-        raise InvalidFile("is UTF-16, not UTF-8", where=where, hint="Save it as UTF-8 (in Excel: CSV UTF-8).")
-    content = content.removeprefix(UTF8_BOM)
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InvalidFile(
-            f"is not UTF-8 (byte 0x{content[error.start]:02x})", where=f"{where}: line {line}", hint="Save it as UTF-8."
-        ) from error
-
-
 def _by_ending(path: str) -> Format:
+    name = path.lower().removesuffix(GZIP_ENDING)
     for ending in ("csv", "jsonl", "txt"):
-        if path.lower().endswith(f".{ending}"):
+        if name.endswith(f".{ending}"):
             return ending
     raise InvalidInput(
         "the file's ending does not tell its format", where=path, hint="Use --input-format csv|jsonl|txt."
     )
 
 
-def _guess(text: str) -> Format:
-    first = text.lstrip().partition("\n")[0]
+def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
+    """The format, by the first line that is not blank, and what was read to see it."""
+    read: list[tuple[int, str]] = []
+    for number, line in lines:
+        if line.strip():
+            read.append((number, line))
+            break
+    first = read[0][1].strip()[:1000] if read else ""  # a header, or it is none
     if first.startswith("{"):
-        return "jsonl"
-    return "csv" if "prompt" in next(csv.reader([first]), []) else "txt"
+        return "jsonl", read
+    return ("csv" if "prompt" in next(csv.reader([first]), []) else "txt"), read
 
 
-def _csv(text: str, where: str, columns: Sequence[str]) -> Rows:
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+def _csv(lines: Lines, where: str, columns: Sequence[str]) -> Rows:
+    at = 0
+
+    def counted() -> Iterator[str]:
+        nonlocal at
+        for at, line in lines:  # noqa: B007 (the reader has no number for the line that a guess has skipped)
+            yield line
+
+    reader = csv.reader(counted(), strict=True)
     header: list[str] | None = None
-    line = 1
     while True:
+        line = at + 1
         try:
             cells = next(reader, None)
         except csv.Error as error:
-            yield line, Unreadable(f"is not CSV: {error}; the lines below it were not read")
+            yield line, Unreadable(f"is not CSV: {_csv_error(error)}; the lines below it were not read")
             return
         if cells is None:
             return
@@ -148,7 +132,12 @@ def _csv(text: str, where: str, columns: Sequence[str]) -> Rows:
                 header = _header([cell.strip() for cell in cells], line, where, columns)
             else:
                 yield line, _csv_row(header, cells)
-        line = reader.line_num + 1
+
+
+def _csv_error(error: csv.Error) -> str:
+    if "field limit" in str(error):
+        return f"a cell of over {csv.field_size_limit():,} characters, as where a quote is never closed"
+    return "a quote is never closed" if "end of data" in str(error) else str(error)
 
 
 def _header(names: list[str], line: int, where: str, columns: Sequence[str]) -> list[str]:
@@ -190,13 +179,13 @@ def _csv_value(name: str, cell: str) -> object:
     return cell if name == "prompt" else cell.strip()
 
 
-def _jsonl(text: str) -> Rows:
-    for line, content in enumerate(text.split("\n"), 1):
-        if content.strip():
-            yield line, read_json(content)
+def _jsonl(lines: Lines) -> Rows:
+    for number, line in lines:
+        if line.strip():
+            yield number, read_json(line)
 
 
-def _txt(text: str) -> Rows:
-    for line, content in enumerate(text.split("\n"), 1):
-        if content.strip():
-            yield line, {"prompt": content.rstrip("\r")}
+def _txt(lines: Lines) -> Rows:
+    for number, line in lines:
+        if line.strip():
+            yield number, {"prompt": line.rstrip("\r\n")}

@@ -18,7 +18,8 @@ import sqlalchemy as sa
 import structlog
 import uvicorn
 
-from services.api.app import SOCKETS, create_app
+from services.api.app import create_app
+from services.api.connections import connection_options
 from services.cli.client import Client
 from services.cli.place import Server
 from shared.bundles import BundleWriter, TextSpec
@@ -152,7 +153,11 @@ class ApiThread:
         self.config = config
         self._server = uvicorn.Server(
             uvicorn.Config(
-                create_app(config), port=config.port, log_level="warning", timeout_graceful_shutdown=1, **SOCKETS
+                create_app(config),
+                port=config.port,
+                log_level="warning",
+                timeout_graceful_shutdown=1,
+                **connection_options(config),
             )
         )
         self._thread = threading.Thread(target=self._server.run, daemon=True)

@@ -10,12 +10,12 @@ from fastapi.concurrency import run_in_threadpool
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
+from services.api.bodies import read_body
 from services.api.context import Connection, Shared
 from services.api.evaluations import service
 from services.api.evaluations.comparison import ComparisonView, compare_runs
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.api.guards import limit_of_submit, read_body
 from services.api.problems import RESPONSES
 from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs
@@ -39,7 +39,7 @@ async def begin_evaluation(
     idempotency_key: IdempotencyKey = None,
 ) -> EvaluationDetailView:
     """Plan an evaluation: its motions are made in the background, then measured. All bad prompts are told at once."""
-    body = await read_body(request, limit_of_submit())
+    body = await read_body(request)
     view, replayed = await run_in_threadpool(service.create, shared, key, body, idempotency_key)
     response.headers["Location"] = f"/v1/evaluations/{view.id}"
     if replayed:

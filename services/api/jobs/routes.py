@@ -12,8 +12,8 @@ from fastapi.sse import EventSourceResponse
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
+from services.api.bodies import read_body
 from services.api.context import Connection, Context, Shared
-from services.api.guards import limit_of_submit, read_body
 from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
 from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
@@ -83,7 +83,7 @@ async def submit_job(
     For NDJSON, what concerns the job as a whole stands in the query. All problems of all lines are told at once, and
     then nothing is written.
     """
-    body = await read_body(request, limit_of_submit())
+    body = await read_body(request)
     kind = request.headers.get("content-type", JSON).partition(";")[0].strip().lower()
     fields = {
         "name": name,

@@ -9,11 +9,11 @@ from fastapi.concurrency import run_in_threadpool
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
+from services.api.bodies import read_body
 from services.api.context import Connection, Shared
 from services.api.evaluations.routes import body_of
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView
 from services.api.evaluations.service import detail
-from services.api.guards import limit_of_submit, read_body
 from services.api.problems import RESPONSES
 from services.api.schedules import service
 from services.api.schedules.schemas import NewScheduleBody, SchedulePatch, ScheduleView
@@ -26,7 +26,7 @@ router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONS
 @router.post("", status_code=201, openapi_extra=body_of("NewScheduleBody"))
 async def create_schedule(request: Request, response: Response, shared: Shared, key: Submitter) -> ScheduleView:
     """Plan evaluations that come again. Each run looks up the bundles by the names given here, exact or not."""
-    body = await read_body(request, limit_of_submit())
+    body = await read_body(request)
     view = await run_in_threadpool(service.create, shared, key, body)
     response.headers["Location"] = f"/v1/schedules/{view.id}"
     return view
@@ -48,7 +48,7 @@ def get_schedule(schedule: UUID, conn: Connection, key: Reader) -> ScheduleView:
 @router.patch("/{schedule}", openapi_extra=body_of("SchedulePatch"))
 async def change_schedule(schedule: UUID, request: Request, shared: Shared, key: Operator) -> ScheduleView:
     """Change what is given. After a pause, and with new times, it is next due at its next time from now."""
-    body = await read_body(request, limit_of_submit())
+    body = await read_body(request)
     return await run_in_threadpool(service.change, shared, key, schedule, body)
 
 

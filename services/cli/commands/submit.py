@@ -94,6 +94,9 @@ def read_prompts(prompts: list[str] | None, file: str | None, input_format: opti
         raise InvalidInput("both PROMPT and -f are given", hint="Give the one or the other.")
     if file:
         return rows.items_from_file(file, None if input_format is None else input_format.value)
+    for prompt in prompts or ():
+        if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and Path(prompt).is_file():
+            raise InvalidInput("is a file, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
     if not prompts:
         raise InvalidInput("there is no prompt", hint="Give one or more in quotes, or a file of them with -f.")
     return rows.items_from_prompts(prompts)

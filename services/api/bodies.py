@@ -1,0 +1,188 @@
+"""ASGI middleware: how large a request's body may be, and how slowly it may come."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+
+from starlette.datastructures import Headers
+from starlette.requests import ClientDisconnect, Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from services.api.problems import problem_response
+from shared.errors import InvalidInput, MareyError, TooLarge, TooSlow
+from shared.items import MAX_BODY_BYTES
+
+MAX_OTHER_BODY = 2**20
+"""Bytes of any body but those that hold many prompts."""
+PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
+"""Where such bodies go; their routes read them, once they know who sends them."""
+MIN_RATE = 4096
+"""Bytes a second, on average, below which a body is too slow: half of what a modem did."""
+LINGER_SECONDS = 2.0
+SILENT_SECONDS = 0.25
+LINGER_BYTES = 2**20
+"""What is read, and thrown away, of a body that was refused: a client that still sends when the connection closes may
+lose the answer that says why."""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long a body is waited for.
+
+    Attributes:
+        seconds: for the whole of it.
+        pause: for its first bytes, and in all while it comes slower than `MIN_RATE`.
+    """
+
+    seconds: float
+    pause: float
+
+    def until(self, began: float, received: int) -> float:
+        """When it is too slow, with so many bytes here."""
+        return began + min(self.seconds, self.pause + received / MIN_RATE)
+
+
+class Incoming:
+    """The body of one request on its way in: counts what came, and raises when it is too slow."""
+
+    def __init__(self, scope: Scope, receive: Receive, patience: Patience) -> None:
+        headers = Headers(scope=scope)
+        self.whole = headers.get("content-length", "0") == "0" and "transfer-encoding" not in headers
+        self._receive = receive
+        self._patience = patience
+        self._began = time.monotonic()
+        self._received = 0
+
+    async def __call__(self) -> Message:
+        """The next message of the client.
+
+        Raises:
+            TooSlow: the body does not come fast enough.
+        """
+        if self.whole:
+            return await self._receive()
+        left = self._patience.until(self._began, self._received) - time.monotonic()
+        try:
+            async with asyncio.timeout(left):
+                return self._seen(await self._receive())
+        except TimeoutError:
+            raise TooSlow(
+                f"the body did not come within {self._patience.seconds:g} s, or at {MIN_RATE} bytes a second "
+                f"({self._received} bytes did)",
+                where="body",
+                hint="Send it again, in parts if the line is slow.",
+            ) from None
+
+    async def linger(self) -> None:
+        """Throw away what still comes: not more than a limit, not for long, and not once the client falls silent."""
+        before = self._received
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LINGER_SECONDS):
+                while not self.whole and self._received - before < LINGER_BYTES:
+                    async with asyncio.timeout(SILENT_SECONDS):
+                        self._seen(await self._receive())
+
+    def _seen(self, message: Message) -> Message:
+        self._received += len(message.get("body", b""))
+        self.whole = message["type"] != "http.request" or not message.get("more_body", False)
+        return message
+
+
+class BodyGuard:
+    """Reads bodies up to their limits before a route sees them. Routes that take many prompts read their own, within
+    the same limits of time.
+
+    Whatever is answered before the whole body is here is the last answer on its connection: what still comes would be
+    read for as long as the client likes to send.
+    """
+
+    def __init__(self, app: ASGIApp, patience: Patience) -> None:
+        self.app = app
+        self.patience = patience
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on with the whole body, or refuse."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        incoming = Incoming(scope, receive, self.patience)
+        answer = _Answer(incoming, send)
+        if _holds_prompts(scope):
+            await self.app(scope, incoming, answer)
+            return
+        try:
+            body = await read_body(Request(scope, incoming), MAX_OTHER_BODY)
+        except MareyError as error:
+            await problem_response(error)(scope, incoming, answer)
+            return
+        sent = False
+
+        async def replay() -> Message:
+            nonlocal sent
+            if sent:
+                return await receive()
+            sent = True
+            return {"type": "http.request", "body": body, "more_body": False}
+
+        await self.app(scope, replay, send)
+
+
+class _Answer:
+    """Sends an answer; ends the connection after one that does not wait for the body."""
+
+    def __init__(self, incoming: Incoming, send: Send) -> None:
+        self._incoming = incoming
+        self._send = send
+        self._early = False
+
+    async def __call__(self, message: Message) -> None:
+        if message["type"] == "http.response.start" and not self._incoming.whole:
+            self._early = True
+            message = {**message, "headers": [*message.get("headers", ()), (b"connection", b"close")]}
+        if self._early and message["type"] == "http.response.body" and not message.get("more_body", False):
+            await self._send({**message, "more_body": True})
+            await self._incoming.linger()
+            message = {"type": "http.response.body", "body": b""}
+        await self._send(message)
+
+
+async def read_body(request: Request, limit: int = MAX_BODY_BYTES) -> bytes:
+    """The body of a request; by default one that holds many prompts.
+
+    Raises:
+        TooLarge: over `limit` bytes; it is not read further.
+        TooSlow: it does not come fast enough.
+        InvalidInput: the length it declares is not a number, it is compressed, or the client left in its middle.
+    """
+    declared = request.headers.get("content-length", "0")
+    if not declared.isdecimal():
+        raise InvalidInput("is not a number", where="Content-Length")
+    encoding = request.headers.get("content-encoding", "identity")
+    if encoding.strip().lower() != "identity":
+        raise InvalidInput(f"{encoding[:40]!r} is not taken", where="Content-Encoding", hint="Send the body as it is.")
+    if int(declared) > limit:
+        raise _too_large(limit)
+    parts: list[bytes] = []
+    size = 0
+    try:
+        async for part in request.stream():
+            size += len(part)
+            if size > limit:
+                raise _too_large(limit)
+            parts.append(part)
+    except ClientDisconnect:  # nobody reads this, but it is no bug either
+        raise InvalidInput("the client went away before it was whole", where="body") from None
+    return b"".join(parts)
+
+
+def _holds_prompts(scope: Scope) -> bool:
+    if scope["method"] == "PATCH":
+        return scope["path"].startswith("/v1/schedules/")
+    return scope["method"] == "POST" and scope["path"] in PROMPTS_PATHS
+
+
+def _too_large(limit: int) -> TooLarge:
+    return TooLarge(f"the body is over {limit / 2**20:g} MiB", where="body", hint="Send it in several requests.")

@@ -1,0 +1,81 @@
+"""What uvicorn is told of connections: how long one may say nothing, and whose buffers a socket has."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from services.api.problems import problem_response
+from services.api.streams.wire import StreamProtocol
+from shared.errors import TooSlow
+from shared.settings import Settings
+
+
+class PatientProtocol(H11Protocol):
+    """uvicorn's HTTP/1.1 with a limit for the head of a request: its own ends only connections on which an answer was
+    the last thing said. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to
+    begin one.
+    """
+
+    head_timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Open the connection."""
+        super().connection_made(transport)
+        self._expect_head()
+
+    def data_received(self, data: bytes) -> None:
+        """Take what the client sent."""
+        super().data_received(data)
+        if self.conn.their_state is not h11.IDLE or self.transport.is_closing():
+            self._forget_head()
+        elif self.head_timer is None:
+            self._expect_head()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """The client is gone."""
+        self._forget_head()
+        super().connection_lost(exc)
+
+    def _expect_head(self) -> None:
+        self.head_timer = self.loop.call_later(self.timeout_keep_alive, self._head_is_late)
+
+    def _forget_head(self) -> None:
+        if self.head_timer is not None:
+            self.head_timer.cancel()
+            self.head_timer = None
+
+    def _head_is_late(self) -> None:
+        self.head_timer = None
+        if self.transport.is_closing() or self.conn.their_state is not h11.IDLE:
+            return
+        if self.conn.trailing_data[0]:  # who said nothing is told nothing: browsers connect ahead
+            self._say_late()
+        self.transport.close()
+
+    def _say_late(self) -> None:
+        error = TooSlow(
+            f"the head of the request did not come within {self.timeout_keep_alive:g} s", hint="Send it again."
+        )
+        answer = problem_response(error)
+        headers = [*answer.raw_headers, (b"connection", b"close")]
+        for event in (
+            h11.Response(status_code=answer.status_code, headers=headers, reason=b"Request Timeout"),
+            h11.Data(data=bytes(answer.body)),
+            h11.EndOfMessage(),
+        ):
+            self.transport.write(self.conn.send(event) or b"")
+
+
+def connection_options(config: Settings) -> dict[str, Any]:
+    """Arguments of uvicorn."""
+    return {
+        "http": PatientProtocol,
+        "timeout_keep_alive": config.idle_seconds,
+        "ws": StreamProtocol,
+        "ws_max_size": 64 * 2**10,  # what is too long for us is answered; what is over this is not even read
+        "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
+    }
