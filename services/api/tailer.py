@@ -15,13 +15,15 @@ import sqlalchemy as sa
 import structlog
 
 from shared.errors import NotFound, Unreachable
-from shared.jobs import EVENT_CHANNEL, EventRow, Listener, events_after, transaction
+from shared.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
 
 log = structlog.get_logger(__name__)
 
 PERIOD = 0.5
 """Seconds between two readings of one job: two progress messages a second at most, however fast it goes."""
 WAIT = 0.25
+KEY_SECONDS = 2.0
+"""Between two looks whether the keys of those who follow are still valid, as for sockets."""
 QUEUE_LIMIT = 1000
 """Batches a slow client may lag behind before its stream is closed; it comes back with Last-Event-ID."""
 PROGRESS = "progress"
@@ -35,6 +37,7 @@ class Subscription:
     """One open stream."""
 
     tenant: str
+    key: UUID
     job: UUID
     seq: int
     loop: asyncio.AbstractEventLoop
@@ -62,6 +65,7 @@ class Tailer:
         self._subscriptions: dict[UUID, set[Subscription]] = defaultdict(set)
         self._due: dict[UUID, float] = {}
         self._read: dict[UUID, float] = {}
+        self._keys_due = 0.0
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="tailer", daemon=True)
 
@@ -78,9 +82,10 @@ class Tailer:
         self._thread.join(timeout=5)
 
     @contextlib.asynccontextmanager
-    async def follow(self, tenant: str, job: UUID, seq: int) -> AsyncIterator[Subscription]:
-        """A subscription to a job's events with a greater `seq`; those that stand already come first."""
-        subscription = Subscription(tenant, job, seq, asyncio.get_running_loop())
+    async def follow(self, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[Subscription]:
+        """A subscription to a job's events with a greater `seq`; those that stand already come first. It is closed
+        within seconds of the key's end: that the tenant is suspended, too."""
+        subscription = Subscription(key.tenant, key.id, job, seq, asyncio.get_running_loop())
         with self._lock:
             self._subscriptions[job].add(subscription)
             self._due[job] = 0.0
@@ -101,6 +106,7 @@ class Tailer:
                     while not self._stopping.is_set():
                         self._mark(n.payload for n in listener.wait(WAIT))
                         self._read_due()
+                        self._close_invalid()
             except Unreachable as error:
                 log.warning("tailer_disconnected", error=error.message)
                 self._stopping.wait(1.0)
@@ -135,6 +141,22 @@ class Tailer:
                     if job in self._subscriptions:
                         self._due[job] = now
                 raise
+
+    def _close_invalid(self) -> None:
+        """Close what follows by a key that is revoked or expired since, or whose tenant is suspended."""
+        now = time.monotonic()
+        if now < self._keys_due:
+            return
+        self._keys_due = now + KEY_SECONDS
+        with self._lock:
+            followers = [follower for of_job in self._subscriptions.values() for follower in of_job]
+        if not followers:
+            return
+        with transaction(self._engine) as conn:
+            valid = keys_still_valid(conn, {follower.key for follower in followers})
+        for follower in followers:
+            if follower.key not in valid:
+                follower.put(CLOSED)
 
     def _feed(self, job: UUID) -> None:
         with self._lock:

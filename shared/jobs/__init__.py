@@ -68,7 +68,16 @@ from shared.jobs.evaluations import (
     store_prompts,
 )
 from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets, remove_unused_assets
-from shared.jobs.keys import SCOPES, authenticate, check_key, create_key, list_keys, revoke_key, rotate_key
+from shared.jobs.keys import (
+    SCOPES,
+    authenticate,
+    check_key,
+    create_key,
+    keys_still_valid,
+    list_keys,
+    revoke_key,
+    rotate_key,
+)
 from shared.jobs.lease_types import (
     AssetDigest,
     Claim,
@@ -317,6 +326,7 @@ __all__ = [
     "get_webhook",
     "give_back_deliveries",
     "heartbeat",
+    "keys_still_valid",
     "leased_items",
     "list_audit",
     "list_deliveries",

@@ -113,6 +113,12 @@ def check_key(conn: sa.Connection, key: UUID) -> None:
     _valid(row)
 
 
+def keys_still_valid(conn: sa.Connection, keys: Collection[UUID]) -> set[UUID]:
+    """Those of these keys that `check_key` would let stay; one query for all that is open."""
+    rows = conn.execute(_standing().where(schema.api_key.c.id.in_(keys))).mappings()
+    return {row["id"] for row in rows if row["revoked"] is None and not row["expired"] and not row["suspended"]}
+
+
 def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
     """Keys of a tenant, newest first, revoked ones too."""
     table = schema.api_key.c

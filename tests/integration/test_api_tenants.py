@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import re
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from uuid import UUID
 
 import httpx2
 import pytest
+import sqlalchemy as sa
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from websockets.exceptions import ConnectionClosed
 
@@ -22,6 +24,7 @@ from shared.jobs import (
     create_tenant,
     list_audit,
     revoke_key,
+    schema,
     set_quotas,
     suspend_tenant,
     transaction,
@@ -346,6 +349,36 @@ def test_a_revoked_key_loses_its_open_socket(place: Studio, mine: Mine) -> None:
             assert http.get("/v1/jobs").status_code == 200
             revoke_key(conn, "default", key_id(place, key))
         assert viewer.closed()[0] == 4401
+
+
+@pytest.mark.parametrize("ending", ["revoked", "expired", "suspended"])
+def test_an_event_stream_ends_with_its_key(place: Studio, ending: str) -> None:
+    tenant = f"tenant-{ending}"
+    with transaction(place.api.engine) as conn:
+        create_tenant(conn, tenant)
+    key, other = place.key("admin", tenant=tenant), place.key("admin", tenant=tenant)
+    with httpx2.Client(base_url=place.api.url, headers={"Authorization": f"Bearer {key}"}, timeout=30) as http:
+        job = accepted(http.post("/v1/jobs", json=BODIES["POST /v1/jobs"]))["id"]
+        asked = {"headers": {"Accept": "text/event-stream"}}
+        with http.stream("GET", f"/v1/jobs/{job}/events", **asked) as stream:
+            lines = stream.iter_lines()
+            assert "submitted" in "".join(itertools.takewhile(lambda line: "data:" not in line, lines))
+            with transaction(place.api.engine) as conn:
+                end_key(conn, ending, tenant, authenticate(conn, key).id)
+            assert all("error" not in line for line in lines)  # it ends, and does not break off
+        assert http.get(f"/v1/jobs/{job}/events", **asked).status_code == (403 if ending == "suspended" else 401)
+    if ending != "suspended":
+        with httpx2.Client(base_url=place.api.url, headers={"Authorization": f"Bearer {other}"}) as http:
+            accepted(http.post(f"/v1/jobs/{job}/cancel"))
+
+
+def end_key(conn: sa.Connection, ending: str, tenant: str, key: UUID) -> None:
+    if ending == "revoked":
+        revoke_key(conn, tenant, key)
+    elif ending == "suspended":
+        suspend_tenant(conn, tenant)
+    else:
+        conn.execute(sa.update(schema.api_key).where(schema.api_key.c.id == key).values(expires_at=sa.func.now()))
 
 
 def key_id(place: Studio, secret: str) -> UUID:

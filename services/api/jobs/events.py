@@ -11,7 +11,7 @@ from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
 from services.api.jobs.schemas import EventView
 from services.api.tailer import Tailer
 from shared.errors import InvalidInput
-from shared.jobs import EventRow
+from shared.jobs import ApiKey, EventRow
 from shared.jobs.states import ENDED
 
 PING_SECONDS = 15.0
@@ -32,10 +32,10 @@ def last_event_id(header: str | None, after: int) -> int:
     return int(header)
 
 
-async def stream_events(tailer: Tailer, tenant: str, job: UUID, seq: int) -> AsyncIterator[bytes]:
-    """The events after `seq` as they happen, until the job has ended or is deleted."""
+async def stream_events(tailer: Tailer, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[bytes]:
+    """The events after `seq` as they happen, until the job has ended or is deleted, or the key is no longer valid."""
     yield format_sse_event(retry=RETRY_MILLISECONDS)
-    async with tailer.follow(tenant, job, seq) as subscription:
+    async with tailer.follow(key, job, seq) as subscription:
         while True:
             try:
                 batch = await asyncio.wait_for(subscription.queue.get(), PING_SECONDS)

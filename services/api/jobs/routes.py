@@ -289,7 +289,8 @@ def list_events(
 ) -> Response:
     """Events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
 
-    A stream sends at most two progress messages a second, and ends when the job has.
+    A stream sends at most two progress messages a second, and ends when the job has, or within seconds of the key's
+    end; then a new request says why.
     """
     row = jobs.get_job(conn, key.tenant, job)
     if SSE not in request.headers.get("accept", ""):
@@ -301,7 +302,7 @@ def list_events(
     if row.state in ENDED and seq >= row.event_seq:
         return Response(status_code=204)
     headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
-    return EventSourceResponse(stream_events(shared.tailer, key.tenant, job, seq), headers=headers)
+    return EventSourceResponse(stream_events(shared.tailer, key, job, seq), headers=headers)
 
 
 SCHEMAS = (NewJobBody, NewItemBody)
