@@ -13,6 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from shared.nn.lanes import ONE_LANE, Lanes
 from shared.nn.packed import can_pack, pack_linears, packed_gelu
 from shared.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
 
@@ -154,6 +155,7 @@ class Transformer(nn.Module):
         self.dtype = torch.float32
         self.multiple = SEQUENCE_MULTIPLE  # of rows, for bits that do not depend on padding
         self.packed = False
+        self.lanes = ONE_LANE
 
     def forward(self, x: Tensor, valid: Tensor | None, rows: int | None = None) -> Tensor:
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
@@ -163,7 +165,9 @@ class Transformer(nn.Module):
         than it saves.
         """
         if self.packed:
-            return self._ragged(x, torch.ones(x.shape[:2], dtype=torch.bool) if valid is None else valid, rows)
+            valid = torch.ones(x.shape[:2], dtype=torch.bool) if valid is None else valid
+            parts = self.lanes.parts(len(x))
+            return torch.cat(self.lanes.map(lambda part: self._ragged(x[part], valid[part], rows), parts))
         mask = None if valid is None else valid[:, None, None, :]
         kind = x.device.type
         dtype = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else self.dtype
@@ -181,10 +185,11 @@ class Transformer(nn.Module):
             x = block.ragged(x, where)
         return self.norm(blocks[-1].ragged(x, where, kept))[place].float()
 
-    def lower(self, dtype: torch.dtype) -> None:
-        """Cast to `dtype` for inference, for good; what goes in and comes out stays float32."""
+    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
+        """Cast to `dtype` for inference, for good; what goes in and comes out stays float32. On a CPU sequences are
+        shared among `lanes`."""
         self.to(dtype)
-        self.dtype = dtype
+        self.dtype, self.lanes = dtype, lanes
         if can_pack(self):
             for block in self.blocks:
                 if isinstance(block, Block):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -15,6 +16,7 @@ from torch import Tensor
 from shared.bundles import Bundle
 from shared.errors import InvalidInput
 from shared.motion.features import FeatureLayout, layout
+from shared.nn.lanes import Lanes
 from shared.nn.sampling import uniform
 from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
 from workers.hgm3.bundle import Networks, load_networks
@@ -84,9 +86,16 @@ class Generator:
     """A loaded bundle. Not thread-safe; one a process."""
 
     def __init__(
-        self, bundle: Bundle, config: HGM3Config, networks: Networks, device: torch.device, dtype: torch.dtype
+        self,
+        bundle: Bundle,
+        config: HGM3Config,
+        networks: Networks,
+        device: torch.device,
+        dtype: torch.dtype,
+        lanes: Lanes,
     ) -> None:
         self.bundle = bundle
+        self.lanes = lanes
         self.config = config
         self.networks = networks
         self.device = device
@@ -116,11 +125,12 @@ class Generator:
         for part in networks.parts().values():
             part.to(chosen)
         # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.
-        networks.masked.lower(dtype)
-        networks.residual.lower(dtype)
+        lanes = Lanes(torch.get_num_threads() if chosen.type == "cpu" else 1)
+        networks.masked.lower(dtype, lanes)
+        networks.residual.lower(dtype, lanes)
         if dtype != torch.float32:
             networks.tokenizer.decoder.lower(dtype)
-        return cls(verified, config, networks, chosen, dtype)
+        return cls(verified, config, networks, chosen, dtype, lanes)
 
     @property
     def frames_per_token(self) -> int:
@@ -144,9 +154,13 @@ class Generator:
         frames = [self.frames(request) for request in requests]
         results: list[Generated | None] = [None] * len(requests)
         groups = self._groups(frames)
-        watcher = _Watcher(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
-        for rows in groups:
-            self._group(rows, requests, frames, inference, options, watcher, results)
+        steps = _Steps(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
+
+        def make(rows: list[int]) -> None:
+            self._group(_Watcher(steps, rows), requests, frames, inference, options, results)
+
+        with self.lanes.open():
+            self.lanes.map(make, groups)
         return results
 
     def settings(self, values: Mapping[str, Any]) -> Settings:
@@ -187,26 +201,26 @@ class Generator:
         return min(max(frames, self.config.min_frames), self.config.max_frames)
 
     def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Rows of one bucket each, at most MAX_ROWS."""
+        """Rows of one bucket each, at most MAX_ROWS and no more than a lane's share; the longest motions first."""
         buckets: dict[int, list[int]] = defaultdict(list)
         for row, count in enumerate(frames):
             buckets[self._bucket(count)].append(row)
-        return [rows[i : i + MAX_ROWS] for _, rows in sorted(buckets.items()) for i in range(0, len(rows), MAX_ROWS)]
+        most = min(MAX_ROWS, -(-len(frames) // self.lanes.count))
+        longest = sorted(buckets.items(), reverse=True)
+        return [rows[i : i + most] for _, rows in longest for i in range(0, len(rows), most)]
 
     def _group(
         self,
-        rows: list[int],
+        watcher: _Watcher,
         requests: Sequence[Request],
         frames: Sequence[int],
         inference: InferenceConfig,
         options: DecodeOptions,
-        watcher: _Watcher,
         results: list[Generated | None],
     ) -> None:
-        watcher.start(rows)
-        if not watcher.rows:
-            return
         rows = watcher.rows
+        if not rows:
+            return
         items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
         items = decode_base(self.networks.masked, items, inference, options, watcher.step)
         items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
@@ -241,25 +255,40 @@ class Generator:
         )
 
 
-class _Watcher:
-    """Counts steps, reports them, and turns dropped requests into rows to keep."""
+class _Steps:
+    """Counts the steps of all groups, which lanes make side by side, and reports them."""
 
     def __init__(self, control: Control, total: int) -> None:
-        self.control = control
-        self.total = total
-        self.done = 0
-        self.rows: list[int] = []
+        self._control = control
+        self._total = total
+        self._done = 0
+        self._lock = threading.Lock()
 
-    def start(self, rows: list[int]) -> None:
-        """Begin a group of requests."""
-        dropped = self.control.dropped()
+    def step(self) -> set[int]:
+        """One step done; requests to leave out."""
+        with self._lock:
+            self._done = min(self._done + 1, self._total)
+            self._control.progress(self._done, self._total)
+            return self._control.dropped()
+
+    def dropped(self) -> set[int]:
+        """Requests to leave out."""
+        with self._lock:
+            return self._control.dropped()
+
+
+class _Watcher:
+    """Turns dropped requests into rows of one group to keep."""
+
+    def __init__(self, steps: _Steps, rows: list[int]) -> None:
+        """`rows`: the group's requests."""
+        self._steps = steps
+        dropped = steps.dropped()
         self.rows = [r for r in rows if r not in dropped]
 
     def step(self) -> Tensor | None:
         """One step done; rows to keep, or None for all."""
-        self.done = min(self.done + 1, self.total)
-        self.control.progress(self.done, self.total)
-        dropped = self.control.dropped()
+        dropped = self._steps.step()
         if not dropped or not any(r in dropped for r in self.rows):
             return None
         keep = [r not in dropped for r in self.rows]

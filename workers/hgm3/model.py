@@ -22,6 +22,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from shared.nn.lanes import ONE_LANE, Lanes
 from shared.nn.packed import packed_gelu
 from shared.nn.ragged import pad_length
 from shared.nn.sampling import guide
@@ -264,9 +265,9 @@ class MaskedTransformer(nn.Module):
         self.head = TokenHead(config.masked.width, codes, tied=config.compact)
         initialize(self)
 
-    def lower(self, dtype: torch.dtype) -> None:
-        """Make ready for inference; matrices in `dtype`."""
-        self.sequence.transformer.lower(dtype)
+    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
+        """Make ready for inference; matrices in `dtype`, sequences shared among `lanes`."""
+        self.sequence.transformer.lower(dtype, lanes)
         self.head.lower(dtype)
 
     def forward(
@@ -344,9 +345,9 @@ class ResidualTransformer(nn.Module):
             nn.init.normal_(self.enter.weight, std=0.5 * t.code_width**-0.5)
             nn.init.zeros_(self.leave.weight)  # first guess: how often each code occurs
 
-    def lower(self, dtype: torch.dtype) -> None:
-        """Make ready for inference; matrices in `dtype`."""
-        self.sequence.transformer.lower(dtype)
+    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
+        """Make ready for inference; matrices in `dtype`, sequences shared among `lanes`."""
+        self.sequence.transformer.lower(dtype, lanes)
         if not self.compact:
             self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
 

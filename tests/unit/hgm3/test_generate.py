@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,6 +63,29 @@ def test_tokens_are_equal_in_any_batch_with_bfloat16_matrices(generator: Generat
     together = lowered.generate(requests())
     alone = [lowered.generate([r])[0] for r in requests()]
     assert equal(together, alone)
+
+
+@pytest.fixture
+def in_lanes(generator: Generator) -> Iterator[Generator]:
+    """The same bundle in two lanes."""
+    before = torch.get_num_threads()
+    yield Generator.load(generator.bundle, device="cpu", threads=2, dtype=generator.dtype)
+    torch.set_num_threads(before)
+
+
+def test_motions_are_equal_in_two_lanes(in_lanes: Generator, reference: list[Generated | None]) -> None:
+    assert in_lanes.lanes.count == 2
+    assert equal(reference, in_lanes.generate(requests()))
+    assert equal(reference[:3], in_lanes.generate(requests()[:3]))
+    assert equal(reference[7:8], in_lanes.generate(requests()[7:8]))  # its two branches of guidance
+
+
+def test_a_request_dropped_in_two_lanes_ends_and_the_others_stay_the_same(
+    in_lanes: Generator, reference: list[Generated | None]
+) -> None:
+    made = in_lanes.generate(requests()[:3], control=Dropper())
+    assert made[1] is None
+    assert equal([reference[0], reference[2]], [made[0], made[2]])
 
 
 @pytest.mark.parametrize("plain", [Settings(skip_idle=False), Settings(trim_slots=False)])
