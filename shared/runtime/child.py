@@ -23,7 +23,7 @@ from shared.runtime.faults import patiently
 from shared.runtime.handler import Handler, HandlerFactory, Role
 from shared.runtime.lease import Heartbeat
 from shared.runtime.logs import configure_logging, logger
-from shared.runtime.loop import Drain
+from shared.runtime.loop import Drain, end_child
 from shared.runtime.status import WorkerStatus, status_file, write_status
 from shared.settings import Settings, settings
 from shared.storage import open_store
@@ -75,6 +75,8 @@ class Child:
             stopping=self._stopping,
             present=self._present,
             held_by=self._held_by,
+            stall_seconds=chosen.stall_seconds,
+            stuck=end_child,
         )
         store = open_store(chosen)
         self._committer = Committer(self._engine, store, self._heartbeat, self._stopping)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Collection, Iterable
@@ -36,11 +37,13 @@ class HeldLease:
         self._open = self._everything
         self._gone: frozenset[UUID] = frozenset()
         self._moved = True
+        self._moved_at = time.monotonic()
         self._exempt = False
 
     def progress(self, done: int, total: int) -> None:
         """`done` of `total` steps: the batch is alive."""
         self._moved = True
+        self._moved_at = time.monotonic()
         self._exempt = False
 
     def dropped(self) -> frozenset[UUID]:
@@ -64,6 +67,11 @@ class HeldLease:
     def exempt(self) -> None:
         """Loading and the first compile may be silent for minutes; ends with the next `progress`."""
         self._exempt = True
+
+    def stuck(self, seconds: float) -> bool:
+        """Whether nothing is ours any more and the batch has not moved for so long: it will not notice by itself."""
+        silent = time.monotonic() - self._moved_at
+        return self._gone >= self._everything and not self._exempt and silent > seconds
 
     def take_progress(self) -> bool:
         """Whether the batch moved since the last call (or need not)."""
@@ -92,14 +100,19 @@ class Heartbeat(threading.Thread):
         present: Callable[[], None] = lambda: None,
         held_by: Callable[[UUID], frozenset[UUID]] | None = None,
         look_seconds: float = LOOK_SECONDS,
+        stall_seconds: float = math.inf,
+        stuck: Callable[[], None] = lambda: None,
     ) -> None:
         """`present`, called after each round, says that this worker lives; `held_by` reads the items of a lease. Both
-        raise `Unreachable` at most."""
+        raise `Unreachable` at most. `stuck` is called when a batch hangs: nothing of it is ours any more, and it has
+        not moved for `stall_seconds`."""
         super().__init__(name="heartbeat", daemon=True)
         self._renew = renew
         self._present = present
         self._held_by = held_by
         self._look_seconds = look_seconds
+        self._stall_seconds = stall_seconds
+        self._stuck = stuck
         self._interval = interval
         self._stopping = stopping
         self._held: dict[UUID, HeldLease] = {}
@@ -122,6 +135,7 @@ class Heartbeat(threading.Thread):
                 self.look()
                 continue
             self.beat()
+            self._end_stuck()
             try:
                 self._present()
             except Unreachable as error:
@@ -133,6 +147,13 @@ class Heartbeat(threading.Thread):
     def close(self) -> None:
         """End the thread; leases still held run out by themselves."""
         self._closed.set()
+
+    def _end_stuck(self) -> None:
+        for lease in list(self._held.values()):
+            if lease.stuck(self._stall_seconds):
+                with lease.work.bound():
+                    log.error("batch_hangs", items=len(lease.claim.items), seconds=self._stall_seconds)
+                self._stuck()
 
     def _pause(self, due: float) -> float:
         """Seconds until there is something to do."""

@@ -42,7 +42,7 @@ class Loaded:
 
 
 def end_child() -> NoReturn:
-    """Crash this process: its accelerator's context is gone, and every later call would fail.
+    """Crash this process: its accelerator's context is gone and every later call would fail, or a batch hangs in it.
 
     The parent starts another child; the lease runs out as after any crash, so that a prompt which does this each time
     ends `dead` and its neighbours do not.

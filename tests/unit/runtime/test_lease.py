@@ -148,3 +148,32 @@ def test_an_outage_between_two_heartbeats_takes_nothing_away(database: Database)
     heart.look()
     assert lease.dropped() == frozenset()
     assert len(lease.open) == 2
+
+
+def test_a_batch_that_hangs_on_after_its_lease_was_lost_ends_its_child(database: Database) -> None:
+    stuck: list[bool] = []
+    heartbeat = Heartbeat(
+        database.renew,
+        interval=0.01,
+        stopping=threading.Event(),
+        stall_seconds=0.05,
+        stuck=lambda: stuck.append(True) or heartbeat.close(),
+    )
+    heartbeat.hold(make_claim(2))
+    database.answer = Answer(lost=True, gone=frozenset())
+    heartbeat.start()
+    heartbeat.join(30.0)
+    assert stuck == [True]
+
+
+def test_only_a_silent_batch_of_which_nothing_is_ours_counts_as_stuck(database: Database) -> None:
+    heartbeat = Heartbeat(database.renew, interval=60.0, stopping=threading.Event())
+    lease = heartbeat.hold(make_claim(2))
+    assert not lease.stuck(0.0)  # silent, but ours
+    lease.learn(Answer(lost=False, gone=frozenset({lease.claim.items[0].id})))
+    assert not lease.stuck(0.0)  # half of it is
+    lease.learn(Answer(lost=True, gone=frozenset()))
+    assert lease.stuck(0.0)
+    assert not lease.stuck(3600.0)
+    lease.exempt()
+    assert not lease.stuck(0.0)  # loading is silent for minutes
