@@ -36,7 +36,7 @@ LANES = sa.text(f"""
     WITH {SHARE}, ordered AS (
         SELECT lane.job_id, lane.batch_key,
                extract(epoch FROM clock_timestamp() - lane.waiting_since)::float8 AS waited,
-               allowed.running, allowed.max_running IS NOT NULL AS limited,
+               allowed.running, allowed.max_running IS NOT NULL AS limited, lane.solo > 0 AS lonely,
                row_number() OVER (
                    ORDER BY allowed.running, job.priority DESC, job.created_at, job.id, lane.waiting_since,
                             lane.batch_key
@@ -44,9 +44,9 @@ LANES = sa.text(f"""
         FROM lane JOIN job ON job.id = lane.job_id JOIN allowed ON allowed.id = job.tenant_id
         WHERE lane.queue = :queue AND lane.ready + lane.solo > 0 AND job.control = 'run'
     )
-    SELECT job_id, batch_key, waited, running, limited, place FROM ordered WHERE place <= :tried
+    SELECT job_id, batch_key, waited, running, limited, lonely, place FROM ordered WHERE place <= :tried
     UNION
-    (SELECT job_id, batch_key, waited, running, limited, place FROM ordered WHERE batch_key = :prefer
+    (SELECT job_id, batch_key, waited, running, limited, lonely, place FROM ordered WHERE batch_key = :prefer
      ORDER BY place LIMIT 1)
     ORDER BY place
 """)  # noqa: S608 - of constants alone
@@ -77,6 +77,8 @@ TAKE = sa.text("""
               item.text_key, item.seed, item.seconds, item.settings, item.tags, item.attempts, item.stage
 """)
 
+ALONE = sa.text("SELECT EXISTS (SELECT FROM lease WHERE job_id = :job AND queue = :queue AND solo)")
+
 TEXTS = sa.text("SELECT key, blob FROM text_features WHERE key = ANY(:keys)")
 
 WAITING = sa.text(f"""
@@ -98,6 +100,8 @@ class _Lane:
     """Items of its tenant that are being made."""
     limited: bool
     """Its tenant has a quota of running items."""
+    lonely: bool
+    """It has items that must run alone."""
 
 
 def claim(
@@ -118,7 +122,7 @@ def claim(
     """
     rules = rules or policy()
     found = conn.execute(LANES, {"queue": queue, "tried": LANES_TRIED, "prefer": prefer_batch_key})
-    lanes = [_Lane(row.job_id, row.batch_key, row.waited, row.running, row.limited) for row in found]
+    lanes = [_Lane(row.job_id, row.batch_key, row.waited, row.running, row.limited, row.lonely) for row in found]
     contended: list[_Lane] = []
     for lane in _preferred_first(lanes, prefer_batch_key, rules):
         taken, locked = _try_lane(conn, lane, queue, worker, limit, rules, skip_locked=True)
@@ -216,7 +220,7 @@ def _try_lane(
     job = lock_job(conn, lane.job, skip_locked=skip_locked)
     if job is not None and lane.limited:
         limit = room_to_run(conn, job.tenant, limit)
-    taken = None if job is None or limit == 0 else _take(conn, job, queue, lane.batch_key, worker, limit, rules)
+    taken = None if job is None or limit == 0 else _take(conn, job, queue, lane, worker, limit, rules)
     if taken is None:
         savepoint.rollback()
     else:
@@ -225,18 +229,24 @@ def _try_lane(
 
 
 def _take(
-    conn: sa.Connection, job: LockedJob, queue: str, batch_key: str, worker: str, limit: int, rules: Policy
+    conn: sa.Connection, job: LockedJob, queue: str, lane: _Lane, worker: str, limit: int, rules: Policy
 ) -> Claim | None:
+    """Items that lost a lease in company run alone, one after the other, and beside them fresh ones. So those of a
+    killed worker start again at once however long the queue is, and an item that brings down its worker keeps no more
+    than one busy with that."""
     if job.control is not JobControl.RUN:
         return None
     token = uuid4()
-    lane = {"job": job.id, "queue": queue, "batch_key": batch_key}
+    batch_key = lane.batch_key
+    where = {"job": job.id, "queue": queue, "batch_key": batch_key}
     lease = {"token": token, "worker": worker, "seconds": rules.lease}
+    alone_first = lane.lonely and not conn.execute(ALONE, {"job": job.id, "queue": queue}).scalar_one()
+    rows: Sequence[sa.RowMapping] = ()
     solo = False
-    rows = conn.execute(TAKE, {**lane, **lease, "solo": False, "limit": limit}).mappings().all()
-    if not rows:  # those that lost a lease in company run alone, after the others
-        solo = True
-        rows = conn.execute(TAKE, {**lane, **lease, "solo": True, "limit": 1}).mappings().all()
+    for solo in (alone_first, not alone_first):
+        rows = conn.execute(TAKE, {**where, **lease, "solo": solo, "limit": 1 if solo else limit}).mappings().all()
+        if rows:
+            break
     if not rows:
         return None
     record(conn, job, moved={(ItemState.READY, ItemState.LEASED): len(rows)})

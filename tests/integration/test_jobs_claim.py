@@ -260,14 +260,18 @@ def test_a_lost_lease_marks_its_items_solo_and_costs_no_attempt(engine: sa.Engin
         assert audit(conn) == []
 
 
-def test_fresh_items_go_before_those_that_must_run_alone(engine: sa.Engine) -> None:
-    submit_items(engine, 6)
+def test_items_that_must_run_alone_go_one_at_a_time_with_fresh_ones_beside_them(engine: sa.Engine) -> None:
+    submit_items(engine, 8)
     parse_texts(engine)
     lost = claim_some(engine, limit=2)
     let_expire(engine, lost.lease_token)
     sweep(engine)
-    assert [item.position for item in claim_some(engine).items] == [2, 3, 4, 5]
-    assert [item.position for item in claim_some(engine).items] == [0]
+    first = claim_some(engine, limit=3)
+    assert [item.position for item in first.items] == [0]
+    assert [item.position for item in claim_some(engine, limit=3).items] == [2, 3, 4]
+    commit_all(engine, first)
+    assert [item.position for item in claim_some(engine, limit=3).items] == [1]
+    assert [item.position for item in claim_some(engine, limit=3).items] == [5, 6, 7]
 
 
 def test_an_item_that_kills_its_worker_dies_and_its_neighbours_succeed(engine: sa.Engine) -> None:
