@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import http.client
 import itertools
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from shared.storage.s3 import S3Options, S3Store
 
+ACCOUNT = "AUTH_test"
+HASH_PREFIX = HASH_SUFFIX = "marey"
+PART_POWER = 4
+"""As `swift_server.py` sets them; importing Swift here would bring eventlet into the tests."""
 ACCESS_KEY = "test:tester"
 SECRET_KEY = "testing"
 
@@ -52,6 +59,30 @@ class Swift:
             assert self._process.stdout is not None
             self._process.stdout.close()
             self._process = None
+
+    def limit(self, bucket: str, room: int | None) -> None:
+        """Let a bucket take so many bytes more: what is PUT beyond them is refused. None = as many as the disk holds.
+
+        Asked of the container server itself, as the S3 API has no such request; the limit outlives a restart.
+        """
+        quota = "" if room is None else str(int(self._container("HEAD", bucket)["x-container-bytes-used"]) + room)
+        self._container("POST", bucket, **{"x-container-meta-quota-bytes": quota})
+
+    def _container(self, method: str, bucket: str, **headers: str) -> dict[str, str]:
+        path = f"/{ACCOUNT}/{bucket}"
+        digest = hashlib.md5(f"{HASH_PREFIX}{path}{HASH_SUFFIX}".encode()).digest()
+        partition = int.from_bytes(digest[:4], "big") >> (32 - PART_POWER)  # where the ring puts it
+        connection = http.client.HTTPConnection("127.0.0.1", self._ports[1], timeout=30)
+        try:
+            connection.request(
+                method, f"/d1/{partition}{path}", headers={"x-timestamp": f"{time.time():016.05f}", **headers}
+            )
+            answer = connection.getresponse()
+            if answer.status // 100 != 2:
+                raise RuntimeError(f"the container server answers {answer.status} {answer.reason}")
+            return {name.lower(): value for name, value in answer.getheaders()}
+        finally:
+            connection.close()
 
     def options(self, bucket: str, **changes: object) -> S3Options:
         """How to reach a bucket of it."""

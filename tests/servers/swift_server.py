@@ -58,8 +58,8 @@ use = egg:swift#{kind}
 
 PROXY = f"""
 [pipeline:main]
-pipeline = catch_errors proxy-logging cache listing_formats bulk tempurl s3api tempauth slo dlo versioned_writes \
-symlink copy proxy-logging proxy-server
+pipeline = catch_errors proxy-logging cache listing_formats bulk tempurl s3api tempauth container_quotas slo dlo \
+versioned_writes symlink copy proxy-logging proxy-server
 [app:proxy-server]
 use = egg:swift#proxy
 allow_account_management = true
@@ -83,6 +83,8 @@ s3_acl = false
 [filter:tempauth]
 use = egg:swift#tempauth
 user_test_tester = {SECRET_KEY} .admin
+[filter:container_quotas]
+use = egg:swift#container_quotas
 [filter:slo]
 use = egg:swift#slo
 min_segment_size = 1
