@@ -3,6 +3,9 @@ harmless, and so is its death."""
 
 from __future__ import annotations
 
+import math
+import os
+import socket
 import threading
 from functools import partial
 
@@ -34,6 +37,7 @@ from shared.runtime.exposition import expose
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
 from shared.runtime.signals import stop_on_signals
+from shared.runtime.status import Teller
 from shared.settings import Settings
 from shared.storage import open_store
 from shared.webhooks.addresses import Allowed
@@ -64,6 +68,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
             where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
             hint="Set both, or use `marey serve`, which brings its own.",
         )
+    alone = stopping is None
     if stopping is None:
         configure_logging("scheduler", level=chosen.log_level, json=chosen.log_json)
         expose("scheduler", chosen)
@@ -74,14 +79,22 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     engine = create_engine(database_url)
     app = create_app(queue_url)
     lists = redis_client(queue_url)
-    threads = [
-        Relay(engine, database_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping),
-        *_periodic(engine, chosen, stopping),
-        *_webhooks(engine, chosen, stopping),
-    ]
+    relay = Relay(engine, database_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
+    periodic = _periodic(engine, chosen, stopping)
+    threads: list[threading.Thread] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
+
+    def silence() -> float:
+        if not all(thread.is_alive() for thread in threads):
+            return math.inf
+        return max(relay.silence(), *(part.silence() for part in periodic))
+
     for thread in threads:
         thread.start()
     log.info("started", parts=[thread.name for thread in threads])
+    if alone:
+        name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
+        threads.append(Teller(chosen.home, name, silence, stopping))
+        threads[-1].start()
     stopping.wait()
     for thread in threads:
         thread.join(STOP_SECONDS)

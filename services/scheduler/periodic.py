@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 from shared import metrics
@@ -36,9 +37,15 @@ class Periodic(threading.Thread):
         self._grace = grace
         self._stopping = stopping
         self.away = False
+        self._ticked = time.monotonic()
+
+    def silence(self) -> float:
+        """Seconds for which a round is under way, or overdue; below 0 between two rounds."""
+        return time.monotonic() - self._ticked - self._seconds
 
     def run(self) -> None:
         while not self._stopping.wait(self._seconds):
+            self._ticked = time.monotonic()
             try:
                 self.once()
                 outcome = "done"
@@ -51,6 +58,7 @@ class Periodic(threading.Thread):
                 outcome = "failed"
                 log.exception(f"{self.name}_failed")
             metrics.ROUNDS.labels(self.name, outcome).inc()
+            self._ticked = time.monotonic()
 
     def once(self) -> None:
         """One round.

@@ -54,13 +54,20 @@ class Relay(threading.Thread):
         self._interval = interval
         self._stopping = stopping
         self._next_tick = 0.0
+        self._ticked = time.monotonic()
+
+    def silence(self) -> float:
+        """Seconds for which a round is under way, or overdue; below 0 between two rounds."""
+        return time.monotonic() - self._ticked - self._interval
 
     def run(self) -> None:
         while not self._stopping.is_set():
+            self._ticked = time.monotonic()  # also while the database is away: waiting for it is no standstill
             try:
                 with Listener(self._database_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
                         self.round()
+                        self._ticked = time.monotonic()
                         metrics.ROUNDS.labels(self.name, "done").inc()
                         if listener.wait(self._interval):
                             self._stopping.wait(LEAST_PAUSE)

@@ -3,51 +3,89 @@
 from __future__ import annotations
 
 import importlib.util
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+import psycopg
 import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 
-from shared.errors import Conflict
+from shared.errors import Conflict, Unreachable
 from shared.jobs.database import transaction
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
+LOCK_SECONDS = 3.0
+"""A statement that waits longer for a table gives up: whoever comes to that table behind it waits as long."""
+PATIENCE = 60.0
+"""Then the migration is tried again, for so long."""
+PAUSE_SECONDS = 2.0
 
 
-def upgrade(engine: sa.Engine, revision: str = "head") -> None:
-    """Migrate up, under an advisory lock: several processes may start at once.
-
-    Raises:
-        Unreachable: the database does not answer.
-    """
-    with transaction(engine) as conn:
-        command.upgrade(_config(conn), revision)
-
-
-def downgrade(engine: sa.Engine, revision: str) -> None:
-    """Migrate down to a revision ("base" = no tables). What the younger tables held is lost.
+def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATIENCE) -> None:
+    """Migrate up, all or nothing, under an advisory lock: several processes may start at once.
 
     Raises:
+        Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
         Unreachable: the database does not answer.
     """
-    with transaction(engine) as conn:
-        command.downgrade(_config(conn), revision)
+    _migrate(engine, command.upgrade, revision, patience)
+
+
+def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -> None:
+    """Migrate down to a revision ("base" = no tables). What the younger tables and columns held is lost.
+
+    Raises:
+        Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
+        Unreachable: the database does not answer.
+    """
+    _migrate(engine, command.downgrade, revision, patience)
+
+
+def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: str, patience: float) -> None:
+    until = time.monotonic() + patience
+    while True:
+        try:
+            with transaction(engine) as conn:
+                move(_config(conn), revision)
+            return
+        except Unreachable as error:
+            if not isinstance(getattr(error.__cause__, "orig", None), psycopg.errors.LockNotAvailable):
+                raise
+            if time.monotonic() > until:
+                raise Conflict(
+                    f"a table is in use: the migration gave up after {patience:g} seconds, and changed nothing",
+                    where="database",
+                    hint="See `pg_stat_activity` for the oldest transaction (a backup, a report?) and try again after it.",
+                ) from error
+        except CommandError as error:
+            raise Conflict(
+                f"this version of Marey does not know the database's revision ({error})",
+                where="database",
+                hint="The database is of a newer version. Migrate with that version.",
+            ) from error
+        time.sleep(PAUSE_SECONDS)
 
 
 def check_revision(engine: sa.Engine) -> None:
-    """Raise when the database is not at the newest revision.
+    """Raise when the database lacks what this version needs.
+
+    A database of a newer version is fine: migrations only add (docs/deployment.md), and an upgrade migrates first.
 
     Raises:
-        Conflict: it is not.
+        Conflict: it is older, or not migrated at all.
         Unreachable: it does not answer.
     """
     with transaction(engine) as conn:
         found = MigrationContext.configure(conn).get_current_revision()
-        newest = ScriptDirectory.from_config(_config(conn)).get_current_head()
-    if found != newest:
+    scripts = ScriptDirectory(str(_folder()))
+    newest = scripts.get_current_head()
+    older = {script.revision for script in scripts.walk_revisions()} - {newest}
+    if found is None or found in older:
         raise Conflict(
             f"the database is at revision {found or 'none'}, this version of Marey needs {newest}",
             where="database",
@@ -55,13 +93,18 @@ def check_revision(engine: sa.Engine) -> None:
         )
 
 
-def _config(conn: sa.Connection) -> Config:
-    conn.execute(sa.text("SET LOCAL statement_timeout = 0"))
-    conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+def _folder() -> Path:
     found = importlib.util.find_spec("migrations")
     if found is None or found.origin is None:
         raise RuntimeError("the package `migrations` is part of the distribution")
+    return Path(found.origin).parent
+
+
+def _config(conn: sa.Connection) -> Config:
+    conn.execute(sa.text("SET LOCAL statement_timeout = 0"))
+    conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+    conn.execute(sa.text(f"SET LOCAL lock_timeout = {int(LOCK_SECONDS * 1000)}"))
     config = Config()
-    config.set_main_option("script_location", str(Path(found.origin).parent).replace("%", "%%"))
+    config.set_main_option("script_location", str(_folder()).replace("%", "%%"))
     config.attributes["connection"] = conn
     return config

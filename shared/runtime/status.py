@@ -1,4 +1,5 @@
-"""What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds.
+"""What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds. Live
+workers and the scheduler say the same, each by a `Teller`.
 
 `python -m shared.runtime.status` is the liveness probe of a machine's workers, with `ready` the readiness probe.
 """
@@ -11,7 +12,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -19,6 +20,7 @@ import psutil
 
 from shared.settings import settings
 
+TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
 TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the last batch's end, doubled
 
@@ -74,6 +76,29 @@ def forget_dead(home: Path) -> None:
     for path, status in _of_this_host(home):
         if not psutil.pid_exists(status.pid):
             path.unlink(missing_ok=True)
+
+
+class Teller(threading.Thread):
+    """Writes the status of this process until `stopping`, then removes it.
+
+    Args:
+        name: unique among the workers of `home`.
+        silence: seconds without a sign of what this process is there for.
+    """
+
+    def __init__(self, home: Path, name: str, silence: Callable[[], float], stopping: threading.Event) -> None:
+        super().__init__(name="status", daemon=True)
+        self._home, self._name = home, name
+        self._silence = silence
+        self._stopping = stopping
+
+    def run(self) -> None:
+        forget_dead(self._home)
+        while not self._stopping.is_set():
+            status = WorkerStatus(os.getpid(), ready=True, tick_age=self._silence(), written=time.time())
+            write_status(self._home, self._name, status)
+            self._stopping.wait(TELL_SECONDS)
+        status_file(self._home, self._name).unlink(missing_ok=True)
 
 
 def _of_this_host(home: Path) -> Iterator[tuple[Path, WorkerStatus]]:

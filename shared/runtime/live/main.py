@@ -6,6 +6,7 @@ import importlib
 import os
 import socket
 import threading
+import time
 from typing import cast
 
 from shared.errors import InvalidInput
@@ -18,6 +19,7 @@ from shared.runtime.live.port import ShowFactory
 from shared.runtime.logs import configure_logging, logger
 from shared.runtime.queue import redis_client
 from shared.runtime.signals import stop_on_signals
+from shared.runtime.status import Teller
 from shared.settings import Settings
 
 log = logger(__name__)
@@ -43,6 +45,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
             where="MAREY_DATABASE_URL, MAREY_QUEUE_URL",
             hint="Set both, or use `marey serve`, which brings its own.",
         )
+    alone = stopping is None
     if stopping is None:
         configure_logging("live", level=chosen.log_level, json=chosen.log_json)
         expose("live", chosen)
@@ -59,12 +62,17 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     worker = WorkerBeat(name, QUEUE, socket.gethostname(), os.getpid(), show.device, loop.room.bundle)
     keeper = Keeper(engine, client, worker, show.parse, idle_seconds=chosen.stream_idle_seconds, stopping=stopping)
     keeper.serve(loop)
+    teller = Teller(chosen.home, name, lambda: time.monotonic() - loop.ticked, stopping)
+    if alone:
+        teller.start()
     log.info("ready", worker=name, bundle=loop.room.bundle, slots=chosen.live_slots)
     try:
         loop.run(stopping)
     finally:
         stopping.set()
         keeper.join(STOP_SECONDS)
+        if alone:
+            teller.join(STOP_SECONDS)
         client.close()
         engine.dispose()
     return 0
