@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import signal
+import sys
 from collections.abc import AsyncIterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -148,6 +150,8 @@ def write_openapi(path: Path) -> None:
 def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
     config = settings()
+    # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     configure_logging("api", level=config.log_level, json=config.log_json)
     configure_tracing("api")
     uvicorn.run(
