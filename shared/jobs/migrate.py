@@ -11,7 +11,6 @@ import psycopg
 import sqlalchemy as sa
 from alembic import command
 from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 
@@ -60,7 +59,7 @@ def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: s
                 raise Conflict(
                     f"a table is in use: the migration gave up after {patience:g} seconds, and changed nothing",
                     where="database",
-                    hint="See `pg_stat_activity` for the oldest transaction (a backup, a report?) and try again after it.",
+                    hint="See the oldest transaction in `pg_stat_activity` (a backup, a report?); try again after it.",
                 ) from error
         except CommandError as error:
             raise Conflict(
@@ -81,7 +80,8 @@ def check_revision(engine: sa.Engine) -> None:
         Unreachable: it does not answer.
     """
     with transaction(engine) as conn:
-        found = MigrationContext.configure(conn).get_current_revision()
+        table = conn.execute(sa.select(sa.func.to_regclass("alembic_version"))).scalar_one()
+        found = table and conn.execute(sa.text("SELECT version_num FROM alembic_version")).scalar_one_or_none()
     scripts = ScriptDirectory(str(_folder()))
     newest = scripts.get_current_head()
     older = {script.revision for script in scripts.walk_revisions()} - {newest}
