@@ -79,7 +79,7 @@ def database(engine: sa.Engine) -> Check:
         check_revision(engine)
     except MareyError as error:
         return broken("database", error)
-    return Check("database", "ok", f"PostgreSQL {version}, at the newest revision")
+    return Check("database", "ok", f"PostgreSQL {version}, with all that this version needs")
 
 
 def _clock(engine: sa.Engine) -> Check:

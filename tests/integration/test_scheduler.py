@@ -223,6 +223,17 @@ def test_a_periodic_action_outlives_its_errors() -> None:
     assert not thread.is_alive()
 
 
+def test_a_periodic_action_that_hangs_is_told_by_its_silence() -> None:
+    stopping, released = threading.Event(), threading.Event()
+    thread = Periodic("test", lambda: released.wait() and None, seconds=0.05, stopping=stopping)
+    thread.start()
+    wait(lambda: thread.silence() > 0.3)
+    released.set()
+    wait(lambda: thread.silence() < 0)
+    stopping.set()
+    thread.join(5.0)
+
+
 def test_after_an_outage_heartbeats_come_before_the_sweeper() -> None:
     """Leases run out while the database is away; taking them at its return would blame the workers."""
     stopping = threading.Event()

@@ -1,10 +1,11 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
-from shared.runtime.status import FRESH, TICK_LIMIT, WorkerStatus, forget_dead, probe, read_status, write_status
+from shared.runtime.status import FRESH, TICK_LIMIT, Teller, WorkerStatus, forget_dead, probe, read_status, write_status
 
 
 def test_a_living_worker_beats_and_ticks() -> None:
@@ -52,6 +53,30 @@ def test_what_killed_workers_left_is_forgotten(tmp_path: Path) -> None:
     write_status(tmp_path, "theirs", WorkerStatus(ended.pid, True, 3.0, 1000.0, host="elsewhere"))
     forget_dead(tmp_path)
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["worker-alive.json", "worker-theirs.json"]
+
+
+def test_a_process_without_children_tells_of_itself_until_it_stops(tmp_path: Path) -> None:
+    stopping, silence = threading.Event(), [0.0]
+    asked = threading.Event()
+
+    def told() -> float:
+        asked.set()
+        return silence[0]
+
+    teller = Teller(tmp_path, "scheduler", told, stopping)
+    teller.start()
+    assert asked.wait(60)
+    while not (tmp_path / "run" / "worker-scheduler.json").exists():
+        time.sleep(0.01)
+    assert probe(tmp_path, ready=True)
+    stopping.set()
+    teller.join(60)
+    assert not probe(tmp_path), "who has gone is not healthy"
+
+
+def test_a_process_that_stands_still_is_not_healthy_though_it_tells_of_itself(tmp_path: Path) -> None:
+    write_status(tmp_path, "scheduler", WorkerStatus(os.getpid(), True, float("inf"), 1000.0))
+    assert not probe(tmp_path, now=1000.0)
 
 
 def test_the_probe_is_a_command(tmp_path: Path) -> None:
