@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from email.utils import format_datetime
 from typing import Annotated, Any
 from uuid import UUID
 
@@ -14,13 +16,15 @@ from services.api.context import Context
 from services.api.ranges import ByteRange, parse_range
 from services.api.schemas import View
 from shared.jobs import asset_key
-from shared.storage import AssetStore, Opened
+from shared.storage import PRESIGN_SECONDS, AssetStore, Opened
+
+MARGIN_SECONDS = 60
 
 FILE_RESPONSES: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
     206: {"description": "The range asked for"},
     304: {"description": "The client has it"},
-    307: {"description": "At a URL signed for 15 minutes"},
+    307: {"description": "At a URL signed for 15 minutes; `Expires` says until when"},
     416: {"description": "The range begins past the end"},
 }
 
@@ -55,7 +59,7 @@ def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, par
     filename = f"{owner}.{file.format}"
     url = shared.store.presign(object_key, filename=filename, media_type=file.media_type)
     if url is not None:
-        return RedirectResponse(url, status_code=307)
+        return RedirectResponse(url, status_code=307, headers=_valid_for(PRESIGN_SECONDS))
     wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)
     headers = {
         "ETag": etag,
@@ -64,6 +68,14 @@ def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, par
         "Content-Disposition": f'attachment; filename="{filename}"',
     }
     return _content(shared.store, object_key, file, wanted, headers)
+
+
+def _valid_for(seconds: int) -> dict[str, str]:
+    """Until when a signed URL works: a cache may send there, too, for a little less long."""
+    return {
+        "Cache-Control": f"private, max-age={seconds - MARGIN_SECONDS}",
+        "Expires": format_datetime(datetime.now(UTC) + timedelta(seconds=seconds), usegmt=True),
+    }
 
 
 def _content(

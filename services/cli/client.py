@@ -135,7 +135,7 @@ class Client:
         with _as_unreachable(self.server), self._http.stream("GET", path, **options) as response:
             if response.status_code >= 400:
                 response.read()
-                raise error_of(response)
+                raise _refused_elsewhere(response) if response.history else error_of(response)
             yield response
 
     def events(self, job: str, after: int = 0, *, patience: float = 30.0) -> Iterator[dict[str, Any]]:
@@ -198,6 +198,15 @@ def error_of(response: httpx2.Response) -> MareyError:
         return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
     return found(message, where=where, hint=hint)
+
+
+def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
+    """The error of an object store, where a signed URL led: without the signature, which opens the object."""
+    return Unreachable(
+        f"the object store answered {response.status_code} to a URL that was signed for it",
+        where=str(response.request.url.copy_with(query=None)),
+        hint="Signed URLs work for minutes: is the clock of the server, or of the store, wrong?",
+    )
 
 
 def _is_quota(response: httpx2.Response) -> bool:

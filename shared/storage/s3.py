@@ -34,8 +34,33 @@ from shared.storage.port import (
 CONNECT_SECONDS = 3.0
 READ_SECONDS = 15.0
 RETRIES = 2
+PROBE = "doctor/none"
+"""A key without an object."""
 PUTS_AT_ONCE = 8  # of one batch; the pool of connections holds 16
-MISSING = frozenset({"NoSuchKey", "NoSuchBucket", "404"})
+MISSING = frozenset({"NoSuchKey", "404"})
+WORDLESS = frozenset({"AccessDenied", "BadRequest"})
+"""Codes that the SDK makes up where an answer has no body, as that to a HEAD."""
+NO_BUCKET = "NoSuchBucket"
+_KEYS = "does not accept the keys", "Check MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY."
+_REGION = "is in another region", "Set MAREY_S3_REGION to that of the bucket."
+_FULL = "is full", "Make room, or raise the quota of the bucket; what could not be stored is tried again."
+REASONS = {
+    "SignatureDoesNotMatch": _KEYS,
+    "InvalidAccessKeyId": _KEYS,
+    "AuthorizationHeaderMalformed": _REGION,
+    "PermanentRedirect": _REGION,
+    NO_BUCKET: ("has no such bucket", "Check MAREY_STORE; `marey admin migrate` makes the bucket."),
+    "AccessDenied": (
+        "does not let these keys do that",
+        "Let them read, write, list and delete objects of the bucket, or check MAREY_S3_ACCESS_KEY.",
+    ),
+    "RequestTimeTooSkewed": ("has another time than this machine", "Let both take it from one source (NTP)."),
+    "QuotaExceeded": _FULL,
+    "InsufficientStorage": _FULL,
+    "XMinioStorageFull": _FULL,
+    "XMinioAdminBucketQuotaExceeded": _FULL,
+}
+"""What the object store does, and what to do about it, by the code of its answer."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +148,7 @@ class S3Store:
             try:
                 self._client.stat_object(self.options.bucket, checked_key(key))
             except S3Error as error:
-                if error.code in MISSING:
+                if error.code in MISSING and self._client.bucket_exists(self.options.bucket):
                     return False
                 raise
         return True
@@ -161,9 +186,7 @@ class S3Store:
         """See `AssetStore.check`."""
         with self._outages():
             if not self._client.bucket_exists(self.options.bucket):
-                raise Unreachable(
-                    "the bucket does not exist", where=self._where(), hint="`marey admin migrate` makes it."
-                )
+                raise self._because(NO_BUCKET)
 
     def _chunks(self, key: str, start: int, length: int) -> Iterator[bytes]:
         with self._outages(key):
@@ -191,14 +214,37 @@ class S3Store:
             STORE_ERRORS.labels("s3").inc()
             raise
         except S3Error as error:
-            if key is not None and error.code in MISSING:
+            told = self._told(error)
+            if key is not None and told.code in MISSING:
                 raise no_such_object(key) from error
-            raise self._unreachable(f"{error.code}: {error.message}") from error
+            raise self._because(told.code or "", told.message) from error
         except (ServerError, InvalidResponseError, MinioException) as error:
             raise self._unreachable(str(error).splitlines()[0]) from error
         except (urllib3.exceptions.HTTPError, OSError) as error:
             cause = getattr(error, "reason", None) or error
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
+
+    def _told(self, error: S3Error) -> S3Error:
+        """The error, or a better one: that to a HEAD says neither that the bucket is missing nor what is wrong with
+        the keys, so the same is asked by a GET."""
+        try:
+            if error.code in MISSING and self._client.bucket_exists(self.options.bucket):
+                return error
+            if error.code in MISSING | WORDLESS:
+                self._client.get_object(self.options.bucket, PROBE).release_conn()
+        except S3Error as better:
+            return error if better.code in MISSING else better
+        except (MinioException, urllib3.exceptions.HTTPError, OSError):
+            pass  # away by now: the first error is as good
+        return error
+
+    def _because(self, code: str, message: str | None = None) -> Unreachable:
+        """The error for an answer of the store."""
+        what, hint = REASONS.get(code, (None, None))
+        if what is None or hint is None:
+            return self._unreachable(f"{code}: {message}")
+        STORE_ERRORS.labels("s3").inc()
+        return Unreachable(f"the object store {what} ({message or code})", where=self._where(), hint=hint)
 
     def _unreachable(self, cause: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()

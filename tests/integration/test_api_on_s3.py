@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
+import time
 from collections.abc import Iterator
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 
 import httpx2
 import pytest
 from pydantic import SecretStr
 
-from services.cli.fetching import Download, download_all
+from services.cli.fetching import ATTEMPTS, Download, download_all
+from shared.errors import Unreachable
 from shared.hashing import sha256_of
-from shared.jobs import create_engine, create_key, transaction
+from shared.jobs import DEFAULT_TENANT, asset_key, create_engine, create_key, transaction
 from shared.storage import open_store
 from shared.storage.s3 import S3Store
 from tests.support.live_api import ApiThread, LiveApi, settings_of
@@ -54,3 +58,39 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
         (tmp_path / "x.npz.part").write_bytes(content[:1000])
         download_all(client, [target], overwrite=False, done=lambda _: None)
     assert sha256_of(tmp_path / "x.npz") == digest["sha256"]
+    assert parsedate_to_datetime(answer.headers["expires"]) > parsedate_to_datetime(answer.headers["date"])
+
+
+def test_signed_urls_that_expired_are_asked_for_anew(
+    api: LiveApi, s3_store: S3Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = b"motion" * 100
+    key = asset_key(DEFAULT_TENANT, hashlib.sha256(content).hexdigest())
+    s3_store.put(key, content)
+    expired = s3_store.presign(key, filename="x.npz", media_type="x/y", seconds=1)
+    assert expired is not None
+    while httpx2.get(expired).status_code != 403:
+        time.sleep(0.1)
+    signed = S3Store.presign
+    given: list[str] = []
+
+    def stale_at_first(store: S3Store, key: str, **options: str) -> str | None:
+        given.append(key)
+        return expired if len(given) < ATTEMPTS else signed(store, key, **options)
+
+    monkeypatch.setattr(S3Store, "presign", stale_at_first)
+    with api.client() as client:
+        job = client.submit([{"prompt": "a person walks"}])
+        api.work(content)
+        (motion,) = client.pages(f"/v1/jobs/{job['id']}/motions")
+        digest = hashlib.sha256(content).hexdigest()
+        target = Download(f"/v1/motions/{motion['id']}/files/npz", digest, len(content), tmp_path / "x.npz")
+        download_all(client, [target], overwrite=False, done=lambda _: None)
+        assert (tmp_path / "x.npz").read_bytes() == content
+        assert len(given) == ATTEMPTS
+        (tmp_path / "x.npz").unlink()
+        monkeypatch.setattr(S3Store, "presign", lambda *_, **__: expired)
+        with pytest.raises(Unreachable, match="answered 403 to a URL that was signed") as caught:
+            download_all(client, [target], overwrite=False, done=lambda _: None)
+        assert "Signature" not in str(caught.value)
+    assert list(tmp_path.glob("x.*")) == []

@@ -272,18 +272,35 @@ def test_presigned_urls_carry_the_public_endpoint_and_cost_no_request(swift: Swi
     assert urlsplit(url).netloc == "assets.example:443"
 
 
-def test_a_wrong_secret_is_unreachable_with_a_hint(swift: Swift) -> None:
-    store = S3Store(swift.options("marey-secret", secret_key="wrong"))
-    with pytest.raises(Unreachable, match="keys right") as caught:
-        store.put(key_of(b"x"), b"x")
-    assert "wrong" not in str(caught.value)
-
-
-def test_a_missing_bucket_is_unreachable_not_empty(swift: Swift) -> None:
-    store = S3Store(swift.options("no-such-bucket"))
-    for use in (store.check, lambda: store.put(key_of(b"x"), b"x"), lambda: list(store.keys())):
-        with pytest.raises(Unreachable):
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"secret_key": "topsecret"}, ("does not accept the keys", "MAREY_S3_SECRET_KEY")),
+        ({"access_key": "no:body"}, ("does not accept the keys", "MAREY_S3_ACCESS_KEY")),
+        ({"region": "eu-nowhere-9"}, ("is in another region", "MAREY_S3_REGION")),
+        ({"bucket": "no-such-bucket"}, ("has no such bucket", "MAREY_STORE")),
+    ],
+)
+def test_a_store_that_is_set_up_wrongly_says_by_every_call_which_setting_it_is(
+    swift: Swift, s3_store: S3Store, wrong: dict[str, str], said: tuple[str, str]
+) -> None:
+    s3_store.put(key_of(b"walk"), b"walk")
+    store = S3Store(swift.options(**{"bucket": s3_store.options.bucket, **wrong}))
+    for use in (
+        store.check,
+        lambda: store.put(key_of(b"x"), b"x"),
+        lambda: list(store.put_all([NewObject(key_of(b"x"), b"x")] * 3)),
+        lambda: store.get(key_of(b"walk")),
+        lambda: store.size(key_of(b"walk")),
+        lambda: store.exists(key_of(b"walk")),
+        lambda: store.delete(key_of(b"walk")),
+        lambda: list(store.keys()),
+    ):
+        with pytest.raises(Unreachable) as caught:
             use()
+        assert all(words in str(caught.value) for words in said)
+        assert "topsecret" not in str(caught.value)
+    assert list(s3_store.keys()) == [key_of(b"walk")]
 
 
 def test_an_outage_is_told_and_passes(swift: Swift, monkeypatch: pytest.MonkeyPatch) -> None:

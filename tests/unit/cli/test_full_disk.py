@@ -1,0 +1,58 @@
+"""A disk that takes no more in the middle of a file: told, and nothing half done is left under a name.
+
+The limit is that of a process on the size of its files, so that real calls fail with real errors, in a child.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("resource", reason="Windows has no such limit")
+
+LIMIT = 64 * 1024
+CHILD = Path(__file__).with_name("full_disk_child.py")
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """What each attempt said, and which files it left; see the child."""
+    folder = tmp_path_factory.mktemp("disk")
+    ran = subprocess.run(
+        [sys.executable, str(CHILD), str(folder), str(LIMIT)], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(ran.stdout)
+
+
+@pytest.mark.parametrize("what", ["put", "put_all", "fetch", "page", "npz", "manifest"])
+def test_what_finds_no_room_is_told_with_its_place_and_leaves_no_file_under_its_name(
+    told: dict[str, dict[str, Any]], what: str
+) -> None:
+    found = told[what]
+    assert "File too large" in found["said"]
+    assert found["kind"] == ("Unreachable" if what.startswith("put") else found["kind"])
+    assert found["kind"] in ("Unreachable", "InvalidInput", "InvalidFile")
+    assert found["left"] == (["clip.npz.part"] if what == "fetch" else [])  # a fetch goes on from there
+
+
+def test_a_file_that_was_there_before_stays_as_it_was(told: dict[str, dict[str, Any]]) -> None:
+    assert told["replaced"]["kind"] == "InvalidInput"
+    assert told["replaced"]["left"] == ["old.html"]
+    assert told["replaced"]["content"] == "old"
+
+
+def test_a_fetch_goes_on_when_there_is_room(told: dict[str, dict[str, Any]]) -> None:
+    assert told["fetched"] == {"left": ["clip.npz"], "whole": True, "asked": ["bytes=0-", f"bytes={LIMIT}-"]}
+
+
+def test_a_bvh_that_grows_keeps_its_whole_rows(told: dict[str, dict[str, Any]]) -> None:
+    found = told["stream"]
+    assert (found["kind"], found["left"]) == ("InvalidInput", ["live.bvh"])
+    assert "cannot be written" in found["said"]
+    assert 1 < found["written"] == found["read"]
