@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -55,6 +55,22 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     for row in rows:
         drawn.add_row(*(Text(_cell(value)) for value in row))
     Console(highlight=False).print(drawn)
+
+
+def listing(
+    found: Iterable[dict[str, Any]],
+    columns: Sequence[str],
+    cell: Callable[[dict[str, Any], str], object],
+    *,
+    as_json: bool,
+) -> None:
+    """Elements of a listing of the API: a line of JSON each, or a table with what `cell` makes of each column."""
+    rows = list(found)  # all of them, or the error alone
+    if not as_json:
+        table(columns, ([cell(each, column) for column in columns] for each in rows))
+        return
+    for each in rows:
+        result_json(each)
 
 
 def bar() -> Progress:

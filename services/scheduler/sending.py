@@ -9,6 +9,8 @@ import socket
 import ssl
 import time
 from collections.abc import Mapping
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
 
 import httpx2
 
@@ -43,8 +45,9 @@ class Sender:
         """POST; how it went. Never raises for what a receiver or the network does."""
         began = time.monotonic()
         status: int | None = None
+        wait = 0.0
         try:
-            status = await self._post(httpx2.URL(url), headers, body)
+            status, wait = await self._post(httpx2.URL(url), headers, body)
             error = None if 200 <= status < 300 else _refusal(status)
         except TimeoutError:
             error = f"no answer within {self._seconds:g} s"
@@ -52,10 +55,10 @@ class Sender:
             error = refused.message
         except (httpx2.HTTPError, httpx2.InvalidURL, ssl.SSLError, OSError) as failure:
             error = _told(failure)
-        return Attempt(status, time.monotonic() - began, error)
+        return Attempt(status, time.monotonic() - began, error, wait)
 
-    async def _post(self, url: httpx2.URL, headers: Mapping[str, str], body: bytes) -> int:
-        """The status of the answer."""
+    async def _post(self, url: httpx2.URL, headers: Mapping[str, str], body: bytes) -> tuple[int, float]:
+        """The status of the answer, and for how many seconds it asks to be left alone."""
         client = httpx2.AsyncClient(
             verify=self._tls,
             trust_env=False,  # a proxy would look the name up once more
@@ -67,7 +70,7 @@ class Sender:
                 response = await self._ask(client, url, headers, body)
             async with contextlib.aclosing(response):
                 await _drain(response)
-            return response.status_code
+            return response.status_code, asked_to_wait(response.headers.get("retry-after"))
 
     async def _ask(
         self, client: httpx2.AsyncClient, url: httpx2.URL, headers: Mapping[str, str], body: bytes
@@ -90,6 +93,20 @@ class Sender:
         except (socket.gaierror, UnicodeError) as error:
             raise Refused("the host is not known") from error
         return choose_address([str(each[4][0]) for each in found], url.scheme, self._allowed)
+
+
+def asked_to_wait(header: str | None, now: datetime | None = None) -> float:
+    """Seconds that a `Retry-After` names, as a number or as a date; 0 for none, and for what makes no sense."""
+    if header is None:
+        return 0.0
+    if header.strip().isascii() and header.strip().isdecimal():
+        return float(header.strip()[:12])
+    try:
+        at = parsedate_to_datetime(header)
+    except ValueError:
+        return 0.0
+    at = at if at.tzinfo is not None else at.replace(tzinfo=UTC)
+    return max((at - (now or datetime.now(UTC))).total_seconds(), 0.0)
 
 
 async def _drain(response: httpx2.Response) -> None:

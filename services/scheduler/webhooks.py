@@ -138,7 +138,7 @@ class Deliverer(threading.Thread):
     async def _try(self, due: DueDelivery) -> Attempt:
         try:
             body = message_of(due, self._api)
-            headers = headers_of(due, body, self._vault.decrypt(due.secret))
+            headers = headers_of(due, body, [self._vault.decrypt(each) for each in due.secrets])
             return await self._sender.send(due.url, headers, body)
         except InvalidInput as error:
             return Attempt(None, 0.0, str(error).splitlines()[0])

@@ -177,7 +177,14 @@ from shared.jobs.webhook_types import (
     WebhookChange,
     WebhookRow,
 )
-from shared.jobs.webhooks import change_webhook, create_webhook, delete_webhook, get_webhook, list_webhooks
+from shared.jobs.webhooks import (
+    change_webhook,
+    create_webhook,
+    delete_webhook,
+    get_webhook,
+    list_webhooks,
+    rotate_secret,
+)
 from shared.jobs.workers import beat, list_workers, live_workers, retire
 
 __all__ = [
@@ -371,6 +378,7 @@ __all__ = [
     "revoke_key",
     "rewrite_files",
     "rotate_key",
+    "rotate_secret",
     "run_schedule",
     "send_test",
     "server_version",

@@ -14,10 +14,12 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from shared.errors import Conflict, NotFound
+from shared.jobs.audit import audit
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
 from shared.jobs.pages import cut_page, page_limit, read_cursor
-from shared.jobs.schema import webhook_attempt, webhook_delivery, webhook_event
+from shared.jobs.schema import webhook, webhook_attempt, webhook_delivery, webhook_event
+from shared.jobs.tenant_types import Actor
 from shared.jobs.types import Page
 from shared.jobs.webhook_types import (
     TEST_KIND,
@@ -36,6 +38,12 @@ JITTER = 0.1
 """Share by which a delay is longer or shorter, so that a receiver that comes back is not met by all at once."""
 HOLD = 60.0
 """Seconds of a claim: well beyond the longest try."""
+MAX_WAIT = 43_200.0
+"""Seconds: a receiver may put off the next try by no more than the longest delay."""
+GONE = 410
+"""Status by which a receiver says that it will never listen again."""
+DELIVERER = Actor("webhooks")
+"""Who pauses such a webhook, in the audit log."""
 MAX_ERROR = 300
 """Characters of an error in the log."""
 KEPT = 30 * 86_400.0
@@ -65,8 +73,9 @@ CLAIM = sa.text("""
         FROM picked WHERE (delivery.webhook_id, delivery.event_id) = (picked.webhook_id, picked.event_id)
         RETURNING delivery.webhook_id, delivery.event_id, delivery.tries
     )
-    SELECT claimed.webhook_id, claimed.event_id, event.kind, event.at, event.data, webhook.url, webhook.secret,
-           claimed.tries
+    SELECT claimed.webhook_id, claimed.event_id, event.kind, event.at, event.data, webhook.url,
+           CASE WHEN webhook.previous_until > now() THEN ARRAY[webhook.secret, webhook.previous_secret]
+                ELSE ARRAY[webhook.secret] END, claimed.tries
     FROM claimed JOIN webhook ON webhook.id = claimed.webhook_id JOIN webhook_event AS event
          ON event.id = claimed.event_id
     ORDER BY claimed.event_id
@@ -84,19 +93,25 @@ def claim_deliveries(
 
 
 def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> DeliveryState | None:
-    """Write down how a try went; where the delivery stands then. None when the claim was lost: nothing is written."""
+    """Write down how a try went; where the delivery stands then. None when the claim was lost: nothing is written.
+
+    A receiver that is gone is told nothing more: its webhook is paused, which the audit log says.
+    """
     tries = due.tries + 1
+    gone = attempt.status == GONE
+    if gone:  # before its deliveries, as whoever removes it
+        conn.execute(sa.select(webhook.c.id).where(webhook.c.id == due.webhook).with_for_update(key_share=True))
     values: dict[str, Any] = {"claim": None, "tries": tries, "attempts": webhook_delivery.c.attempts + 1}
     if attempt.error is None:
         state = DeliveryState.DELIVERED
-    elif due.kind == TEST_KIND or tries > len(DELAYS):
+    elif gone or due.kind == TEST_KIND or tries > len(DELAYS):
         state = DeliveryState.FAILED
     else:
         state = DeliveryState.PENDING
     ended = state is not DeliveryState.PENDING
     values |= {
         "state": state,
-        "next_at": None if ended else CLOCK + interval(delay_after(tries)),
+        "next_at": None if ended else CLOCK + interval(max(delay_after(tries), min(attempt.wait, MAX_WAIT))),
         "ended_at": CLOCK if ended else None,
     }
     table = webhook_delivery.c
@@ -117,6 +132,8 @@ def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> D
             error=None if attempt.error is None else attempt.error[:MAX_ERROR],
         )
     )
+    if gone:
+        _pause_gone(conn, due)
     return state
 
 
@@ -216,6 +233,14 @@ def forget_events(conn: sa.Connection) -> None:
 
 
 # --- helpers ---
+
+
+def _pause_gone(conn: sa.Connection, due: DueDelivery) -> None:
+    table = webhook.c
+    paused = sa.update(webhook).where(table.id == due.webhook, ~table.paused).values(paused=True)
+    tenant = conn.execute(paused.returning(table.tenant_id)).scalar_one_or_none()
+    if tenant is not None:
+        audit(conn, tenant, DELIVERER, "webhook.gone", due.webhook, event=str(due.event), status=GONE)
 
 
 def _is(webhook: UUID, event: UUID) -> sa.ColumnElement[bool]:

@@ -117,7 +117,8 @@ class DueDelivery:
     at: datetime
     data: Mapping[str, object]
     url: str
-    secret: bytes
+    secrets: Sequence[bytes]
+    """Encrypted: the newest first, then the one before it while both work."""
     tries: int
 
 
@@ -129,3 +130,5 @@ class Attempt:
     seconds: float
     error: str | None
     """None = delivered."""
+    wait: float = 0.0
+    """Seconds that the receiver asked for before the next try."""

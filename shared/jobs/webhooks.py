@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from shared.errors import Conflict, InvalidInput, NotFound
 from shared.jobs import schema
 from shared.jobs.ids import new_id
+from shared.jobs.journal import CLOCK, interval
 from shared.jobs.pages import cut_page, page_limit, read_cursor
 from shared.jobs.schema import webhook, webhook_delivery
 from shared.jobs.submit import check_text
@@ -19,6 +20,8 @@ from shared.jobs.webhook_types import DeliveryState, EventKind, NewWebhook, Webh
 
 MAX_WEBHOOKS = 20
 """Of a tenant: each of its events is written once for each that wants it."""
+OVERLAP, LONGEST_OVERLAP = 86_400.0, 30 * 86_400.0
+"""Seconds that a rotated signing secret still signs: a day to bring the new one to the receiver."""
 
 
 def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
@@ -93,6 +96,29 @@ def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: W
     if values:
         ours = sa.update(webhook).where(table.tenant_id == tenant, table.id == identifier)
         conn.execute(ours.values(values))
+    return get_webhook(conn, tenant, identifier)
+
+
+def rotate_secret(
+    conn: sa.Connection, tenant: str, identifier: UUID, secret: bytes, *, overlap: float = OVERLAP
+) -> WebhookRow:
+    """Sign with another secret, and for a while with the one in force as well; an older one no longer works.
+
+    Args:
+        secret: encrypted.
+        overlap: seconds; 0 = the new one alone from now on.
+
+    Raises:
+        NotFound: the tenant has no such webhook.
+        InvalidInput: an overlap that cannot be.
+    """
+    if not 0 <= overlap <= LONGEST_OVERLAP:
+        raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap", hint="Up to 30 days.")
+    table = webhook.c
+    kept = {"previous_secret": table.secret, "previous_until": CLOCK + interval(overlap)}
+    values = {"previous_secret": None, "previous_until": None} if overlap == 0 else kept
+    ours = sa.update(webhook).where(table.tenant_id == tenant, table.id == identifier)
+    conn.execute(ours.values(secret=secret, **values))
     return get_webhook(conn, tenant, identifier)
 
 

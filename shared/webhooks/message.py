@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 
@@ -28,8 +28,9 @@ def message_of(due: DueDelivery, api: str) -> bytes:
     return json.dumps(document, separators=(",", ":"), sort_keys=True).encode()
 
 
-def headers_of(due: DueDelivery, body: bytes, secret: str, now: datetime | None = None) -> Mapping[str, str]:
-    """The headers of one try: the id of the event, the time of the try, the signature over both and the body."""
+def headers_of(due: DueDelivery, body: bytes, secrets: Sequence[str], now: datetime | None = None) -> Mapping[str, str]:
+    """The headers of one try: the id of the event, the time of the try, the signatures over both and the body. While a
+    secret is rotated there are two, of which receivers know one."""
     at = now or datetime.now(UTC)
     identifier = str(due.event)
     return {
@@ -37,5 +38,5 @@ def headers_of(due: DueDelivery, body: bytes, secret: str, now: datetime | None 
         "user-agent": f"Marey/{version('marey')}",
         "webhook-id": identifier,
         "webhook-timestamp": str(int(at.timestamp())),
-        "webhook-signature": Webhook(secret).sign(identifier, at, body.decode()),
+        "webhook-signature": " ".join(Webhook(each).sign(identifier, at, body.decode()) for each in secrets),
     }

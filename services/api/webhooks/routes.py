@@ -64,6 +64,24 @@ def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Con
     return WebhookView.of(jobs.change_webhook(conn, key.tenant, webhook, jobs.WebhookChange(**fields)))
 
 
+@router.post("/{webhook}/rotate")
+def rotate_webhook(
+    webhook: UUID,
+    shared: Shared,
+    conn: Connection,
+    key: Operator,
+    overlap_hours: Annotated[
+        float, Query(ge=0, le=720, description="The secret in force now signs as well for so long; 0 = no more.")
+    ] = 24,
+) -> MadeWebhookView:
+    """Sign with another secret. The answer has it, and only this one; meanwhile messages carry two signatures."""
+    secret = new_signing_secret()
+    sealed = Vault.of(shared.config).encrypt(secret)
+    row = jobs.rotate_secret(conn, key.tenant, webhook, sealed, overlap=3600 * overlap_hours)
+    note(conn, key, "webhook.rotate", webhook, overlap_hours=overlap_hours)
+    return MadeWebhookView.made(row, secret)
+
+
 @router.delete("/{webhook}", status_code=204, response_class=Response)
 def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
     """Remove a webhook, with its deliveries and their log."""

@@ -67,12 +67,7 @@ def list_schedules(as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = list(client.pages("/v1/schedules", limit=1000))
-    if as_json:
-        for each in found:
-            console.result_json(each)
-        return
-    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+        console.listing(client.pages("/v1/schedules", limit=1000), COLUMNS, _cell, as_json=as_json)
 
 
 @app.command()

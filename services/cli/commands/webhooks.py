@@ -62,12 +62,7 @@ def list_webhooks(as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = list(client.pages("/v1/webhooks", limit=1000))
-    if as_json:
-        for each in found:
-            console.result_json(each)
-        return
-    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+        console.listing(client.pages("/v1/webhooks", limit=1000), COLUMNS, _cell, as_json=as_json)
 
 
 @app.command()
@@ -94,6 +89,26 @@ def pause(webhooks: Ids, as_json: console.Json = False) -> None:
 def resume(webhooks: Ids, as_json: console.Json = False) -> None:
     """Go on telling, with what waited first."""
     _change(webhooks, as_json, paused=False)
+
+
+@app.command()
+def rotate(
+    webhook: Id,
+    overlap_hours: Annotated[
+        float, typer.Option("--overlap-hours", min=0, max=720, help="The old secret signs as well for so long.")
+    ] = 24,
+    as_json: console.Json = False,
+) -> None:
+    """Sign with another secret; prints it, this once. Until the overlap ends messages carry both signatures."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        made = client.post_once(f"/v1/webhooks/{webhook}/rotate?overlap_hours={overlap_hours:g}", None)
+    if as_json:
+        console.result_json(made)
+    else:
+        console.result(made["secret"])
+        console.say(f"Give it to the receiver; the one before it works for {overlap_hours:g} hours more.")
 
 
 @app.command()
@@ -130,12 +145,7 @@ def deliveries(
             return
         wanted = {"state": state.value} if state else {}
         pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=min(limit, 1000), **wanted)
-        found = list(islice(pages, limit))
-    if as_json:
-        for each in found:
-            console.result_json(each)
-        return
-    console.table(DELIVERY_COLUMNS, ([each[column] for column in DELIVERY_COLUMNS] for each in found))
+        console.listing(islice(pages, limit), DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json)
 
 
 @app.command()

@@ -20,9 +20,12 @@ webhook = sa.Table(
     sa.Column("url", sa.Text, nullable=False),
     sa.Column("events", ARRAY(sa.Text), nullable=False),
     sa.Column("secret", BYTEA, nullable=False),  # encrypted: `shared.webhooks.vault`
+    sa.Column("previous_secret", BYTEA),  # signs beside it until then
+    sa.Column("previous_until", Time),
     sa.Column("paused", sa.Boolean, nullable=False, server_default=sa.false()),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.CheckConstraint("cardinality(events) > 0", name="events"),
+    sa.CheckConstraint("(previous_secret IS NULL) = (previous_until IS NULL)", name="previous"),
     sa.Index("ix_webhook_tenant_id_id", "tenant_id", "id"),
 )
 

@@ -107,6 +107,16 @@ def test_a_webhook_shows_its_secret_once_and_the_database_never_holds_it(place: 
     assert make(http)["events"] == sorted(EventKind)
 
 
+def test_a_secret_is_rotated_and_shown_once(http: httpx2.Client) -> None:
+    made = make(http)
+    path = f"/v1/webhooks/{made['id']}"
+    rotated = http.post(f"{path}/rotate").json()
+    assert rotated["secret"].startswith("whsec_")
+    assert rotated["secret"] != made["secret"]
+    assert "secret" not in http.get(path).json()
+    refused(http.post(f"{path}/rotate", params={"overlap_hours": 721}), 422, "invalid-input")
+
+
 def test_what_is_given_is_changed_and_nothing_else(http: httpx2.Client) -> None:
     made = make(http, name="farm")
     path = f"/v1/webhooks/{made['id']}"
@@ -224,6 +234,8 @@ def test_a_webhook_is_added_tried_out_paused_and_removed(
     line = [webhook, "farm", receiver.url(), "job.ended, job.paused", "", "0", "0"]
     assert [each.split("\t") for each in marey("list").ok().out.splitlines()] == [line]
     assert secret not in marey("list", "--json").out + marey("show", webhook, "--json").out
+    rotated = marey("rotate", webhook, "--overlap-hours", 1).ok()
+    assert (rotated.out.startswith("whsec_"), "1 hours more" in rotated.err) == (True, True)
     with delivering(place):
         said = marey("test", webhook, "--wait").ok()
         assert (said.out.strip(), "it arrived: 200" in said.err) == (receiver.received[0].id, True)

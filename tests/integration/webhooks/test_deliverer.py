@@ -27,12 +27,13 @@ from shared.jobs import (
     DeliveryState,
     cancel,
     claim_deliveries,
+    rotate_secret,
     send_test,
     transaction,
 )
 from shared.settings import REPOSITORY, Settings
 from shared.webhooks.addresses import Allowed
-from shared.webhooks.vault import Vault
+from shared.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.evaluations import wait
@@ -92,6 +93,29 @@ def test_an_event_arrives_signed_once_with_where_the_api_shows_it(engine: sa.Eng
     assert first.id != second.id
     (row, _) = deliveries(engine, webhook)
     assert (str(row.event), row.status, row.error, row.attempts) == (first.id, 200, None, 1)
+
+
+def test_while_a_secret_is_rotated_the_receiver_may_know_either(engine: sa.Engine, receiver: Receiver) -> None:
+    webhook, secret = new_webhook(engine, receiver.url()), new_signing_secret()
+    with transaction(engine) as conn:
+        rotate_secret(conn, DEFAULT_TENANT, webhook, VAULT.encrypt(secret))
+    with delivering(engine):
+        happen(engine)
+        wait(lambda: all_delivered(engine, webhook))
+    (request,) = receiver.received
+    for known in (SECRET, secret):
+        assert Webhook(known).verify(request.body, request.headers)["type"] == "job.ended"
+
+
+def test_a_receiver_s_wish_to_wait_is_kept(engine: sa.Engine, receiver: Receiver) -> None:
+    receiver.answer = status(503, **{"Retry-After": "3600"})
+    webhook = new_webhook(engine, receiver.url())
+    with delivering(engine):
+        happen(engine)
+        wait(lambda: deliveries(engine, webhook)[0].status == 503)
+    (row,) = deliveries(engine, webhook)
+    assert row.next is not None
+    assert (row.next - row.created).total_seconds() > 3000
 
 
 def test_what_a_receiver_refuses_is_tried_again_under_the_same_id(engine: sa.Engine, receiver: Receiver) -> None:

@@ -23,15 +23,17 @@ from shared.jobs import (
     get_delivery,
     get_webhook,
     give_back_deliveries,
+    list_audit,
     list_deliveries,
     list_webhooks,
     record_attempt,
     replay_delivery,
+    rotate_secret,
     send_test,
     sweep,
     transaction,
 )
-from shared.jobs.deliveries import DELAYS, JITTER
+from shared.jobs.deliveries import DELAYS, JITTER, MAX_WAIT
 from shared.jobs.webhooks import MAX_WEBHOOKS
 from tests.servers.jobs import submit_items
 from tests.support.webhooks import deliveries, errors, events_written, new_webhook, time_passes, told
@@ -118,6 +120,66 @@ def test_eight_tries_are_made_later_and_later_and_then_it_has_failed(engine: sa.
     (row,) = deliveries(engine, webhook)
     assert (row.state, row.attempts, row.status, row.error) == (DeliveryState.FAILED, 8, None, "x" * 300)
     assert errors(engine, webhook, row.event) == ["answered 500"] * 7 + ["x" * 300]
+
+
+@pytest.mark.parametrize(("asked", "kept"), [(1.0, DELAYS[0]), (300.0, 300.0), (1e9, MAX_WAIT)])
+def test_a_receiver_may_put_off_the_next_try_but_not_for_ever_and_not_bring_it_forward(
+    engine: sa.Engine, asked: float, kept: float
+) -> None:
+    new_webhook(engine)
+    happen(engine)
+    (due,) = claim(engine)
+    assert record(engine, due, Attempt(429, 0.1, "answered 429", asked)) is DeliveryState.PENDING
+    waits = next_in(engine, due)
+    assert waits is not None
+    assert waits <= (1 + JITTER) * kept
+    assert asked < kept or waits > DELAYS[0] * (1 + JITTER)
+
+
+def test_a_receiver_that_is_gone_is_told_nothing_more_and_the_audit_log_says_why(engine: sa.Engine) -> None:
+    webhook, other = new_webhook(engine), new_webhook(engine)
+    happen(engine, 2)
+    first, second = (each for each in claim(engine) if each.webhook == webhook)
+    assert record(engine, first, Attempt(410, 0.1, "answered 410")) is DeliveryState.FAILED
+    assert record(engine, second, Attempt(410, 0.1, "answered 410")) is DeliveryState.FAILED
+    with transaction(engine) as conn:
+        assert get_webhook(conn, DEFAULT_TENANT, webhook).paused
+        assert not get_webhook(conn, DEFAULT_TENANT, other).paused
+        (noted,) = list_audit(conn, verb="webhook.gone").rows
+    assert (noted.target, noted.tenant, noted.data["event"]) == (str(webhook), DEFAULT_TENANT, str(first.event))
+    happen(engine)
+    assert webhook not in {each.webhook for each in claim(engine)}
+    with transaction(engine) as conn:
+        change_webhook(conn, DEFAULT_TENANT, webhook, WebhookChange(paused=False))
+    assert webhook in {each.webhook for each in claim(engine)}
+
+
+def test_a_rotated_secret_signs_until_its_overlap_is_over(engine: sa.Engine) -> None:
+    webhook = new_webhook(engine)
+
+    def secrets() -> list[bytes]:
+        time_passes(engine)
+        (due,) = claim(engine)
+        return [bytes(secret) for secret in due.secrets]
+
+    happen(engine)
+    (first,) = secrets()
+    with transaction(engine) as conn:
+        rotate_secret(conn, DEFAULT_TENANT, webhook, b"second")
+    assert secrets() == [b"second", first]
+    with transaction(engine) as conn:
+        rotate_secret(conn, DEFAULT_TENANT, webhook, b"third", overlap=60)
+    assert secrets() == [b"third", b"second"]
+    with transaction(engine) as conn:
+        conn.execute(sa.text("UPDATE webhook SET previous_until = now()"))
+    assert secrets() == [b"third"]
+    with transaction(engine) as conn:
+        rotate_secret(conn, DEFAULT_TENANT, webhook, b"fourth", overlap=0)
+    assert secrets() == [b"fourth"]
+    with transaction(engine) as conn, pytest.raises(InvalidInput, match="length of time"):
+        rotate_secret(conn, DEFAULT_TENANT, webhook, b"x", overlap=-1)
+    with transaction(engine) as conn, pytest.raises(NotFound):
+        rotate_secret(conn, "studio", webhook, b"x")
 
 
 def test_a_replay_has_all_tries_again_and_the_same_id_and_the_log_goes_on(engine: sa.Engine) -> None:

@@ -13,6 +13,7 @@ from cryptography.fernet import Fernet
 from pydantic import SecretStr
 from standardwebhooks.webhooks import Webhook, WebhookVerificationError
 
+from services.scheduler.sending import asked_to_wait
 from shared.errors import InvalidInput, Refused
 from shared.jobs import DueDelivery
 from shared.jobs.deliveries import DELAYS, HOLD, JITTER, delay_after
@@ -26,24 +27,47 @@ API = "https://marey.example"
 
 
 def due(**data: object) -> DueDelivery:
-    return DueDelivery(uuid4(), uuid4(), uuid4(), "job.ended", AT, data, "https://studio.example", b"", 0)
+    return DueDelivery(uuid4(), uuid4(), uuid4(), "job.ended", AT, data, "https://studio.example", [b""], 0)
 
 
 def test_the_library_of_standard_webhooks_verifies_a_message_and_no_changed_one() -> None:
     secret, each = new_signing_secret(), due(job=str(JOB), state="succeeded")
     body = message_of(each, API)
-    headers = dict(headers_of(each, body, secret))
+    headers = dict(headers_of(each, body, [secret]))
     assert headers["webhook-id"] == str(each.event)
     assert Webhook(secret).verify(body, headers) == json.loads(body)
     for changed, told in (
         (body + b" ", headers),
         (body, {**headers, "webhook-id": str(uuid4())}),
         (body, {**headers, "webhook-timestamp": str(int(headers["webhook-timestamp"]) + 1)}),
-        (body, dict(headers_of(each, body, secret, datetime.now(UTC) - timedelta(minutes=6)))),
-        (body, dict(headers_of(each, body, new_signing_secret()))),
+        (body, dict(headers_of(each, body, [secret], datetime.now(UTC) - timedelta(minutes=6)))),
+        (body, dict(headers_of(each, body, [new_signing_secret()]))),
     ):
         with pytest.raises(WebhookVerificationError):
             Webhook(secret).verify(changed, told)
+
+
+def test_while_a_secret_is_rotated_receivers_that_know_either_take_a_message() -> None:
+    new, old, each = new_signing_secret(), new_signing_secret(), due(job=str(JOB))
+    body = message_of(each, API)
+    headers = dict(headers_of(each, body, [new, old]))
+    assert len(headers["webhook-signature"].split()) == 2
+    for secret in (new, old):
+        assert Webhook(secret).verify(body, headers) == json.loads(body)
+    with pytest.raises(WebhookVerificationError):
+        Webhook(new_signing_secret()).verify(body, headers)
+
+
+@pytest.mark.parametrize(
+    ("header", "seconds"),
+    [
+        (None, 0), ("120", 120), (" 7 ", 7), ("Sun, 22 Nov 2026 03:01:30 GMT", 90),
+        ("Sun, 22 Nov 2026 02:59:00 GMT", 0),
+        ("soon", 0), ("-5", 0), ("1.5", 0), ("", 0), ("²", 0), ("9" * 5000, 1e12 - 1),
+    ],
+)  # fmt: skip
+def test_a_receiver_may_ask_for_a_wait_in_seconds_or_by_a_date(header: str | None, seconds: float) -> None:
+    assert asked_to_wait(header, AT) == seconds
 
 
 def test_a_message_says_what_happened_and_where_the_api_shows_it() -> None:
