@@ -251,7 +251,7 @@ class S3Store:
         return Unreachable(
             f"the object store does not answer as it should ({cause})",
             where=self._where(),
-            hint="Is it running, and are MAREY_S3_ENDPOINT and the keys right?",
+            hint="Is it running, has it room left, and are MAREY_S3_ENDPOINT and the keys right?",
         )
 
 

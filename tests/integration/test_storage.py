@@ -327,6 +327,18 @@ def test_an_outage_is_told_and_passes(swift: Swift, monkeypatch: pytest.MonkeyPa
 # --- the choice ---
 
 
+def test_a_bucket_at_its_byte_limit_takes_nothing_says_so_and_goes_on_when_there_is_room(swift: Swift) -> None:
+    store = swift.new_store()
+    swift.limit(store.options.bucket, 1500)
+    store.put(key_of(b"a" * 1000), b"a" * 1000)
+    more = [NewObject(key_of(content), content) for content in (b"b" * 1000, b"c" * 1000)]
+    with pytest.raises(Unreachable, match=r"quota.*\n.*room left"):
+        list(store.put_all(more))
+    assert list(store.keys()) == [key_of(b"a" * 1000)]
+    swift.limit(store.options.bucket, None)
+    assert sorted(store.put_all(more)) == sorted(one.key for one in more)
+
+
 def test_settings_choose_the_store(tmp_path: Path) -> None:
     assert isinstance(open_store(Settings(home=tmp_path)), FolderStore)
     chosen = open_store(Settings(store="s3://clips", s3_access_key="a", s3_secret_key="b"))  # pyright: ignore
