@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -14,7 +15,8 @@ import psutil
 import redis
 import sqlalchemy as sa
 
-from shared.jobs import create_engine, upgrade
+from shared.errors import Unreachable
+from shared.jobs import create_engine, transaction, upgrade
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
 from shared.runtime.queue import redis_client
 from shared.runtime.status import read_status
@@ -42,6 +44,7 @@ class Cluster:
             **environment,
         }
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._orphans: list[psutil.Process] = []
 
     def __enter__(self) -> Cluster:
         return self
@@ -49,6 +52,9 @@ class Cluster:
     def __exit__(self, *_: object) -> None:
         for name in list(self.processes):
             self.kill(name)
+        for orphan in self._orphans:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                orphan.kill()
         self.engine.dispose()
         self.valkey.stop()
         self.postgres.stop()
@@ -64,6 +70,10 @@ class Cluster:
     ) -> None:
         """Start a worker and return at once; `wait_ready` waits for it."""
         self._start(name, environment, "worker", name, queue, reference, bundle)
+
+    def start_api(self, name: str = "api", **environment: str) -> None:
+        """Start an API at `MAREY_PORT` of the environment."""
+        self._start(name, environment, "api")
 
     def wait_ready(self, name: str) -> None:
         """Wait until the worker `name` serves."""
@@ -81,9 +91,14 @@ class Cluster:
 
     # --- breaking ---
 
-    def kill(self, name: str) -> None:
-        """SIGKILL a process; its children die with it."""
+    def kill(self, name: str, *, children: bool = True) -> None:
+        """SIGKILL a process and its children, as when a machine goes; or it alone."""
         process = self.processes.pop(name)
+        with contextlib.suppress(psutil.NoSuchProcess):
+            found = psutil.Process(process.pid).children(recursive=True)
+            self._orphans += [] if children else found
+            for child in found if children else []:
+                child.kill()
         process.kill()
         process.wait()
 
@@ -110,11 +125,39 @@ class Cluster:
         with self.redis() as client:
             client.flushall()
 
-    def restart_postgres(self, seconds_away: float) -> None:
-        """SIGKILL Postgres and start it again after a while."""
-        self.postgres.kill()
+    def restart_postgres(self, seconds_away: float, how: str = "kill") -> None:
+        """Stop Postgres and start it again after a while.
+
+        Args:
+            how: "fast" and "immediate" as `pg_ctl -m` does it, "kill" = SIGKILL; "session" = SIGKILL of one of its
+                processes, on which it throws out all others and recovers by itself.
+        """
+        match how:
+            case "fast":
+                self.postgres.stop()
+            case "immediate":
+                self.postgres.process.send_signal(signal.SIGQUIT)
+                self.postgres.process.wait()
+                self.postgres.kill()  # nothing is left but the lock of its folder
+            case "session":
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    psutil.Process(self.postgres.process.pid).children()[-1].kill()
+                self._wait_for_postgres()
+                return
+            case _:
+                self.postgres.kill()
         time.sleep(seconds_away)
         self.postgres = start_postgres(self.home)
+
+    def _wait_for_postgres(self) -> None:
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                with transaction(self.engine):
+                    return
+            except Unreachable:
+                assert time.monotonic() < deadline, "Postgres does not recover"
+                time.sleep(0.05)
 
     def restart_valkey(self, seconds_away: float) -> None:
         """SIGKILL Valkey and start it again after a while."""
@@ -128,7 +171,7 @@ class Cluster:
         """A client of the queue."""
         return redis_client(self.valkey.url)
 
-    def wait(self, condition: Callable[[], bool], what: str, *, seconds: float = 120.0) -> float:
+    def wait(self, condition: Callable[[], bool], what: str, *, seconds: float = 600.0) -> float:
         """Poll until `condition` holds; gives the seconds that took. Fails with the ends of all logs."""
         started = time.monotonic()
         while not condition():

@@ -1,5 +1,5 @@
-"""A process of the product for the driver: `scheduler`, or `worker NAME QUEUE REFERENCE BUNDLE`; with commas, a worker
-of several queues.
+"""A process of the product for the driver: `api`, `scheduler`, or `worker NAME QUEUE REFERENCE BUNDLE`; with commas, a
+worker of several queues.
 
 It is what `marey scheduler` and `marey worker` call, with a toy in place of a model; it dies with the test.
 """
@@ -19,6 +19,11 @@ from shared.settings import settings
 def main(what: str, *arguments: str) -> int:
     """Run until told to stop."""
     set_pdeathsig("SIGKILL")
+    if what == "api":
+        from services.api.app import serve  # a worker does without
+
+        serve()
+        return 0
     if what == "scheduler":
         return scheduler_main(settings())
     name, queue, reference, bundle = arguments

@@ -27,6 +27,8 @@ class Deed(StrEnum):
     WALK = "walk"
     KILL = "kill"
     """SIGKILL to its own process: a segfault, an OOM kill."""
+    HANG = "hang"
+    """No step and no outcome, for a day."""
     BUG = "bug"
     """An unexpected exception out of `run`."""
     REFUSE = "refuse"
@@ -87,6 +89,8 @@ class ToyHandler:
         match deed(item):
             case Deed.KILL:
                 os.kill(os.getpid(), signal.SIGKILL)
+            case Deed.HANG:
+                time.sleep(86_400)
             case Deed.BUG:
                 raise RuntimeError("a bug")
             case Deed.REFUSE:

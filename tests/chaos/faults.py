@@ -1,0 +1,263 @@
+"""What a chaos run breaks, and how long it takes until work goes on."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from uuid import UUID
+
+import httpx2
+import sqlalchemy as sa
+
+from shared.jobs import collect_garbage, transaction
+from shared.jobs.schema import item, lease
+from shared.runtime.faults import patiently
+from shared.runtime.status import read_status
+from tests.chaos.driver import Cluster
+from tests.chaos.places import Place
+from tests.chaos.studios import ask, client_of
+
+LIMIT = 600.0  # seconds; what takes longer to answer again fails the run
+LOOK = 0.05
+
+
+def now() -> datetime:
+    """The machine's clock, which is the database's too."""
+    return datetime.now(UTC)
+
+
+@dataclass
+class Fault:
+    """Something that was broken.
+
+    Attributes:
+        at: when it was broken. back: when it was there again.
+        held: items that a killed worker held, and `leases` by which.
+        waits: seconds until things that were waited for at once, by what they are.
+    """
+
+    kind: str
+    at: datetime
+    back: datetime | None = None
+    held: list[UUID] = field(default_factory=list)
+    leases: list[UUID] = field(default_factory=list)
+    waits: dict[str, float] = field(default_factory=dict)
+
+
+class Breaker:
+    """Breaks one thing at a time of a cluster, by seeded draws.
+
+    Args:
+        url, key: of the API. metrics_url: of the scheduler.
+        workers: how many `worker-N` there are.
+        start: starts the process of a name.
+        longest: seconds by which outages are measured.
+        start_again: starts what has ended by itself.
+    """
+
+    def __init__(
+        self,
+        cluster: Cluster,
+        place: Place,
+        *,
+        draw: random.Random,
+        url: str,
+        key: str,
+        metrics_url: str,
+        workers: int,
+        start: Mapping[str, Callable[[], None]],
+        longest: float,
+        start_again: Callable[[], None],
+    ) -> None:
+        self._cluster = cluster
+        self._place = place
+        self._draw = draw
+        self._url, self._key, self._metrics_url = url, key, metrics_url
+        self._workers = workers
+        self._start = start
+        self._longest = longest
+        self._start_again = start_again
+        self.faults: list[Fault] = []
+        self.kinds: dict[str, Callable[[Fault], None]] = {
+            "worker's child killed": self._child,
+            "worker killed, its child left": self._parent,
+            "worker and child killed": self._worker,
+            "worker stopped for a while": self._freeze,
+            "scheduler killed": self._scheduler,
+            "API killed": self._api,
+            "queue flushed": self._flush,
+            "queue killed": self._valkey,
+            "Postgres stopped (fast)": lambda fault: self._postgres(fault, "fast"),
+            "Postgres stopped (immediate)": lambda fault: self._postgres(fault, "immediate"),
+            "Postgres killed": lambda fault: self._postgres(fault, "kill"),
+            "Postgres session killed": lambda fault: self._postgres(fault, "session"),
+            "store away": lambda fault: self._without_store(fault, place.away()),
+            "store full": lambda fault: self._without_store(fault, place.full()),
+            "garbage collected": self._collect,
+        }
+
+    def break_one(self, kind: str) -> Fault:
+        """Break something of this kind and bring it back."""
+        fault = Fault(kind, now())
+        self.faults.append(fault)
+        self.kinds[kind](fault)
+        fault.back = fault.back or now()
+        return fault
+
+    # --- processes ---
+
+    def _some_worker(self) -> str:
+        return f"worker-{self._draw.randrange(self._workers)}"
+
+    def _note_held(self, fault: Fault, name: str) -> None:
+        query = sa.select(item.c.id, lease.c.token).join(lease, lease.c.token == item.c.lease_token)
+        ours = query.where(lease.c.worker.like(f"{name}/%"))
+
+        def look() -> Sequence[sa.Row[tuple[UUID, UUID]]]:
+            with transaction(self._cluster.engine) as conn:
+                return conn.execute(ours).all()
+
+        rows = patiently(look, seconds=LIMIT)
+        fault.held, fault.leases = [row.id for row in rows], list({row.token for row in rows})
+        fault.at = now()
+
+    def _child(self, fault: Fault) -> None:
+        name = self._some_worker()
+        self._note_held(fault, name)
+        if self._cluster.child(name):
+            self._cluster.kill_child(name)
+
+    def _parent(self, fault: Fault) -> None:
+        """Its child goes on until its drain ends, for all it knows."""
+        name = self._some_worker()
+        self._cluster.kill(name, children=False)
+        self._away(3.0)
+        self._start[name]()
+
+    def _worker(self, fault: Fault) -> None:
+        name = self._some_worker()
+        self._note_held(fault, name)
+        self._cluster.kill(name)
+        self._away(3.0)
+        self._start[name]()
+
+    def _freeze(self, fault: Fault) -> None:
+        """SIGSTOP for longer than a lease lasts: it wakes up, and what it holds is somebody else's."""
+        name = self._some_worker()
+        status = read_status(self._cluster.home, name)
+        if status is None or not self._cluster.child(name):
+            return
+        self._note_held(fault, name)
+        try:
+            os.kill(status.pid, signal.SIGSTOP)
+            self._away(2 * self._longest, least=self._longest)
+            os.kill(status.pid, signal.SIGCONT)
+        except ProcessLookupError:
+            return
+
+    def _scheduler(self, fault: Fault) -> None:
+        self._cluster.kill("scheduler")
+        self._away(3.0)
+        self._start["scheduler"]()
+        fault.back = now()
+        for part in ("relay", "sweeper"):
+            self._wait(fault, f"{part} at work", lambda part=part: self._rounds(part) > 0)
+
+    def _api(self, fault: Fault) -> None:
+        self._cluster.kill("api")
+        self._away(2.0)
+        self._start["api"]()
+        fault.back = now()
+        self._wait(fault, "API answers", self._answers)
+
+    # --- servers ---
+
+    def _flush(self, _fault: Fault) -> None:
+        self._cluster.flush_queue()
+
+    def _valkey(self, fault: Fault) -> None:
+        self._cluster.restart_valkey(self._draw.uniform(0.0, 4.0))
+        fault.back = now()
+
+    def _postgres(self, fault: Fault, how: str) -> None:
+        self._cluster.restart_postgres(self._draw.uniform(0.0, 4.0), how)
+        fault.back = now()
+        self._wait(fault, "API answers", self._answers)
+
+    def _without_store(self, fault: Fault, gone: AbstractContextManager[None]) -> None:
+        with gone:
+            self._away(1.5 * self._longest, least=1.0)
+        fault.back = now()
+
+    def _collect(self, _fault: Fault) -> None:
+        """No fault: it must do no harm at any moment."""
+        patiently(lambda: collect_garbage(self._cluster.engine, self._place.store), seconds=LIMIT)
+
+    # --- waiting ---
+
+    def _away(self, most: float, least: float = 0.0) -> None:
+        time.sleep(self._draw.uniform(least, most))
+
+    def _wait(self, fault: Fault, what: str, condition: Callable[[], bool]) -> None:
+        assert fault.back is not None
+        deadline = time.monotonic() + LIMIT
+        while not condition():
+            if time.monotonic() > deadline:
+                raise AssertionError(f"{fault.kind}, and then not in {LIMIT:.0f} s: {what}\n{self._cluster.logs()}")
+            self._start_again()
+            time.sleep(LOOK)
+        fault.waits[what] = (now() - fault.back).total_seconds()
+
+    def _answers(self) -> bool:
+        with client_of(self._url, self._key) as http:
+            answer = ask(http, "GET", "/v1/jobs", params={"limit": 1})
+        return answer is not None and answer.status_code == httpx2.codes.OK
+
+    def _rounds(self, part: str) -> float:
+        """Rounds that this part of the scheduler has done since it was started."""
+        try:
+            with urllib.request.urlopen(self._metrics_url, timeout=5) as response:
+                lines = response.read().decode().splitlines()
+        except (urllib.error.URLError, OSError):
+            return 0.0
+        wanted = f'marey_scheduler_rounds_total{{outcome="done",part="{part}"}}'
+        return next((float(line.rpartition(" ")[2]) for line in lines if line.startswith(wanted)), 0.0)
+
+
+# --- what the ledger says of it afterwards ---
+
+STARTED_AGAIN = """
+    SELECT min(at) FROM ledger_item
+    WHERE after = 'leased' AND at > :at AND item = ANY(:items) AND NOT lease = ANY(:leases)
+"""
+LOST = """
+    SELECT count(*) FROM ledger_item WHERE after = 'ready' AND at > :at AND item = ANY(:items) AND lease = ANY(:leases)
+"""
+NEXT = "SELECT min(at) FROM ledger_item WHERE after = :after AND at > :at"
+
+
+def recoveries(engine: sa.Engine, fault: Fault) -> dict[str, float]:
+    """Seconds until work went on, by what was waited for."""
+    found = dict(fault.waits)
+    with transaction(engine) as conn:
+        if fault.held:
+            asked = {"at": fault.at, "items": fault.held, "leases": fault.leases}
+            if conn.execute(sa.text(LOST), asked).scalar_one():
+                again = conn.execute(sa.text(STARTED_AGAIN), asked).scalar_one()
+                if again is not None:
+                    found["first item again"] = (again - fault.at).total_seconds()
+        wanted = {"Postgres": "succeeded", "store": "succeeded", "queue": "leased"}.get(fault.kind.split()[0])
+        if wanted is not None and fault.back is not None:
+            first = conn.execute(sa.text(NEXT), {"at": fault.back, "after": wanted}).scalar_one()
+            if first is not None:
+                name = "next motion stored" if wanted == "succeeded" else "next claim"
+                found[name] = (first - fault.back).total_seconds()
+    return found
