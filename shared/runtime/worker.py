@@ -25,7 +25,7 @@ from shared.runtime.app import create_app
 from shared.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, wait_for_database
 from shared.runtime.handler import Role
 from shared.runtime.logs import configure_logging, logger
-from shared.runtime.status import forget_dead, read_status, status_file
+from shared.runtime.status import WorkerStatus, forget_dead, read_status, status_file
 from shared.settings import Settings
 
 log = logger(__name__)
@@ -102,10 +102,15 @@ def _watch(home: Path, name: str) -> None:
     stuck = 0
     while stuck < WATCH_LOOKS:
         time.sleep(WATCH_SECONDS)
-        status = read_status(home, name)
-        stuck = stuck + 1 if status is not None and not status.alive(time.time()) else 0
+        stuck = stuck + 1 if _is_stuck(read_status(home, name), time.time()) else 0
     log.error("worker_stuck", worker=name)
     os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _is_stuck(status: WorkerStatus | None, now: float) -> bool:
+    """Whether the child that said so hangs. The last word of one that was killed says nothing of its successor, which
+    may still be importing; Celery's pool waits for that."""
+    return status is not None and psutil.pid_exists(status.pid) and not status.alive(now)
 
 
 def _stop_child(home: Path, name: str) -> None:
