@@ -6,10 +6,11 @@ import hashlib
 import itertools
 import json
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
-from uuid import UUID
+from uuid import UUID, uuid4
 
 import httpx2
 import pytest
@@ -349,6 +350,28 @@ def test_a_revoked_key_loses_its_open_socket(place: Studio, mine: Mine) -> None:
             assert http.get("/v1/jobs").status_code == 200
             revoke_key(conn, "default", key_id(place, key))
         assert viewer.closed()[0] == 4401
+
+
+def test_on_no_route_is_anybody_answered_without_a_valid_key(place: Studio) -> None:
+    with transaction(place.api.engine) as conn:
+        create_tenant(conn, "closed")
+    keys = {ending: place.key("admin", tenant="closed") for ending in ("revoked", "expired", "suspended")}
+    with transaction(place.api.engine) as conn:
+        for ending in keys:  # suspended last: then the others are still told what they are
+            end_key(conn, ending, "closed", authenticate(conn, keys[ending]).id)
+    shown = {"no key": None, "garbage": "Bearer marey_0_0", "of another kind": "Basic bWU6bWU=", "empty": ""}
+    shown |= {ending: f"Bearer {secret}" for ending, secret in keys.items()}
+    asked = [*requests(), ("GET", "/metrics"), ("GET", "/v1/models"), ("POST", "/v1/texts/parse")]
+    nobody = Mine(defaultdict(lambda: str(uuid4())), "")
+    with httpx2.Client(base_url=place.api.url, timeout=30) as http:
+        for method, template in asked:
+            path, body = nobody.path(template), nobody.body(f"{method} {template}")
+            for state, header in shown.items():
+                headers = {} if header is None else {"Authorization": header}
+                response = http.request(method, path, json=body, headers=headers)
+                told = (response.status_code, response.json()["type"].rpartition(":")[2])
+                wanted = (403, "refused") if state == "suspended" else (401, "unauthenticated")
+                assert told == wanted, f"{state}: {method} {template}: {response.text[:200]}"
 
 
 @pytest.mark.parametrize("ending", ["revoked", "expired", "suspended"])
