@@ -22,14 +22,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import sqlalchemy as sa
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from services.cli.client import Client
-from services.cli.place import read_server
 from shared.jobs import create_engine, schema
 from shared.settings import REPOSITORY
 from shared.streams.frames import Frame, decode_frame
-from tests.support.marey import Marey, Serving, serving
+from tests.support.marey import Marey, Serving, serving, socket_of
 from workers.mogo.bundle import random_bundle
 
 STREAMS = 20
@@ -60,7 +59,7 @@ def main() -> None:
 def _first_frame(marey: Marey, client: Client) -> float:
     began = time.perf_counter()
     stream = client.post_once("/v1/streams", PROMPT)
-    with _opened(marey, stream["id"]) as socket:
+    with socket_of(marey, stream["id"]) as socket:
         _next(socket)
         took = time.perf_counter() - began
         _stop(socket)
@@ -73,7 +72,7 @@ def _gap_of_a_kill(marey: Marey, client: Client, server: Serving) -> float:
     with _second_worker(environment):
         time.sleep(WARM_SECONDS)
         stream = client.post_once("/v1/streams", PROMPT)
-        with _opened(marey, stream["id"]) as socket:
+        with socket_of(marey, stream["id"]) as socket:
             for _ in range(60):
                 _next(socket)
             os.kill(_holder(environment["MAREY_DATABASE_URL"], stream["id"]), signal.SIGKILL)
@@ -105,13 +104,6 @@ def _holder(database_url: str, stream: str) -> int:
         name = conn.scalar(sa.select(schema.stream.c.worker).where(schema.stream.c.id == stream))
     engine.dispose()
     return int(str(name).rpartition("-")[2])
-
-
-def _opened(marey: Marey, stream: str) -> ClientConnection:
-    server = read_server(marey.home)
-    assert server is not None
-    url = f"{server.url.replace('http', 'ws', 1)}/v1/streams/{stream}"
-    return connect(url, additional_headers={"Authorization": f"Bearer {server.key}"}, open_timeout=PATIENCE)
 
 
 def _next(socket: ClientConnection) -> Frame:

@@ -120,6 +120,7 @@ from shared.jobs.streams import (
     get_stream,
     list_streams,
     open_streams,
+    stream_acts,
     stream_prompts,
     take_stream,
 )
@@ -386,6 +387,7 @@ __all__ = [
     "set_priority",
     "set_quotas",
     "store_prompts",
+    "stream_acts",
     "stream_prompts",
     "submit",
     "suspend_tenant",

@@ -9,6 +9,7 @@ from uuid import UUID
 
 from shared.jobs.states import StreamState
 from shared.jobs.types import Problem
+from shared.streams.acts import Begun
 
 
 @dataclass(frozen=True)
@@ -69,11 +70,13 @@ class StreamPast:
     Attributes:
         tokens: int16, little-endian, a column of V levels for each of `row.frames`.
         prompts: every prompt with the frame from which it was in force; none before the first frame.
+        acts: the acts of all these prompts that began.
     """
 
     row: StreamRow
     tokens: bytes = field(repr=False)
     prompts: tuple[tuple[int, str], ...]
+    acts: tuple[Begun, ...]
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,7 @@ class StreamChunk:
         prompts: those that came into force in it.
         control: id of the last message that was obeyed.
         state: live or paused; None = as before.
+        acts: those that began in it.
     """
 
     first: int
@@ -95,3 +99,4 @@ class StreamChunk:
     prompts: Sequence[tuple[int, str]]
     control: str
     state: StreamState | None = None
+    acts: Sequence[Begun] = ()

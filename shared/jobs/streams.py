@@ -25,6 +25,7 @@ from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamR
 from shared.jobs.submit import check_text, submit
 from shared.jobs.tenants import get_tenant
 from shared.jobs.types import NewItem, NewJob, Page, Problem
+from shared.streams.acts import Begun
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
 RETRY_SECONDS = 10
@@ -106,6 +107,13 @@ def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
     return [(int(frame), str(text)) for prompts in conn.execute(query).scalars() for frame, text in prompts]
 
 
+def stream_acts(conn: sa.Connection, stream: UUID) -> list[Begun]:
+    """Every act of a stream that began and is on record; none of what workers wrote that did not record acts."""
+    table = schema.stream_chunk.c
+    query = sa.select(table.acts).where(table.stream_id == stream, table.acts.is_not(None)).order_by(table.first)
+    return [Begun(*act) for acts in conn.execute(query).scalars() for act in acts]
+
+
 # --- what a worker does ---
 
 
@@ -140,7 +148,7 @@ def take_stream(conn: sa.Connection, stream: UUID, fence: int, worker: str) -> S
     row = _row(conn.execute(_streams().where(table.c.id == stream)).mappings().one())
     chunk = schema.stream_chunk.c
     tokens = conn.execute(sa.select(chunk.tokens).where(chunk.stream_id == stream).order_by(chunk.first)).scalars()
-    return StreamPast(row, b"".join(tokens), tuple(stream_prompts(conn, stream)))
+    return StreamPast(row, b"".join(tokens), tuple(stream_prompts(conn, stream)), tuple(stream_acts(conn, stream)))
 
 
 def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk) -> bool:
@@ -160,6 +168,7 @@ def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk)
                 first=chunk.first,
                 tokens=chunk.tokens,
                 prompts=[[frame, text] for frame, text in chunk.prompts],
+                acts=[list(act) for act in chunk.acts],
             )
         )
     return True

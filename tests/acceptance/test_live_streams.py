@@ -7,16 +7,20 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from uuid import UUID
 
 import pytest
-from websockets.sync.client import ClientConnection, connect
+import sqlalchemy as sa
+from websockets.sync.client import ClientConnection
 
-from services.cli.place import read_server
+from shared.jobs import create_engine, stream_acts
 from shared.motion.bvh import read_bvh
+from shared.streams.acts import Begun
 from shared.streams.frames import Frame, decode_frame
-from tests.support.marey import Marey, serving
+from tests.support.marey import Marey, serving, socket_of
 
 PATIENCE = 90.0
+ACTS = "walk forward, then wave with the right hand"
 
 
 @pytest.fixture
@@ -32,11 +36,9 @@ def wait_for(what: Callable[[], object]) -> None:
         time.sleep(0.1)
 
 
-def opened(marey: Marey, stream: str) -> ClientConnection:
-    server = read_server(marey.home)
-    assert server is not None
-    url = f"{server.url.replace('http', 'ws', 1)}/v1/streams/{stream}"
-    return connect(url, additional_headers={"Authorization": f"Bearer {server.key}"}, open_timeout=PATIENCE)
+def acts_of(engine: sa.Engine, stream: str) -> list[Begun]:
+    with engine.connect() as conn:
+        return stream_acts(conn, UUID(stream))
 
 
 def frames_until(socket: ClientConnection, enough: Callable[[list[Frame]], bool]) -> list[Frame]:
@@ -52,10 +54,15 @@ def frames_until(socket: ClientConnection, enough: Callable[[list[Frame]], bool]
 
 def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey) -> None:
     with serving(alone) as server, alone.client() as client:
-        stream: dict[str, Any] = client.post_once("/v1/streams", {"prompt": "a person walks", "seed": 7})
-        with opened(alone, stream["id"]) as socket:
-            before = frames_until(socket, lambda found: len(found) >= 60)  # some of them are on record
-            server.children()["live"].kill()
+        stream: dict[str, Any] = client.post_once("/v1/streams", {"prompt": ACTS, "seed": 7})
+        with socket_of(alone, stream["id"]) as socket:
+            worker = server.children()["live"]
+            engine = create_engine(worker.environ()["MAREY_DATABASE_URL"])
+            before = frames_until(
+                socket, lambda found: len(found) % 20 == 0 and len(acts_of(engine, stream["id"])) == 2
+            )
+            acts = acts_of(engine, stream["id"])
+            worker.kill()
             socket.send(json.dumps({"kind": "steer", "prompt": "a person waves"}))
             after = frames_until(socket, lambda found: bool(found) and found[-1].prompt == 1)
             socket.send(json.dumps({"kind": "stop"}))
@@ -65,7 +72,10 @@ def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey)
         wait_for(lambda: client.get(f"/v1/streams/{stream['id']}")["state"] == "ended")
         ended = client.get(f"/v1/streams/{stream['id']}")
         assert ended["frames"] == len(shown)
-        assert [prompt["prompt"] for prompt in ended["prompts"]] == ["a person walks", "a person waves"]
+        steered = next(frame.number for frame in after if frame.prompt == 1)
+        assert acts_of(engine, stream["id"]) == [*acts, Begun(steered, 0)]  # none began again
+        engine.dispose()
+        assert [prompt["prompt"] for prompt in ended["prompts"]] == [ACTS, "a person waves"]
         alone("jobs", "wait", ended["job"], "--timeout", 90, timeout=120).ok()
         (motion,) = client.pages(f"/v1/jobs/{ended['job']}/motions")
         assert motion["frames"] == len(shown)

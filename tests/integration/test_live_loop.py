@@ -11,7 +11,7 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from shared.jobs import StreamState, get_job, list_items, stream_prompts, transaction
+from shared.jobs import StreamState, get_job, list_items, stream_acts, stream_prompts, transaction
 from shared.jobs.states import STREAM_TRANSITIONS, ItemState
 from shared.runtime.live import keeper
 from shared.runtime.live.held import Held
@@ -19,6 +19,7 @@ from shared.runtime.live.port import LiveFrame
 from shared.runtime.queue import redis_client
 from shared.settings import Settings as Configuration
 from shared.storage import FolderStore
+from shared.streams.acts import Begun
 from shared.streams.bell import Bell
 from shared.streams.control import Control
 from shared.streams.frames import Frame
@@ -155,6 +156,44 @@ def test_another_worker_goes_on_behind_the_last_frame_after_a_kill(studio: Studi
     assert {frame.prompt for frame in frames[shown:]} == {1}
     assert studio.row(stream).fence > fence
     assert np.linalg.norm(frames[shown].root - frames[shown - 1].root) <= 3 * farthest_step(frames[:shown]) + 0.05
+
+
+def test_after_a_kill_the_act_that_plays_goes_on_and_none_begins_again(studio: Studio, start: Start) -> None:
+    stream = studio.begin("walk forward, then wave with the right hand")
+    first = start()
+    studio.until(lambda: len(acts_of(studio, stream)) == 2, "the second act's record")
+    first.kill()
+    acts, recorded = acts_of(studio, stream), studio.row(stream).frames
+    assert [begun.act for begun in acts] == [0, 1]
+    assert acts[0].frame == 0 < acts[1].frame < recorded
+    second = start()
+    studio.until(lambda: studio.row(stream).frames > recorded + 20, "records of the other worker")
+    assert acts_of(studio, stream) == acts
+    second.kill()
+    studio.send(stream, Control("steer", "bow, then sit down"))
+    start()
+    studio.until(lambda: len(prompts_of(studio, stream)) == 2, "the record of a steer that came during the outage")
+    turned = prompts_of(studio, stream)[1][0]
+    studio.until(lambda: len(acts_of(studio, stream)) == 4, "the second act of that prompt")
+    found = acts_of(studio, stream)
+    assert found[:3] == [*acts, Begun(turned, 0)]
+    assert found[3].act == 1
+    whole(studio, stream)
+
+
+def test_a_stream_of_a_worker_that_did_not_record_acts_goes_on_with_its_first(
+    studio: Studio, start: Start, engine: sa.Engine
+) -> None:
+    stream = studio.begin("walk forward, then wave with the right hand")
+    first = start()
+    studio.until(lambda: studio.row(stream).frames > 0, "a record")
+    first.kill()
+    with engine.begin() as conn:
+        conn.execute(sa.text("UPDATE stream_chunk SET acts = NULL WHERE stream_id = :id"), {"id": stream})
+    recorded = studio.row(stream).frames
+    start()
+    studio.until(lambda: studio.row(stream).frames > recorded, "records of the other worker")
+    assert acts_of(studio, stream)[0] == Begun(recorded, 0)
 
 
 def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio: Studio, start: Start) -> None:
@@ -297,6 +336,11 @@ def move(engine: sa.Engine, stream: UUID, state: StreamState) -> None:
     with engine.begin() as conn:
         query = sa.text(f"UPDATE stream SET state = :state, ended_at = {ended} WHERE id = :id")
         conn.execute(query, {"state": state, "id": stream})
+
+
+def acts_of(studio: Studio, stream: UUID) -> list[Begun]:
+    with transaction(studio.engine) as conn:
+        return stream_acts(conn, stream)
 
 
 def prompts_of(studio: Studio, stream: UUID) -> list[tuple[int, str]]:

@@ -7,8 +7,10 @@ import threading
 import time
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from uuid import UUID
 
+import numpy as np
 import redis
 import sqlalchemy as sa
 
@@ -36,10 +38,14 @@ PATIENCE = 60.0
 
 
 def parse(prompt: str) -> TextFeatures:
-    """Features that differ with the prompt."""
+    """Features that differ with the prompt; ", then " stands between its acts."""
     if prompt == "refused":
         raise InvalidInput("this prompt cannot be read")
-    return text_features(zlib.crc32(prompt.encode()))
+    text, *acts = (text_features(zlib.crc32(part.encode())) for part in (prompt, *prompt.split(", then ")))
+    if len(acts) == 1:
+        return text
+    rows = np.concatenate([act.nodes[:1] for act in acts])
+    return replace(text, acts=tuple(prompt.split(", then ")), act_rows=rows)
 
 
 class LiveWorker:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from websockets.sync.client import ClientConnection, connect
 
 from services.cli.client import Client
 from services.cli.place import read_server
@@ -170,3 +171,12 @@ def _role(process: psutil.Process) -> str:
     if "services.cli" in command:
         return "live" if command[-2:] == ["--only", "live"] else command[command.index("services.cli") + 1]
     return process.name()
+
+
+def socket_of(marey: Marey, stream: str) -> ClientConnection:
+    """An open socket on a stream of the server that runs in this home."""
+    server = read_server(marey.home)
+    assert server is not None
+    url = f"{server.url.replace('http', 'ws', 1)}/v1/streams/{stream}"
+    headers = {"Authorization": f"Bearer {server.key}"}
+    return connect(url, additional_headers=headers, open_timeout=START_SECONDS)

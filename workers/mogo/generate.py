@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -78,6 +77,7 @@ class Generator:
         self.layout: FeatureLayout = layout(config.layout)
         self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
+        self._packed: dict[int, PackedModel] = {}
 
     @classmethod
     def load(
@@ -99,11 +99,13 @@ class Generator:
         config, tokenizer, transformer = load_networks(verified)
         return cls(verified, config, tokenizer.to(chosen), transformer.to(chosen), dtype)
 
-    @cached_property
-    def packed(self) -> PackedModel:
-        """What draws motions side by side; products of the same shape for any number of them, so the same tokens."""
-        group = sessions_of_product(self.transformer, MAX_SESSIONS)
-        return PackedModel(self.transformer, dtype=self.dtype, group=group)
+    def packed(self, sessions: int = MAX_SESSIONS) -> PackedModel:
+        """What draws up to so many motions side by side; products of the same shape for any number of them, so the same
+        tokens. Made once for each shape."""
+        group = sessions_of_product(self.transformer, sessions)
+        if group not in self._packed:
+            self._packed[group] = PackedModel(self.transformer, dtype=self.dtype, group=group)
+        return self._packed[group]
 
     def settings(self, values: Mapping[str, Any]) -> Settings:
         """An item's settings, checked. Raises InvalidInput."""
@@ -188,7 +190,7 @@ class _Drawing:
         self.total = sum(len(recorded[row]) if row in recorded else self.frames[row] for row in range(len(requests)))
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
-        self.streams = Streams(generator.packed, max(1, min(MAX_SESSIONS, len(requests))), inference)
+        self.streams = Streams(generator.packed(), max(1, min(MAX_SESSIONS, len(requests))), inference)
 
     @property
     def done(self) -> int:

@@ -2,7 +2,7 @@
 
 A session goes through three kinds of state, each with a row for every session: keys and values of the transformer
 (`Streams`), the past of the causal decoder, and root, poses and feet of the body (`shared.motion.live`). What a session
-must keep elsewhere, to go on after its worker died, are its tokens and prompts alone.
+must keep elsewhere, to go on after its worker died, are its tokens, its prompts and where their acts began.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from shared.motion.live import LiveMotion, LiveState
 from shared.nn.packed import is_small
 from shared.runtime.live.port import LiveFrame, Show
 from shared.settings import settings as configuration
+from shared.streams.acts import Begun
 from shared.streams.frames import Frame
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph
@@ -28,7 +29,6 @@ from shared.text.pipeline import TextPipeline
 from workers.generating.port import Request
 from workers.mogo.bundle import MODEL
 from workers.mogo.generate import Generator, Settings
-from workers.mogo.packed_model import PackedModel, sessions_of_product
 from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import DecoderState
 
@@ -71,9 +71,7 @@ class LiveRoom:
         inference = (settings or Settings()).inference(generator.config.inference)
         self.skeleton = generator.layout.skeleton
         self.capacity = capacity
-        group = sessions_of_product(generator.transformer, capacity)
-        packed = PackedModel(generator.transformer, dtype=generator.dtype, group=group)
-        self._streams = Streams(packed, capacity, inference)
+        self._streams = Streams(generator.packed(capacity), capacity, inference)
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # the session in each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)
@@ -110,7 +108,15 @@ class LiveRoom:
         """V, codes of a frame."""
         return self.generator.config.tokenizer.levels
 
-    def start(self, text: TextFeatures, seed: int, *, past: NDArray[np.int16] | None = None, prompt: int = 0) -> int:
+    def start(
+        self,
+        text: TextFeatures,
+        seed: int,
+        *,
+        past: NDArray[np.int16] | None = None,
+        prompt: int = 0,
+        began: Begun | None = None,
+    ) -> int:
         """A new session, or one that another worker began.
 
         Args:
@@ -118,12 +124,14 @@ class LiveRoom:
             seed: of its random numbers.
             past: (n, V) tokens of all its frames so far: it goes on behind them, continuous with what was shown.
             prompt: number of the prompt in force, counted from 0.
+            began: the act of it that plays, and since when; None = the first begins now.
 
         Returns:
             the session's name in all other methods.
 
         Raises:
-            InvalidInput: no room, features of another encoder, a seed out of range, or tokens that are none.
+            InvalidInput: no room, features of another encoder, a seed out of range, tokens that are none, or an act
+                that the prompt does not have.
         """
         self.generator.limits.check(Request(text, seed))
         if len(self) == self.capacity:  # paused ones keep their room
@@ -136,7 +144,7 @@ class LiveRoom:
             features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
             body = self._motion.after(features[0].cpu().numpy())
         acts, lasts = self.generator.acts(text)
-        stream = self._streams.start(acts, seed, lasts=lasts, past=columns)
+        stream = self._streams.start(acts, seed, lasts=lasts, past=columns, began=began)
         self._started += 1
         self._sessions[self._started] = _Session(0 if columns is None else len(columns), prompt, stream)
         self._join(self._started, decoder, body)
@@ -221,7 +229,7 @@ class LiveRoom:
             left, left_toe, right, right_toe = shown.contacts[row].tolist()
             stands = (left, left_toe, right, right_toe)
             frame = Frame(about.shown, shown.root[row], shown.rotations[row], stands, about.prompt)
-            frames[session] = LiveFrame(frame, tokens[row])
+            frames[session] = LiveFrame(frame, tokens[row], self._streams.act(about.stream))
             about.shown += 1
         return frames
 

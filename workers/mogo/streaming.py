@@ -18,6 +18,7 @@ from torch import Tensor
 
 from shared.errors import InvalidInput
 from shared.nn.sampling import guide, sample_top_k, uniform
+from shared.streams.acts import Begun
 from workers.mogo.attention import HIDDEN, RelativeAttention, Slots
 from workers.mogo.config import InferenceConfig
 from workers.mogo.depth import DepthFrame
@@ -80,6 +81,7 @@ class _Plan:
     lasts: list[int]  # frames that each of them usually takes
     until: int  # frames of the session by which the act that plays is over
     ends_from: int  # of the last one
+    number: int = -1  # of the act that plays; none does yet
     earliest: int = 0  # frames of the session after which the act that plays may end
 
     @classmethod
@@ -88,22 +90,27 @@ class _Plan:
         acts = torch.atleast_2d(sentence)
         return cls(acts, [NEVER] * len(acts) if lasts is None else list(lasts), 0, ends_from)
 
-    def take(self, made: int) -> Tensor:
-        """The next act (W,), from frame `made` on."""
-        act, self.until = self.acts[0], made + self.lasts[0]
-        self.earliest = made + (0 if self.lasts[0] == NEVER else int(EARLIEST * self.lasts[0]))
-        self.acts, self.lasts = self.acts[1:], self.lasts[1:]
-        return act
+    def take(self, began: int, skipped: int = 0) -> Tensor:
+        """The next act (W,), or that behind so many others; it begins at frame `began`."""
+        acts, lasts = self.acts[skipped:], self.lasts[skipped:]
+        self.until = began + lasts[0]
+        self.earliest = began + (0 if lasts[0] == NEVER else int(EARLIEST * lasts[0]))
+        self.acts, self.lasts = acts[1:], lasts[1:]
+        self.number += 1 + skipped
+        return acts[0]
 
     def save(self) -> dict[str, Tensor]:
         """As tensors named `PLAN`."""
-        return {"acts": self.acts.clone(), "lasts": torch.tensor([*self.lasts, self.until, self.ends_from])}
+        return {
+            "acts": self.acts.clone(),
+            "lasts": torch.tensor([*self.lasts, self.until, self.ends_from, self.number]),
+        }
 
     @classmethod
     def load(cls, saved: Mapping[str, Tensor]) -> _Plan:
         """From what `save` gave."""
-        *lasts, until, ends_from = saved["lasts"].tolist()
-        return cls(saved["acts"], lasts, until, ends_from)
+        *lasts, until, ends_from, number = saved["lasts"].tolist()
+        return cls(saved["acts"], lasts, until, ends_from, number)
 
 
 class Streams:
@@ -148,6 +155,7 @@ class Streams:
         lasts: Sequence[int] | None = None,
         past: Tensor | None = None,
         skipped: int = 0,
+        began: Begun | None = None,
     ) -> int:
         """A new session; its first frame comes with the next step.
 
@@ -160,17 +168,22 @@ class Streams:
             past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
                 What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
             skipped: frames that were made before `past`.
+            began: the act that plays behind `past`, and the frame of the session at which it began; None = the first
+                act begins behind them.
 
         Returns:
             the session's name in all other methods.
 
         Raises:
-            InvalidInput: no room, or `skipped` without `past`.
+            InvalidInput: no room, `skipped` without `past`, or an act that is none of these or still to come.
         """
         if skipped and (past is None or len(past) == 0):
             raise InvalidInput("a session goes on behind frames that are not given")
-        row = self._take_row()
         before = 0 if past is None else len(past)
+        acts = len(torch.atleast_2d(sentence))
+        if began is not None and not (0 <= began.act < acts and 0 <= began.frame <= skipped + before):
+            raise InvalidInput(f"{began} is no place among {acts} acts and {skipped + before} frames", where="began")
+        row = self._take_row()
         past = self.state.last.new_zeros(0, self.model.levels) if past is None else past[-self.window :]
         mine = self.state.row(row)
         mine["seeds"].fill_(seed)
@@ -178,7 +191,7 @@ class Streams:
         mine["made"].fill_(skipped + before)
         mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
         plan = self._plans[self.sessions[row]] = _Plan.of(sentence, ends_from, lasts)
-        self._begin(row, plan, past)
+        self._begin(row, plan, past, began)
         return self.sessions[row]
 
     def steer(self, session: int, sentence: Tensor, lasts: Sequence[int] | None = None) -> None:
@@ -186,6 +199,10 @@ class Streams:
         computed anew, on each level; what the frames so far were told stays."""
         plan = self._plans[session] = _Plan.of(sentence, NEVER, lasts)
         self._begin(self._row(session), plan)
+
+    def act(self, session: int) -> int:
+        """Number of the act that plays, among those of the prompt in force."""
+        return self._plans[session].number
 
     def stop(self, session: int) -> None:
         """Forget a session; its row goes to the last one."""
@@ -257,11 +274,12 @@ class Streams:
         plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions))
         return [(row, plan) for row, plan in plans if len(plan.acts)]
 
-    def _begin(self, row: int, plan: _Plan, past: Tensor | None = None) -> None:
-        """Tell a row the next act of its plan."""
-        made = int(self.state.made[row])
-        self._read(row, plan.take(made), self.state.last.new_zeros(0, self.model.levels) if past is None else past)
-        shortest = made + self.model.config.min_frames if made or len(plan.acts) else 0
+    def _begin(self, row: int, plan: _Plan, past: Tensor | None = None, began: Begun | None = None) -> None:
+        """Tell a row the next act of its plan, or the one that plays already."""
+        began = began or Begun(int(self.state.made[row]), 0)
+        act = plan.take(began.frame, began.act)
+        self._read(row, act, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
+        shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.acts) else 0
         ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
         self.state.ends_from[row] = ends_from
         self.state.ended[row] = False

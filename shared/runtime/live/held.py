@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shared.jobs import StreamChunk, StreamRow, StreamState
-from shared.runtime.live.port import Tokens
+from shared.runtime.live.port import LiveFrame, Tokens
+from shared.streams.acts import Begun
 from shared.streams.control import ControlQueue
 from shared.streams.frames import Frame
 from shared.streams.redis import FrameStream, Lease
@@ -25,6 +26,7 @@ class Held:
         opening: of the first prompt.
         session: its name in the room; None before it joined and after it left.
         read: id of the last message that was read; `obeyed` of the last that is in force.
+        acts: those that began, of all prompts; `recorded_acts` of them are written down.
         unwritten: frames that Redis has not got yet.
         shown: how many frames Redis has got, before and now: no token beyond them is written down.
         recorded: how many frames are written down, with `recorded_prompts` of the prompts.
@@ -48,11 +50,13 @@ class Held:
     shown: int
     recorded: int
     recorded_prompts: int
+    acts: list[Begun]
     session: int | None = None
     unwritten: list[Frame] = field(default_factory=list[Frame])
     state: StreamState = StreamState.LIVE
     recorded_state: StreamState = StreamState.LIVE
     recorded_control: str = ""
+    recorded_acts: int = 0
     ending: str | None = None
     lost: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -60,16 +64,24 @@ class Held:
     def __post_init__(self) -> None:
         self.state = self.recorded_state = self.row.state
         self.recorded_control = self.row.control
+        self.recorded_acts = len(self.acts)
 
     @property
     def past(self) -> Tokens | None:
         """(n, V) tokens of every frame so far; None before the first."""
         return np.stack(self.tokens) if self.tokens else None
 
-    def add(self, tokens: Tokens) -> None:
+    @property
+    def playing(self) -> Begun | None:
+        """The act of the prompt in force that plays; None before the first frame of that prompt."""
+        return self.acts[-1] if self.acts and self.acts[-1].frame >= self.prompts[-1][0] else None
+
+    def add(self, made: LiveFrame) -> None:
         """A frame was made."""
         with self.lock:
-            self.tokens.append(tokens)
+            if self.playing is None or self.playing.act != made.act:
+                self.acts.append(Begun(len(self.tokens), made.act))
+            self.tokens.append(made.tokens)
 
     def steered(self, prompt: str, text: TextFeatures, control: str) -> None:
         """A prompt is in force from the next frame on."""
@@ -83,6 +95,7 @@ class Held:
             stop = min(self.shown, len(self.tokens))
             tokens = self.tokens[self.recorded : stop]
             prompts = [(frame, text) for frame, text in self.prompts[self.recorded_prompts :] if frame < stop]
+            acts = [act for act in self.acts[self.recorded_acts :] if act.frame < stop]
             changed = self.state is not self.recorded_state
             if not tokens and not changed:
                 return None
@@ -91,7 +104,7 @@ class Held:
             waits = len(self.prompts) > self.recorded_prompts + len(prompts)
             control = self.recorded_control if waits else self.obeyed
             state = self.state if changed else None
-            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state)
+            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, acts)
 
     def wrote(self, chunk: StreamChunk) -> None:
         """A chunk is written down."""
@@ -99,4 +112,5 @@ class Held:
             self.recorded_control = chunk.control
             self.recorded += chunk.frames
             self.recorded_prompts += len(chunk.prompts)
+            self.recorded_acts += len(chunk.acts)
             self.recorded_state = chunk.state or self.recorded_state

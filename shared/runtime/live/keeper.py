@@ -199,6 +199,7 @@ class Keeper(threading.Thread):
             shown=len(tokens),
             recorded=len(tokens),
             recorded_prompts=len(past.prompts),
+            acts=list(past.acts),
         )
         self._held[str(row.id)] = held
         self._loop.join(held)

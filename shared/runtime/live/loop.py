@@ -131,7 +131,7 @@ class LiveLoop:
             self._close(held, "it could not go on", problem)
 
     def _join(self, held: Held) -> None:
-        held.session = self.room.start(held.text, held.row.seed, past=held.past, prompt=len(held.prompts) - 1)
+        held.session = _entered(self.room, held)
         self._held[held.session] = held
         if held.state is StreamState.PAUSED:
             self.room.pause(held.session)
@@ -173,7 +173,7 @@ class LiveLoop:
         for session, frames in made.items():
             held = self._held[session]
             for frame in frames:
-                held.add(frame.tokens)
+                held.add(frame)
                 if frame.frame.number >= held.lease.next_frame:
                     held.unwritten.append(frame.frame)
             if held.ending is None and len(held.tokens) >= held.row.max_frames:
@@ -232,12 +232,18 @@ class LiveLoop:
         """Whether a stream can make its next frame."""
         room = self._open_room()
         try:
-            session = room.start(held.text, held.row.seed, past=held.past, prompt=len(held.prompts) - 1)
+            session = _entered(room, held)
             encode_frame(room.catch_up(session, 1)[0].frame)
         except Exception as error:
             self._close(held, "it could not go on", as_problem(error))
             return False
         return True
+
+
+def _entered(room: Room, held: Held) -> int:
+    """The stream's session in a room, new or where it was."""
+    prompt = len(held.prompts) - 1
+    return room.start(held.text, held.row.seed, past=held.past, prompt=prompt, began=held.playing)
 
 
 def _session(held: Held) -> int:

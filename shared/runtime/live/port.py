@@ -9,6 +9,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.streams.acts import Begun
 from shared.streams.frames import Frame
 from shared.text.features import TextFeatures
 
@@ -22,6 +23,8 @@ class LiveFrame:
     frame: Frame
     tokens: Tokens
     """(V,): the column it was decoded from."""
+    act: int
+    """Number of the act of its prompt, from 0."""
 
 
 class Room(Protocol):
@@ -60,8 +63,11 @@ class Room(Protocol):
         """The shortest clip."""
         ...
 
-    def start(self, text: TextFeatures, seed: int, *, past: Tokens | None = None, prompt: int = 0) -> int:
-        """A new session, or one to go on behind `past` (n, V) with prompt number `prompt` in force; its name."""
+    def start(
+        self, text: TextFeatures, seed: int, *, past: Tokens | None = None, prompt: int = 0, began: Begun | None = None
+    ) -> int:
+        """A new session, or one to go on behind `past` (n, V) with prompt number `prompt` in force, of which the act
+        `began` plays (None: the first begins); its name."""
         ...
 
     def steer(self, session: int, text: TextFeatures) -> None:

@@ -10,6 +10,7 @@ import pytest
 from shared.errors import InvalidInput
 from shared.motion.live import LiveMotion
 from shared.runtime.live.port import LiveFrame
+from shared.streams.acts import Begun
 from shared.streams.frames import decode_frame, encode_frame
 from tests.support.prepared import text_features
 from workers.mogo.bundle import random_bundle
@@ -157,3 +158,51 @@ def test_what_cannot_be_is_refused_and_leaves_the_room_as_it_was(generator: Gene
     assert set(room.step()) == {session}
     with pytest.raises(InvalidInput):
         LiveRoom(generator, 1, replace(Settings(), top_k=2.0))
+
+
+ACTS = replace(
+    text_features(0),
+    acts=("walk forward", "wave"),
+    act_rows=np.concatenate([text_features(0).nodes[:1], text_features(1).nodes[:1]]),
+)
+
+
+def in_second_act(generator: Generator, room: LiveRoom) -> tuple[int, list[LiveFrame], int]:
+    """A session five frames into its second act: its name, its frames, and the one at which that act began."""
+    session = room.start(ACTS, 7)
+    made = run(room, session, 1)
+    while made[-1].act == 0:
+        made += run(room, session, 1)
+    began = made[-1].frame.number
+    return session, made + run(room, session, 4), began
+
+
+def test_a_session_goes_on_with_the_act_that_plays(generator: Generator) -> None:
+    room = LiveRoom(generator, 1)
+    session, made, began = in_second_act(generator, room)
+    assert 0 < began <= generator.acts(ACTS)[1][0]
+    tokens = np.stack([frame.tokens for frame in made])
+    other = LiveRoom(generator, 2)
+    resumed = other.start(ACTS, 7, past=tokens, prompt=0, began=Begun(began, 1))
+    assert {frame.act for frame in run(other, resumed, 60)} == {1}
+    room.pause(session)
+    room.resume(session)
+    assert {frame.act for frame in run(room, session, 60)} == {1}
+
+
+def test_an_act_that_plays_ends_when_it_would_have_ended(generator: Generator) -> None:
+    room = LiveRoom(generator, 2, Settings(temperature=0.0, upper_temperature=0.0))
+    _, made, began = in_second_act(generator, room)
+    tokens = np.stack([frame.tokens for frame in made[: began - 3]])
+    resumed = room.start(ACTS, 7, past=tokens, prompt=0, began=Begun(0, 0))
+    acts = [room.step()[resumed].act for _ in range(generator.acts(ACTS)[1][0])]
+    assert 0 in acts[:1]
+    assert acts.index(1) + began - 3 <= generator.acts(ACTS)[1][0]  # not a whole first act from here on
+
+
+def test_a_place_that_the_prompt_does_not_have_is_refused(generator: Generator) -> None:
+    room = LiveRoom(generator, 1)
+    for began in (Begun(0, 2), Begun(1, 0), Begun(-1, 0), Begun(0, -1)):
+        with pytest.raises(InvalidInput, match="no place"):
+            room.start(ACTS, 0, began=began)
+        assert len(room) == 0

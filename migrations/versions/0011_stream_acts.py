@@ -1,0 +1,16 @@
+"""Acts of a stream: whoever goes on with it knows which one plays."""
+
+from alembic import op
+
+revision = "0011"
+down_revision = "0008"
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    op.execute("ALTER TABLE stream_chunk ADD COLUMN acts JSONB")
+
+
+def downgrade() -> None:
+    op.execute("ALTER TABLE stream_chunk DROP COLUMN acts")
