@@ -178,7 +178,8 @@ def test_after_a_kill_the_act_that_plays_goes_on_and_none_begins_again(studio: S
     found = acts_of(studio, stream)
     assert found[:3] == [*acts, Begun(turned, 0)]
     assert found[3].act == 1
-    whole(studio, stream)
+    shown = whole(studio, stream)
+    assert turned == next(frame.number for frame in shown if frame.prompt == 1)
 
 
 def test_a_stream_of_a_worker_that_did_not_record_acts_goes_on_with_its_first(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +29,7 @@ class Held:
         read: id of the last message that was read; `obeyed` of the last that is in force.
         acts: those that began, of all prompts; `recorded_acts` of them are written down.
         unwritten: frames that Redis has not got yet.
+        delayed: messages to obey when the frames that another worker showed are drawn again.
         shown: how many frames Redis has got, before and now: no token beyond them is written down.
         recorded: how many frames are written down, with `recorded_prompts` of the prompts.
         ending: why it ends; None while it goes on.
@@ -53,6 +55,7 @@ class Held:
     acts: list[Begun]
     session: int | None = None
     unwritten: list[Frame] = field(default_factory=list[Frame])
+    delayed: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
     state: StreamState = StreamState.LIVE
     recorded_state: StreamState = StreamState.LIVE
     recorded_control: str = ""
@@ -70,6 +73,11 @@ class Held:
     def past(self) -> Tokens | None:
         """(n, V) tokens of every frame so far; None before the first."""
         return np.stack(self.tokens) if self.tokens else None
+
+    @property
+    def behind(self) -> bool:
+        """Whether it plays frames once more that another worker has shown."""
+        return self.state is StreamState.LIVE and len(self.tokens) < self.lease.next_frame
 
     @property
     def playing(self) -> Begun | None:

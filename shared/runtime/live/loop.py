@@ -84,6 +84,9 @@ class LiveLoop:
         self.ticked = self._clock()
         while not self._calls.empty():
             self._calls.get()()
+        for held in list(self._held.values()):
+            while held.delayed and not held.behind:
+                self._guarded(held, held.delayed.pop(0))
         metrics.LIVE_STREAMS.set(len(self._held))
         try:
             began, shown = time.perf_counter(), len(self._held)
@@ -102,11 +105,15 @@ class LiveLoop:
 
     def steer(self, held: Held, prompt: str, text: TextFeatures, control: str) -> None:
         """Another prompt."""
-        self._calls.put(lambda: self._guarded(held, lambda: self._steer(held, prompt, text, control)))
+        self._calls.put(
+            lambda: self._guarded(held, lambda: self._in_turn(held, lambda: self._steer(held, prompt, text, control)))
+        )
 
     def switch(self, held: Held, state: StreamState, control: str) -> None:
         """Pause, or go on."""
-        self._calls.put(lambda: self._guarded(held, lambda: self._switch(held, state, control)))
+        self._calls.put(
+            lambda: self._guarded(held, lambda: self._in_turn(held, lambda: self._switch(held, state, control)))
+        )
 
     def end(self, held: Held, reason: str) -> None:
         """Show one more frame, the last, and end."""
@@ -129,6 +136,14 @@ class LiveLoop:
             if problem is not error:
                 log.exception("stream_failed", stream=str(held.row.id))
             self._close(held, "it could not go on", problem)
+
+    def _in_turn(self, held: Held, message: Callable[[], None]) -> None:
+        """Obey behind the frames that were shown already: what another worker showed under one prompt is not put on
+        record under another."""
+        if held.behind or held.delayed:
+            held.delayed.append(message)
+        else:
+            message()
 
     def _join(self, held: Held) -> None:
         held.session = _entered(self.room, held)
