@@ -116,6 +116,7 @@ class Committer(threading.Thread):
 
     def finish(self, lease: HeldLease, reason: str) -> None:
         """No more outcomes of this lease: items without one go back, at no cost, with `reason`."""
+        lease.hand_over()
         self._inbox.put((lease, _Finish(reason)))
 
     def wait_until_idle(self, timeout: float) -> bool:
@@ -132,6 +133,7 @@ class Committer(threading.Thread):
     def run(self) -> None:
         while (message := self._next()) is not None:
             lease, first = message
+            lease.take_up()
             with lease.work.bound():
                 self._take(lease, first)
             if isinstance(first, _Finish):

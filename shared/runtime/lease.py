@@ -39,6 +39,8 @@ class HeldLease:
         self._moved = True
         self._moved_at = time.monotonic()
         self._exempt = False
+        self._handed_over = False
+        self._taken_up = False
 
     def progress(self, done: int, total: int) -> None:
         """`done` of `total` steps: the batch is alive."""
@@ -71,12 +73,25 @@ class HeldLease:
     def stuck(self, seconds: float) -> bool:
         """Whether nothing is ours any more and the batch has not moved for so long: it will not notice by itself."""
         silent = time.monotonic() - self._moved_at
-        return self._gone >= self._everything and not self._exempt and silent > seconds
+        return self._gone >= self._everything and not self._excused and silent > seconds
 
     def take_progress(self) -> bool:
         """Whether the batch moved since the last call (or need not)."""
-        moved, self._moved = self._moved or self._exempt, False
+        moved, self._moved = self._moved or self._excused, False
         return moved
+
+    def hand_over(self) -> None:
+        """The handler is through. Until `take_up` the batch waits for what is stored before it, and may be silent."""
+        self._handed_over = True
+
+    def take_up(self) -> None:
+        """Its results are being written now: from here on silence counts again."""
+        self._taken_up = True
+        self.progress(0, 0)
+
+    @property
+    def _excused(self) -> bool:
+        return self._exempt or (self._handed_over and not self._taken_up)
 
     def learn(self, answer: Answer) -> None:
         """Take in what the database said."""

@@ -70,7 +70,7 @@ def long_plan(seed: int) -> Plan:
         longest=10.0,
         faults=(30, 30),
         operator_pause=4.0,
-        times={"MAREY_STALL_SECONDS": "15"},
+        times={"MAREY_STALL_SECONDS": "40"},
     )
 
 

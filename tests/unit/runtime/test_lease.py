@@ -177,3 +177,25 @@ def test_only_a_silent_batch_of_which_nothing_is_ours_counts_as_stuck(database: 
     assert not lease.stuck(3600.0)
     lease.exempt()
     assert not lease.stuck(0.0)  # loading is silent for minutes
+
+
+def test_a_batch_that_waits_behind_a_slow_store_is_neither_silent_nor_stuck(
+    database: Database, heartbeat: Heartbeat
+) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    lease.hand_over()
+    heartbeat.beat()
+    heartbeat.beat()
+    lease.take_up()
+    heartbeat.beat()
+    heartbeat.beat()
+    assert [progressed for _, progressed in database.asked] == [True, True, True, False]
+    lease.learn(Answer(lost=True, gone=frozenset()))
+    assert lease.stuck(0.0)
+
+
+def test_what_was_taken_away_while_it_waited_ends_no_child(heartbeat: Heartbeat) -> None:
+    lease = heartbeat.hold(make_claim(1))
+    lease.hand_over()
+    lease.learn(Answer(lost=True, gone=frozenset()))
+    assert not lease.stuck(0.0)
