@@ -20,12 +20,13 @@ from services.api import problems
 from services.api.bodies import BodyGuard, Patience
 from services.api.catalogue import Catalogue
 from services.api.connections import connection_options
-from services.api.context import Context
+from services.api.context import CONNECTIONS, Context
 from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from services.api.evaluations.routes import router as evaluations_router
 from services.api.guards import HostGuard
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
+from services.api.jobs.events import message
 from services.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
 from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
@@ -49,8 +50,6 @@ from shared.tracing import configure_tracing
 from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
-CONNECTIONS = 10
-"""Of one process; with 40 threads at most, a wait for one is short, and Postgres' 200 are for the workers too."""
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams and sockets end at once."""
 ROUTERS = (
@@ -97,8 +96,8 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     if config.webhook_key is not None:
         Vault.of(config)
     url = config.database_url.get_secret_value()
-    engine = create_engine(url, pool_size=CONNECTIONS, max_overflow=CONNECTIONS)
-    tailer = Tailer(engine, url)
+    engine = create_engine(url, pool_size=CONNECTIONS // 2, max_overflow=CONNECTIONS // 2)
+    tailer = Tailer(engine, url, message)
     redis_url = config.streams_url or config.queue_url
     hub = None if redis_url is None else Hub(redis_url.get_secret_value())
     app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), hub)

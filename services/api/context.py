@@ -43,10 +43,18 @@ def context(asked: HTTPConnection) -> Context:
 Shared = Annotated[Context, Depends(context)]
 
 
+CONNECTIONS = 20
+"""Of one process to the database."""
+HELD = 10
+"""Of these, how many routes hold at once; who comes later waits for its turn without a thread. A route keeps its
+connection while it waits for a thread, and its key is looked up on another: if routes could hold them all, sixty
+requests at once would wait for each other until the pool's patience is over."""
+
+
 def connection(shared: Shared) -> Iterator[sa.Connection]:
     """A transaction that lasts as long as the route's function, and commits before the answer is sent."""
     with transaction(shared.engine) as conn:
         yield conn
 
 
-Connection = Annotated[sa.Connection, Depends(connection, scope="function")]
+Connection = Annotated[sa.Connection, Depends(connection, scope="function", max_concurrency=HELD)]

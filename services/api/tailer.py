@@ -7,7 +7,7 @@ import contextlib
 import threading
 import time
 from collections import defaultdict
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from uuid import UUID
 
@@ -16,6 +16,7 @@ import structlog
 
 from shared.errors import NotFound, Unreachable
 from shared.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
+from shared.jobs.states import ENDED
 
 log = structlog.get_logger(__name__)
 
@@ -28,8 +29,16 @@ QUEUE_LIMIT = 1000
 """Batches a slow client may lag behind before its stream is closed; it comes back with Last-Event-ID."""
 PROGRESS = "progress"
 
-Batch = list[EventRow]
 CLOSED = None
+
+
+@dataclass(frozen=True)
+class Batch:
+    """New events of one job for all who stand where they begin: put into words once, not once a client."""
+
+    wire: bytes
+    last: bool
+    """Nothing follows: the job has ended."""
 
 
 @dataclass(eq=False)
@@ -44,11 +53,7 @@ class Subscription:
     queue: asyncio.Queue[Batch | None] = field(default_factory=lambda: asyncio.Queue(QUEUE_LIMIT))
 
     def put(self, batch: Batch | None) -> None:
-        """From any thread."""
-        with contextlib.suppress(RuntimeError):  # the loop is closed: so is the stream
-            self.loop.call_soon_threadsafe(self._put, batch)
-
-    def _put(self, batch: Batch | None) -> None:
+        """On its own loop."""
         if self.queue.full():
             self.queue.get_nowait()
             batch = CLOSED
@@ -58,9 +63,11 @@ class Subscription:
 class Tailer:
     """Reads the new events of the jobs that somebody follows, once for all who do."""
 
-    def __init__(self, engine: sa.Engine, url: str) -> None:
+    def __init__(self, engine: sa.Engine, url: str, words: Callable[[EventRow], bytes]) -> None:
+        """`words`: an event as its streams send it."""
         self._engine = engine
         self._url = url
+        self._words = words
         self._lock = threading.Lock()
         self._subscriptions: dict[UUID, set[Subscription]] = defaultdict(set)
         self._due: dict[UUID, float] = {}
@@ -77,8 +84,7 @@ class Tailer:
         """Close every stream and stop."""
         self._stopping.set()
         with self._lock:
-            for subscription in (s for all_of_job in self._subscriptions.values() for s in all_of_job):
-                subscription.put(CLOSED)
+            _tell((s, CLOSED) for all_of_job in self._subscriptions.values() for s in all_of_job)
         self._thread.join(timeout=5)
 
     @contextlib.asynccontextmanager
@@ -154,9 +160,7 @@ class Tailer:
             return
         with transaction(self._engine) as conn:
             valid = keys_still_valid(conn, {follower.key for follower in followers})
-        for follower in followers:
-            if follower.key not in valid:
-                follower.put(CLOSED)
+        _tell((follower, CLOSED) for follower in followers if follower.key not in valid)
 
     def _feed(self, job: UUID) -> None:
         with self._lock:
@@ -170,14 +174,34 @@ class Tailer:
                 while page := events_after(conn, followers[0].tenant, job, events[-1].seq if events else seq):
                     events.extend(page)
         except NotFound:  # deleted
-            for follower in followers:
-                follower.put(CLOSED)
+            _tell((follower, CLOSED) for follower in followers)
             return
-        for follower in followers:
-            new = [event for event in events if event.seq > follower.seq]
-            if new:
-                follower.seq = new[-1].seq
-                follower.put(last_progress_only(new))
+        if not events:
+            return
+        batches: dict[int, Batch] = {}
+        behind = [follower for follower in followers if follower.seq < events[-1].seq]
+        for seq in {follower.seq for follower in behind}:
+            new = last_progress_only([event for event in events if event.seq > seq])
+            wire = b"".join(map(self._words, new))
+            batches[seq] = Batch(wire, last=new[-1].data.get("state") in ENDED)
+        _tell([(follower, batches[follower.seq]) for follower in behind])
+        for follower in behind:
+            follower.seq = events[-1].seq
+
+
+def _tell(told: Iterable[tuple[Subscription, Batch | None]]) -> None:
+    """Hand over to the loops of the streams, each woken once however many of its streams are told."""
+    by_loop: dict[asyncio.AbstractEventLoop, list[tuple[Subscription, Batch | None]]] = defaultdict(list)
+    for subscription, batch in told:
+        by_loop[subscription.loop].append((subscription, batch))
+    for loop, pairs in by_loop.items():
+        with contextlib.suppress(RuntimeError):  # the loop is closed: so are its streams
+            loop.call_soon_threadsafe(_put_all, pairs)
+
+
+def _put_all(pairs: list[tuple[Subscription, Batch | None]]) -> None:
+    for subscription, batch in pairs:
+        subscription.put(batch)
 
 
 def last_progress_only(events: list[EventRow]) -> list[EventRow]:

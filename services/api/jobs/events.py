@@ -12,7 +12,6 @@ from services.api.jobs.schemas import EventView
 from services.api.tailer import Tailer
 from shared.errors import InvalidInput
 from shared.jobs import ApiKey, EventRow
-from shared.jobs.states import ENDED
 
 PING_SECONDS = 15.0
 RETRY_MILLISECONDS = 1000
@@ -38,15 +37,15 @@ async def stream_events(tailer: Tailer, key: ApiKey, job: UUID, seq: int) -> Asy
     async with tailer.follow(key, job, seq) as subscription:
         while True:
             try:
-                batch = await asyncio.wait_for(subscription.queue.get(), PING_SECONDS)
+                async with asyncio.timeout(PING_SECONDS):
+                    batch = await subscription.queue.get()
             except TimeoutError:
                 yield KEEPALIVE_COMMENT
                 continue
             if batch is None:
                 return
-            for event in batch:
-                yield message(event)
-            if batch[-1].data.get("state") in ENDED:
+            yield batch.wire
+            if batch.last:
                 return
 
 
