@@ -70,7 +70,9 @@ def with_defaults(
     variants: int | None = None,
     fps: float | None = None,
 ) -> list[Item]:  # fmt: skip
-    """The items with the options of the command where an item itself says nothing; checked anew."""
+    """The items with the options of the command where an item itself says nothing; checked anew if any was given."""
+    if (model, seconds, seed, variants, fps) == (None,) * 5:
+        return list(items)
     changed = [
         replace(
             item,
