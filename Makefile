@@ -10,7 +10,7 @@ TORCH  := torch==2.13.0
 PARALLEL := -n 2 --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all chaos lint check-deploy format bench lock clean
+.PHONY: help setup demo test test-all chaos soak lint check-deploy format bench lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -38,6 +38,9 @@ chaos: $(STAMP) ## 10,000 items twice, whatever is killed; prints how long recov
 	rm -rf out/chaos
 	MAREY_CHAOS_REPORTS=out/chaos $(BIN)/pytest -q -m '' tests/chaos
 	$(BIN)/python -m tests.chaos.figures out/chaos
+
+soak: $(STAMP) ## Steady load for SOAK_MINUTES (15), and whether memory, descriptors or connections grow
+	$(BIN)/python -m benchmarks.soak
 
 lint: $(STAMP) ## ruff, basedpyright, import-linter
 	$(BIN)/ruff check .

@@ -1,4 +1,5 @@
-"""The queue's SQL on a real Postgres, with fsync: submitting 10,000 prompts, and claims where much or little waits."""
+"""The queue's SQL on a real Postgres, with fsync: submitting 10,000 prompts, claims where much or little waits, in one
+job or many, of one tenant or many, and the plan of a claim."""
 
 from __future__ import annotations
 
@@ -13,14 +14,34 @@ from uuid import uuid4
 import sqlalchemy as sa
 
 from benchmarks.harness import measure, table
-from shared.jobs import NewItem, NewJob, claim, create_engine, release, schema, submit, transaction, upgrade
+from shared.jobs import (
+    NewItem,
+    NewJob,
+    claim,
+    create_engine,
+    create_tenant,
+    release,
+    schema,
+    submit,
+    transaction,
+    upgrade,
+)
+from shared.jobs.claim import LANES, LANES_TRIED, TAKE
 from shared.jobs.ids import new_id
 from shared.runtime.embedded import EmbeddedServer, start_postgres
 
 PROMPTS = 10_000
 CLAIMS = 400
 BATCH = 32
-DEPTHS = {"100 items in 1 job": (1, 100), "100,000 items in 1 job": (1, 100_000), "100,000 in 1,000": (1000, 100)}
+DEPTHS = {
+    "100 items in 1 job": (1, 100, 1),
+    "100,000 items in 1 job": (1, 100_000, 1),
+    "100,000 in 1,000 jobs": (1000, 100, 1),
+    "100,000 in 100 jobs of 100 tenants": (100, 1000, 100),
+    "100,000 in 1,000 jobs of 100 tenants": (1000, 100, 100),
+}
+"""Jobs, items of each, tenants."""
+PLANNED = "100,000 in 1,000 jobs of 100 tenants"
 
 
 def main() -> None:
@@ -29,7 +50,9 @@ def main() -> None:
     try:
         with start_postgres(home) as server:
             _submits(_database(server, "submits"))
-            _claims({name: _filled(server, index, *depth) for index, (name, depth) in enumerate(DEPTHS.items())})
+            engines = {name: _filled(server, index, *depth) for index, (name, depth) in enumerate(DEPTHS.items())}
+            _claims(engines)
+            _plans(engines[PLANNED])
     finally:
         shutil.rmtree(home, ignore_errors=True)
 
@@ -50,7 +73,7 @@ def _submits(engine: sa.Engine) -> None:
         {f"submit() of {PROMPTS:,} prompts": by_submit, "bulk INSERT of as many rows": by_inserts},
         repeats=7,
         warm_up=1,
-        seconds=60,
+        seconds=25,
     )
     print(table("Submitting", timings, baseline="bulk INSERT of as many rows"))
 
@@ -78,6 +101,22 @@ def _claims(engines: dict[str, sa.Engine]) -> None:
         print(f"| {name} | {median * 1e3:.2f} ms | {p95 * 1e3:.2f} ms | {p95 / least:.2f} |")
 
 
+def _plans(engine: sa.Engine) -> None:
+    """How Postgres goes about the two statements of a claim; nothing is taken."""
+    with transaction(engine) as conn:
+        choosing = {"queue": "hgm3", "tried": LANES_TRIED, "prefer": None}
+        lane = conn.execute(LANES, choosing).first()
+        assert lane is not None
+        taking = {"job": lane.job_id, "queue": "hgm3", "batch_key": lane.batch_key, "solo": False, "limit": BATCH}
+        lease = {"token": new_id(), "worker": "bench", "seconds": 10.0}
+        for name, query, values in (("lane", LANES, choosing), (f"items, {BATCH}", TAKE, {**taking, **lease})):
+            print(f"\nThe {name}: EXPLAIN (ANALYZE, BUFFERS)\n\n```")
+            plan = conn.execute(sa.text(f"EXPLAIN (ANALYZE, BUFFERS, TIMING OFF) {query.text}"), values)
+            print("\n".join(plan.scalars()))
+            print("```")
+        conn.rollback()
+
+
 def _database(server: EmbeddedServer, name: str) -> sa.Engine:
     home = create_engine(server.url)
     with home.connect().execution_options(isolation_level="AUTOCOMMIT") as conn:
@@ -88,14 +127,16 @@ def _database(server: EmbeddedServer, name: str) -> sa.Engine:
     return engine
 
 
-def _filled(server: EmbeddedServer, index: int, jobs: int, items: int) -> sa.Engine:
-    """A database with so many jobs of so many items, their texts parsed."""
+def _filled(server: EmbeddedServer, index: int, jobs: int, items: int, tenants: int) -> sa.Engine:
+    """A database with so many jobs of so many items, of so many tenants in turns, their texts parsed."""
     engine = _database(server, f"claims_{index}")
     with transaction(engine) as conn:
         conn.execute(sa.insert(schema.text_features).values(key="known", blob=b""))
-    for _ in range(jobs):
+        for number in range(tenants):
+            create_tenant(conn, f"tenant-{number}")
+    for number in range(jobs):
         with transaction(engine) as conn:
-            submit(conn, NewJob(_items(items, text_key="known")))
+            submit(conn, NewJob(_items(items, text_key="known"), tenant=f"tenant-{number % tenants}"))
     with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as conn:
         conn.execute(sa.text("ANALYZE"))
     return engine

@@ -1,0 +1,151 @@
+"""The real processes of the platform on a home of their own, with a model that does nothing: API, scheduler, workers,
+Postgres and Valkey."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import urllib.error
+import urllib.request
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from services.cli.client import Client
+from services.cli.place import Server
+from shared.bundles import BundleWriter, TextSpec
+from shared.jobs import create_key, transaction
+from shared.settings import Settings
+from tests.chaos.driver import REPOSITORY, Cluster
+from tests.support.toy import QUEUE, REFERENCE, TEXT_REFERENCE
+
+BUNDLE = "toy-nothing"
+WORKER_QUEUES = f"{QUEUE},text"
+WORKER_HANDLERS = f"{REFERENCE},{TEXT_REFERENCE}"
+
+
+class Platform(Cluster):
+    """A cluster that also has an API, a key and a bundle whose queue the toy workers serve."""
+
+    def __init__(self, home: Path, environment: Mapping[str, str]) -> None:
+        models = home / "models"
+        self.port = _free_port()
+        self.environment = {
+            "MAREY_MODELS": str(models),
+            "MAREY_STORE": str(home / "assets"),
+            "MAREY_LOG_LEVEL": "WARNING",
+            "MAREY_PORT": str(self.port),
+            **environment,
+        }
+        super().__init__(home, self.environment)
+        _write_bundle(models)
+        with transaction(self.engine) as conn:
+            self.key = create_key(conn, "benchmark", ["admin"]).secret
+        self.url = f"http://127.0.0.1:{self.port}"
+
+    def start_api(self) -> psutil.Process:
+        """Start `marey api` and wait until it answers."""
+        self.start_command("api", "api")
+        self.wait(self._answers, "the API answers")
+        return self.process("api")
+
+    def start_command(self, name: str, *arguments: str) -> None:
+        """Start `marey ARGUMENTS…` as the process `name`."""
+        with (self.home / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen(
+                marey(*arguments), cwd=REPOSITORY, env=self.command_environment(), stdout=log, stderr=log
+            )
+
+    def start_toys(self, name: str) -> None:
+        """Start a worker that serves texts and the model that does nothing."""
+        self.start_worker(name, queue=WORKER_QUEUES, reference=WORKER_HANDLERS)
+
+    def command_environment(self) -> dict[str, str]:
+        """The environment of a command that talks to this platform."""
+        return {**self._environment, "MAREY_SERVER": self.url, "MAREY_KEY": self.key}
+
+    def settings(self) -> Settings:
+        """The settings of its processes."""
+        return Settings.model_validate(
+            {
+                "home": self.home,
+                "models": self.home / "models",
+                "store": str(self.home / "assets"),
+                "database_url": self.postgres.url,
+                "queue_url": self.valkey.url,
+            }
+        )
+
+    def client(self) -> Client:
+        """The command line's client."""
+        return Client(Server(self.url, self.key))
+
+    def process(self, name: str) -> psutil.Process:
+        """A process of it by name."""
+        return psutil.Process(self.processes[name].pid)
+
+    def _answers(self) -> bool:
+        try:
+            with urllib.request.urlopen(f"{self.url}/livez", timeout=2) as response:
+                return response.status == 200
+        except (urllib.error.URLError, OSError):
+            return False
+
+
+@contextmanager
+def platform(**environment: str) -> Iterator[Platform]:
+    """A platform with nothing started but Postgres and Valkey; all of it is gone after the block."""
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    try:
+        made = Platform(home, environment)
+        with made:
+            yield made
+    finally:
+        shutil.rmtree(home, ignore_errors=True)
+
+
+def marey(*arguments: str) -> list[str]:
+    """The command line of `marey`."""
+    return [sys.executable, "-m", "services.cli", *arguments]
+
+
+def peak_megabytes(process: int) -> float:
+    """The most memory a process has had resident (VmHWM), MB."""
+    for line in Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) / 1024
+    return 0.0  # it has just ended
+
+
+def forget_peak(process: int) -> None:
+    """Let `peak_megabytes` count from here."""
+    Path(f"/proc/{process}/clear_refs").write_text("5", encoding="ascii")
+
+
+def _write_bundle(models: Path) -> None:
+    """A generator's bundle for the queue of the toy; nothing loads it."""
+    with BundleWriter(models / BUNDLE) as writer:
+        writer.add_part("masked", {"w": np.zeros(3, np.float32)})
+        writer.finish(
+            name=BUNDLE,
+            version="1",
+            kind="generator",
+            model=QUEUE,
+            config="tiny",
+            parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 1}},
+            fps=20.0,
+            licence="MIT",
+            text=TextSpec(labeller="none", encoder_sha256="0" * 64),
+        )
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
