@@ -74,7 +74,7 @@ class Reader:
 def main() -> None:
     """Print both tables."""
     with platform() as cluster:
-        server = cluster.start_api()
+        server = cluster.serve()
         print("| clients | all connected | median | 99th | last | CPU a change | memory a client | connections |")
         print("|---|---|---|---|---|---|---|---|")
         for count in CLIENTS:

@@ -42,7 +42,7 @@ REPEATS = 3
 def main() -> None:
     """Print files a second, and processor time."""
     with platform() as cluster:
-        api = cluster.start_api()
+        api = cluster.serve()
         with cluster.client() as client:
             job = client.submit([{"prompt": f"walk {n} steps", "model": BUNDLE} for n in range(MOTIONS)])["id"]
             _make(cluster)

@@ -36,7 +36,7 @@ class Run:
 def main() -> None:
     """Print the table."""
     with platform() as cluster:
-        api = cluster.start_api()
+        api = cluster.serve()
         _submit(cluster, api, 100)  # imports, pools and plans
         before, limit = peak_megabytes(api.pid), MAX_BODY_BYTES // 2**20
         print(f"At most {MAX_ITEMS:,} items and {limit} MiB a request; the API before: {before:.0f} MB\n")

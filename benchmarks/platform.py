@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import shutil
 import socket
-import subprocess
 import sys
 import tempfile
 import urllib.error
@@ -22,7 +21,7 @@ from services.cli.place import Server
 from shared.bundles import BundleWriter, TextSpec
 from shared.jobs import create_key, transaction
 from shared.settings import Settings
-from tests.chaos.driver import REPOSITORY, Cluster
+from tests.chaos.driver import Cluster
 from tests.support.toy import QUEUE, REFERENCE, TEXT_REFERENCE
 
 BUNDLE = "toy-nothing"
@@ -49,18 +48,11 @@ class Platform(Cluster):
             self.key = create_key(conn, "benchmark", ["admin"]).secret
         self.url = f"http://127.0.0.1:{self.port}"
 
-    def start_api(self) -> psutil.Process:
-        """Start `marey api` and wait until it answers."""
-        self.start_command("api", "api")
+    def serve(self) -> psutil.Process:
+        """Start the API and wait until it answers."""
+        self.start_api()
         self.wait(self._answers, "the API answers")
         return self.process("api")
-
-    def start_command(self, name: str, *arguments: str) -> None:
-        """Start `marey ARGUMENTS…` as the process `name`."""
-        with (self.home / f"{name}.log").open("ab") as log:
-            self.processes[name] = subprocess.Popen(
-                marey(*arguments), cwd=REPOSITORY, env=self.command_environment(), stdout=log, stderr=log
-            )
 
     def start_toys(self, name: str) -> None:
         """Start a worker that serves texts and the model that does nothing."""

@@ -54,7 +54,7 @@ def main() -> None:
     """Print what was done, and the table of slopes."""
     extra = {"MAREY_WEBHOOK_KEY": Fernet.generate_key().decode(), "MAREY_WEBHOOK_ALLOW": '["127.0.0.0/8"]'}
     with platform(**extra) as cluster, Receiver() as receiver:
-        cluster.start_api()
+        cluster.serve()
         cluster.start_scheduler()
         for name in ("worker-1", "worker-2"):
             cluster.start_toys(name)
