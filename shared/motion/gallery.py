@@ -6,7 +6,6 @@ itself: it shows the commands that do.
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from urllib.parse import quote
 from shared.errors import InvalidInput
 from shared.motion.clip import MotionClip
 from shared.motion.files import write_atomically
-from shared.motion.pages import asset, code_hashes, fill, script_json
+from shared.motion.pages import asset, fill, script_json, whole_page
 from shared.motion.paper import one_line
 from shared.motion.player import motion_document
 
@@ -84,11 +83,9 @@ def html_gallery(
             for card in cards
         ],
     }
-    page = fill(
+    body = fill(
         asset("gallery.html"),
         {
-            "%TITLE%": html.escape(f"{one_line(title)} · Marey"),
-            "%STYLE%": asset("page.css") + asset("small_players.css") + asset("gallery.css"),
             "%CARDS%": script_json(document),
             "%MOTION%": script_json(motion_document([card.clip for card in cards], [""] * len(cards))),
             "%LICENCE%": asset("three.LICENSE.txt"),
@@ -99,9 +96,6 @@ def html_gallery(
             "%PLAYERS%": asset("small_players.js"),
         },
     )
-    # The marks of the policy are filled last, for the policy holds hashes of the rest.
-    policy = "; ".join(
-        ("default-src 'none'", *code_hashes(page), "img-src data:", "base-uri 'none'", "form-action 'none'")
-    )
-    write_atomically(path, fill(page, {"%POLICY%": policy}).encode())
+    styles = (asset("small_players.css"), asset("gallery.css"))
+    write_atomically(path, whole_page(body, title=f"{one_line(title)} · Marey", styles=styles).encode())
     return path

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from shared.motion.body import dress
-from shared.motion.pages import asset, body_document, code_hashes, fill, script_json, style
+from shared.motion.pages import asset, body_document, code_hashes, fill, script_json, whole_page
 from shared.motion.skeleton import HUMANML3D
 
 SKELETONS = (HUMANML3D,)
@@ -58,7 +58,6 @@ class LivePage:
 def live_page() -> LivePage:
     """The page, put together once a process."""
     parts = {
-        "%STYLE%": style("live.css"),
         "%BODIES%": script_json([{"names": s.joint_names, **body_document(s, dress(s))} for s in SKELETONS]),
         "%LICENCE%": asset("three.LICENSE.txt"),
         "%THREE%": asset("three.min.js"),
@@ -68,6 +67,7 @@ def live_page() -> LivePage:
         "%VIEW%": asset("live_view.js"),
         "%LIVE%": asset("live.js"),
     }
-    page = fill(asset("live.html"), parts)
+    body = fill(asset("live.html"), parts)
+    page = whole_page(body, title="Marey live", styles=[asset("live.css")], sealed=False)
     content = page.encode()
     return LivePage(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', code_hashes(page))

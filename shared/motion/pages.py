@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import html
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 
 from shared.motion.body import Body
 from shared.motion.skeleton import Skeleton
 
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_POLICY = '\n<meta http-equiv="Content-Security-Policy" content="{policy}">'
 _STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 
 
@@ -37,9 +39,28 @@ def fill(template: str, parts: Mapping[str, str]) -> str:
     return "".join([*pieces, template])
 
 
-def style(name: str) -> str:
-    """A page's own style behind the one that all share."""
-    return asset("page.css") + asset(name)
+def whole_page(body: str, *, title: str, styles: Sequence[str], theme: str = "auto", sealed: bool = True) -> str:
+    """A page: the head that all share around a body.
+
+    Args:
+        body: its `<body>` element, with scripts.
+        title: one line of plain text.
+        styles: its own, behind the one that all share.
+        theme: `auto` (as the browser asks), `light` or `dark`.
+        sealed: by a content security policy of its own, it runs its own scripts and styles and fetches nothing. Else
+            whoever serves it sends one.
+    """
+    page = fill(
+        asset("page.html"),
+        {
+            "%THEME%": theme,
+            "%TITLE%": html.escape(title),
+            "%STYLE%": "".join([asset("page.css"), *styles]),
+            "%BODY%": body,
+        },
+    )
+    # Last, for it holds hashes of the rest.
+    return fill(page, {"%POLICY%": _POLICY.format(policy=_policy(page)) if sealed else ""})
 
 
 def script_json(value: object) -> str:
@@ -55,6 +76,12 @@ def code_hashes(page: str) -> tuple[str, str]:
     return (
         " ".join(["script-src", *(_hash(script) for script in _SCRIPT.findall(page))]),
         " ".join(["style-src", *(_hash(text) for text in _STYLE.findall(page))]),
+    )
+
+
+def _policy(page: str) -> str:
+    return "; ".join(
+        ("default-src 'none'", *code_hashes(page), "img-src data:", "base-uri 'none'", "form-action 'none'")
     )
 
 

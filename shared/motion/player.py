@@ -8,7 +8,6 @@ forbids the page to fetch anything. Every text is escaped: a prompt is data, wha
 from __future__ import annotations
 
 import base64
-import html
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,7 +19,7 @@ from shared.errors import InvalidInput
 from shared.motion.body import dress_clip
 from shared.motion.clip import MotionClip
 from shared.motion.files import write_atomically
-from shared.motion.pages import asset, body_document, fill, script_json, style
+from shared.motion.pages import asset, body_document, fill, script_json, whole_page
 from shared.motion.paper import one_line
 from shared.motion.render import caption_of, facts_of
 
@@ -68,9 +67,6 @@ def html_player(
 
 def _page(document: dict[str, object], title: str, theme: str) -> str:
     parts = {
-        "%THEME%": theme,
-        "%TITLE%": html.escape(title),
-        "%STYLE%": style("player.css"),
         "%MOTION%": script_json(document),
         "%LICENCE%": asset("three.LICENSE.txt"),
         "%THREE%": asset("three.min.js"),
@@ -78,7 +74,8 @@ def _page(document: dict[str, object], title: str, theme: str) -> str:
         "%CLIP%": asset("clip.js"),
         "%PLAYER%": asset("player.js"),
     }
-    return fill(asset("player.html"), parts)
+    body = fill(asset("player.html"), parts)
+    return whole_page(body, title=title, styles=[asset("player.css")], theme=theme)
 
 
 def motion_document(clips: Sequence[MotionClip], captions: Sequence[str]) -> dict[str, object]:

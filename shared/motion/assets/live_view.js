@@ -28,7 +28,7 @@ const MareyView = (() => {
       this.options = { follow: true, trail: true, axes: false };
       this.trail = this.stage.line(THREE.Line, new Array(3 * TRAIL).fill(0), 0.8);
       this.clearTrail();
-      this.themeName = this.stage.wantedTheme();
+      this.themeName = document.documentElement.dataset.theme;
       this.resize(0); // before the camera is put somewhere: how far depends on the window
       this.wear(bodies[0]);
       for (const option of Object.keys(this.options)) $(option).onclick = () => this.toggle(option);

@@ -193,7 +193,7 @@
 
   // #clip=2&t=1.5&paused opens at that moment.
   const hash = new URLSearchParams(location.hash.slice(1));
-  state.theme = stage.wantedTheme();
+  state.theme = document.documentElement.dataset.theme;
   resize();
   select(Number(hash.get("clip") ?? 0) || 0);
   theme(state.theme);

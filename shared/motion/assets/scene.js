@@ -207,12 +207,6 @@ const MareyScene = (() => {
       return line;
     }
 
-    // The theme that the page was written with, or the one the browser asks for.
-    wantedTheme() {
-      const wanted = document.documentElement.dataset.theme;
-      return wanted !== "auto" ? wanted : matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-    }
-
     // Paint all but the figure; gives the palette, for that.
     theme(name) {
       document.documentElement.dataset.theme = name;

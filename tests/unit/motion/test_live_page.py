@@ -70,7 +70,7 @@ def test_its_policy_names_each_script_and_its_style_and_nothing_else(elements: E
         return [f"'sha256-{base64.b64encode(hashlib.sha256(t.encode()).digest()).decode()}'" for t in texts]
 
     scripts = elements.texts("script")
-    assert len(scripts) == 6
+    assert len(scripts) == 7
     assert policy["script-src"].split() == hashes(scripts)
     assert policy["style-src"].split() == hashes(elements.texts("style"))
     assert policy["default-src"] == "'none'"

@@ -6,10 +6,11 @@ hashes and lets it fetch nothing; every text is escaped: a prompt is data, whate
 
 from __future__ import annotations
 
-from shared.motion.pages import asset, code_hashes, fill, script_json
+from shared.motion.pages import asset, fill, script_json, whole_page
+from shared.motion.paper import one_line
 from shared.motion.player import motion_document
 from workers.evaluator.report.exhibits import clips_of, exhibits
-from workers.evaluator.report.markup import Markup, element, join, text
+from workers.evaluator.report.markup import Markup, element, join
 from workers.evaluator.report.model import Report
 from workers.evaluator.report.sections import heat, numbers, repeat, speed, top, verdict
 from workers.evaluator.report.trends import trends
@@ -24,20 +25,9 @@ def to_html(report: Report) -> bytes:
     """
     parts = (top(report), verdict(report), numbers(report), heat(report))
     main = join(*parts, exhibits(report), trends(report), speed(report), repeat(report))
-    page = fill(
-        asset("report.html", PACKAGE),
-        {
-            "%TITLE%": text(f"{report.title} · Marey"),
-            "%STYLE%": asset("page.css") + asset("small_players.css") + asset("report.css", PACKAGE),
-            "%REPORT%": main,
-            "%SCRIPTS%": _scripts(report),
-        },
-    )
-    # The marks of the policy are filled last, for the policy holds hashes of the rest.
-    policy = "; ".join(
-        ("default-src 'none'", *code_hashes(page), "img-src data:", "base-uri 'none'", "form-action 'none'")
-    )
-    return fill(page, {"%POLICY%": policy}).encode()
+    body = fill(asset("report.html", PACKAGE), {"%REPORT%": main, "%SCRIPTS%": _scripts(report)})
+    styles = (asset("small_players.css"), asset("report.css", PACKAGE))
+    return whole_page(body, title=one_line(f"{report.title} · Marey"), styles=styles).encode()
 
 
 def _scripts(report: Report) -> Markup:
