@@ -191,8 +191,11 @@ def test_a_schedule_is_made_in_its_short_form_and_lived_with(place: Studio, mare
     ).ok()  # fmt: skip
     schedule = said.out.strip()
     assert "first at 20" in said.err
-    long = marey("eval", "schedule", "add", MONDAYS, "--bundle", GENERATOR, "--json").ok().lines[0]
-    assert (long["cron"], long["request"]["source"]) == (MONDAYS, "test")
+    long = marey("eval", "schedule", "add", MONDAYS, "--bundle", GENERATOR, "--regenerate", "--json").ok().lines[0]
+    assert (long["cron"], long["request"]["source"], long["request"]["repeats"]) == (MONDAYS, "test", 20)
+    marey("eval", "schedule", MONDAYS, "--bundle", GENERATOR, "--regenerate", "--repeats", 3).refused(
+        2, "means --repeats 20", "Give one of the two."
+    )
     (line,) = [each for each in marey("eval", "schedule", "list").ok().out.splitlines() if schedule in each]
     assert line.split("\t")[1:4] == ["weekly", MONDAYS, "Europe/Berlin"]
     assert "paused" in marey("eval", "schedule", "pause", schedule).ok().err

@@ -59,6 +59,11 @@ class EvaluatorConfig(ModelConfig):
         if (known.dim, known.fps) != (self.features, self.fps) or not 0 < self.inputs <= self.features:
             raise InvalidInput(f"does not fit {self.layout}: {known.dim} numbers at {known.fps:g} fps", where="layout")
 
+    @property
+    def width(self) -> int:
+        """E, numbers of an embedding."""
+        return self.network.width
+
 
 PAPER = EvaluatorConfig()
 

@@ -85,7 +85,7 @@ class MotionEncoder(nn.Module):
     def __init__(self, config: EvaluatorConfig) -> None:
         super().__init__()
         self.inputs, self.frames = config.inputs, config.frames_per_token
-        self.width = config.network.width
+        self.width = config.width
         self.register_buffer("mean", torch.zeros(config.features))
         self.register_buffer("std", torch.ones(config.features))
         longest = -(-config.max_frames // self.frames)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import torch
 from torch import nn
@@ -16,17 +16,48 @@ KIND = "evaluator"
 
 
 class Readable(Protocol):
-    """A configuration that says what motions its networks read."""
+    """A configuration that says what motions its networks read, and how wide embeddings are."""
 
     @property
     def layout(self) -> str: ...
     @property
     def fps(self) -> float: ...
+    @property
+    def width(self) -> int: ...
 
 
 C = TypeVar("C", bound=Readable)
 M = TypeVar("M", bound=nn.Module)
 T = TypeVar("T", bound=nn.Module)
+
+
+class Loaded(Generic[C, M, T]):
+    """What `Evaluator` says of a bundle, with its two encoders where they run."""
+
+    def __init__(self, bundle: Bundle, config: C, motion: M, text: T, device: torch.device) -> None:
+        """Move the encoders to the device."""
+        self.bundle, self.config, self.device = bundle, config, device
+        self.motion, self.text = motion.to(device), text.to(device)
+
+    @property
+    def name(self) -> str:
+        """See `Evaluator`."""
+        return self.bundle.reference
+
+    @property
+    def layout(self) -> str:
+        """See `Evaluator`."""
+        return self.config.layout
+
+    @property
+    def fps(self) -> float:
+        """See `Evaluator`."""
+        return self.config.fps
+
+    @property
+    def width(self) -> int:
+        """See `Evaluator`."""
+        return self.config.width
 
 
 def open_networks(

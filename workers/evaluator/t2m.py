@@ -19,7 +19,7 @@ from shared.bundles import Bundle
 from shared.errors import InvalidBundle, InvalidInput
 from shared.nn.devices import choose_device
 from workers.evaluator.metrics.retrieval import Distance
-from workers.evaluator.networks import open_networks
+from workers.evaluator.networks import Loaded, open_networks
 from workers.evaluator.port import Embeddings, Motion, check_motions
 from workers.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
 from workers.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
@@ -29,7 +29,7 @@ WORDS_FILE, WORDS_PART = "words.json", "words"
 BATCH = 32
 
 
-class T2MEvaluator:
+class T2MEvaluator(Loaded[T2MConfig, MotionEncoder, TextEncoder]):
     """A loaded bundle, as `workers.evaluator.t2m_import` writes it. Not thread-safe."""
 
     distance: Distance = "euclidean"
@@ -45,8 +45,7 @@ class T2MEvaluator:
         tagger: Tagger | None,
     ) -> None:
         """Put an evaluator together; most callers want `load`."""
-        self.bundle, self.config, self.device = bundle, config, device
-        self.motion, self.text = motion.to(device), text.to(device)
+        super().__init__(bundle, config, motion, text, device)
         self.words, self.tagger = words, tagger
 
     @classmethod
@@ -64,26 +63,6 @@ class T2MEvaluator:
         """
         config, motion, text = open_networks(bundle, MODEL, T2MConfig.from_dict, MotionEncoder, TextEncoder)
         return cls(bundle, config, motion, text, _words(bundle, config), choose_device(device), tagger)
-
-    @property
-    def name(self) -> str:
-        """See `Evaluator`."""
-        return self.bundle.reference
-
-    @property
-    def layout(self) -> str:
-        """See `Evaluator`."""
-        return self.config.layout
-
-    @property
-    def fps(self) -> float:
-        """See `Evaluator`."""
-        return self.config.fps
-
-    @property
-    def width(self) -> int:
-        """See `Evaluator`."""
-        return self.config.width
 
     @torch.inference_mode()
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:

@@ -17,13 +17,14 @@ from workers.evaluator.bundle import load_networks
 from workers.evaluator.config import EvaluatorConfig
 from workers.evaluator.metrics.retrieval import Distance
 from workers.evaluator.model import MotionEncoder, SentenceEncoder
+from workers.evaluator.networks import Loaded
 from workers.evaluator.port import Embeddings, Motion, check_motions
 from workers.evaluator.sentences import check_encoder, open_encoder, padded, token_states
 
 BATCH = 64
 
 
-class TMREvaluator:
+class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
     """A loaded bundle. Not thread-safe.
 
     On a CPU matrices are packed, and an embedding has the same bits whatever stands beside it in a batch.
@@ -41,9 +42,8 @@ class TMREvaluator:
         device: torch.device,
     ) -> None:
         """Put an evaluator together; most callers want `load`."""
-        self.bundle, self.config, self.device = bundle, config, device
+        super().__init__(bundle, config, motion, text, device)
         self.encoder = encoder
-        self.motion, self.text = motion.to(device), text.to(device)
         self.motion.encoder.pack()
         self.text.encoder.pack()
 
@@ -67,26 +67,6 @@ class TMREvaluator:
             raise InvalidBundle("does not say which text encoder it was trained with", where=str(bundle.path))
         encoder = open_encoder(spec) if encoder is None else check_encoder(spec, encoder)
         return cls(bundle, config, motion, text, encoder, choose_device(device))
-
-    @property
-    def name(self) -> str:
-        """See `Evaluator`."""
-        return self.bundle.reference
-
-    @property
-    def layout(self) -> str:
-        """See `Evaluator`."""
-        return self.config.layout
-
-    @property
-    def fps(self) -> float:
-        """See `Evaluator`."""
-        return self.config.fps
-
-    @property
-    def width(self) -> int:
-        """See `Evaluator`."""
-        return self.config.network.width
 
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
         """See `Evaluator`; motions of 16 to 196 frames at 20 fps, or what the configuration says."""

@@ -41,6 +41,7 @@ def add(
     evaluator: evaluating.Evaluator = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
+    regenerate: evaluating.Regenerate = False,
     seed: evaluating.Seed = None,
     baseline: evaluating.Baseline = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the schedule and its runs.")] = None,
@@ -48,6 +49,7 @@ def add(
     as_json: console.Json = False,
 ) -> None:
     """Measure a model again and again; prints the schedule's id. Each run looks up the bundles by the names given."""
+    repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
     body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
     from services.cli.client import Client
