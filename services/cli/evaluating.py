@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -192,9 +193,9 @@ def _settings(given: Sequence[str]) -> dict[str, float]:
     for text in given:
         name, equals, value = text.partition("=")
         try:
-            if not equals:
-                raise ValueError
             number = float(value)
+            if not equals or not math.isfinite(number):
+                raise ValueError
         except ValueError:
             raise InvalidInput(f"{text!r} is not a setting", where="--set", hint="Write --set guidance=4.5") from None
         found[name.strip()] = number

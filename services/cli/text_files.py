@@ -68,7 +68,7 @@ def _opened(path: str, limit: int) -> Generator[_Counted]:
                 raise _too_large(limit, path)
             yield _Counted(stream)
     except FileNotFoundError:
-        raise NotFound("there is no such file", where=path, hint="Check the path of -f.") from None
+        raise NotFound("there is no such file", where=path, hint="Check the path.") from None
     except OSError as error:
         raise InvalidFile(f"cannot be read: {error.strerror}", where=path) from error
 

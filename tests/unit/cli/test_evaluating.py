@@ -54,7 +54,7 @@ def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize("text", ["guidance", "guidance=", "guidance=high", "=3x"])
+@pytest.mark.parametrize("text", ["guidance", "guidance=", "guidance=high", "guidance=nan", "guidance=inf", "=3x"])
 def test_a_setting_that_is_none_is_told(text: str) -> None:
     with pytest.raises(InvalidInput, match="not a setting"):
         asked(settings=[text]).body()
