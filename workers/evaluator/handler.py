@@ -70,7 +70,10 @@ class EvaluatorHandler:
 def _scored(item: ClaimedItem, source: ScoreInput, loaded: _Loaded, control: BatchControl) -> Scored:
     measured = measure(source.items, source.npz, loaded.evaluator, progress=control.progress)
     reconstruction = find_reconstruction(loaded.bundle, source.request.bundle)
-    report = report_of(source, measured, loaded.evaluator, loaded.real, reconstruction)
+    made = len(measured.motions)
+    report = report_of(
+        source, measured, loaded.evaluator, loaded.real, reconstruction, beat=lambda: control.progress(made, made)
+    )
     files = (
         ExportedFile("html", to_html(report), "text/html; charset=utf-8"),
         ExportedFile("json", to_json(report), "application/json"),

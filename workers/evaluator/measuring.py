@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,11 @@ from shared.jobs import MadeItem
 from shared.motion.clip import MotionClip, parse_npz
 from shared.motion.features import FeatureLayout, layout
 from shared.motion.resample import resample
-from workers.evaluator.port import Embeddings, Evaluator
+from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from workers.training.checks.judge import Act, Expectation, Side, Verdict, judge
 from workers.training.checks.quality import Quality, quality
 
+Piece = TypeVar("Piece")
 TOGETHER = 64
 """Motions held at a time: 10,000 of them would be 2 GB of features."""
 
@@ -128,7 +129,7 @@ def measure(
         tuple(found),
         np.concatenate(raw),
         np.concatenate(exported),
-        _texts([motion.item.prompt for motion in found], evaluator),
+        embed_prompts([motion.item.prompt for motion in found], evaluator, lambda: progress(done, len(made))),
         tuple(broken),
     )
 
@@ -170,14 +171,18 @@ def _read(
     return clip if clip.fps == space.fps else resample(clip, space.fps)
 
 
-def _texts(prompts: Sequence[str], evaluator: Evaluator) -> Embeddings:
+def embed_prompts(prompts: Sequence[str], evaluator: Evaluator, beat: Beat = unheard) -> Embeddings:
     """(N, E); a prompt that stands there several times is read once."""
     distinct = list(dict.fromkeys(prompts))
     rows = {prompt: row for row, prompt in enumerate(distinct)}
-    return evaluator.embed_text(distinct)[[rows[prompt] for prompt in prompts]]
+    found = [np.zeros((0, evaluator.width), np.float32)]
+    for some in _chunks(distinct, TOGETHER):
+        found.append(evaluator.embed_text(some))
+        beat()
+    return np.concatenate(found)[[rows[prompt] for prompt in prompts]]
 
 
-def _chunks(items: Iterable[MadeItem], size: int) -> Iterator[list[MadeItem]]:
+def _chunks(items: Iterable[Piece], size: int) -> Iterator[list[Piece]]:
     rest = iter(items)
     while some := list(islice(rest, size)):
         yield some

@@ -8,7 +8,7 @@ of the model that generated the motion are never the right ones.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 
 from shared.errors import InvalidInput
 from workers.evaluator.metrics.retrieval import Distance
+
+Beat = Callable[[], None]
+"""Called now and then by what takes long: whoever waits hears that it goes on."""
 
 Motion = NDArray[np.float32]
 Embeddings = NDArray[np.float32]
@@ -77,6 +80,10 @@ class Evaluator(Protocol):
             InvalidInput: a sentence it cannot read.
         """
         ...
+
+
+def unheard() -> None:
+    """The `Beat` of those for whom nobody waits."""
 
 
 def check_reads(evaluator: Evaluator, layout: str, fps: float) -> None:

@@ -164,7 +164,7 @@ def rebuilt(tokenizer: MotionTokenizer, clips: Sequence[Features]) -> list[Featu
 
 def _measured(ruler: Ruler, motion: Embeddings, checked: Sequence[Checked]) -> dict[str, Value]:
     split = ruler.real.joined(ruler.splits)
-    side = real_side(split, motion, ruler.evaluator)
+    side = real_side(split, motion, ruler)
     found = [(each.obeyed, each.quality) for each in checked]
     return ruler.values(side, found, np.arange(len(found)), distances=True)
 

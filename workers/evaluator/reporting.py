@@ -17,7 +17,7 @@ from shared.runtime.scoring import ScoreInput
 from workers.evaluator.comparing import Earlier, alarms, changes
 from workers.evaluator.heat import heat_of, style_of
 from workers.evaluator.measuring import Measured, Motion
-from workers.evaluator.port import Evaluator
+from workers.evaluator.port import Beat, Evaluator, unheard
 from workers.evaluator.reconstruction import Reconstruction
 from workers.evaluator.reference import Reference as RealClips
 from workers.evaluator.report import (
@@ -48,6 +48,8 @@ def report_of(
     evaluator: Evaluator,
     real: RealClips,
     reconstruction: Reconstruction | None = None,
+    *,
+    beat: Beat = unheard,
 ) -> Report:
     """The report of an evaluation.
 
@@ -58,6 +60,7 @@ def report_of(
         real: the clips that the evaluator's bundle knows. Those that the prompts describe are the ground truth; of own
             prompts, the split `test`.
         reconstruction: what was measured of the generator's tokenizer.
+        beat: heard while it is measured, which takes minutes for many motions.
 
     Raises:
         InvalidInput: a run to compare with is of other prompts.
@@ -65,9 +68,9 @@ def report_of(
         Unreachable: the store does not answer.
     """
     seed = source.request.seed
-    ruler = Ruler(evaluator, real, source.request.splits or (TEST_SPLIT,), seed)
+    ruler = Ruler(evaluator, real, source.request.splits or (TEST_SPLIT,), seed, beat)
     metrics = metrics_of(evaluator, ruler.splits)
-    sides = sides_of(measured, _labels(source, measured, real))
+    sides = sides_of(measured, _labels(source, measured, real), beat)
     raw, exported = generated_rows(measured, sides, ruler)
     scores = _scores(measured, sides[1], evaluator, seed)
     earlier = _earlier(source)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from shared.jobs import COMPOSITIONAL, TEST_SPLIT
 from shared.measures.comparing import OBEYED, RETRIEVED
-from workers.evaluator.measuring import Measured
-from workers.evaluator.port import Embeddings, Evaluator
+from workers.evaluator.measuring import Measured, embed_prompts
+from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from workers.evaluator.reference import Reference, ReferenceSplit
 from workers.evaluator.report import Row, Value
 from workers.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
@@ -34,12 +34,14 @@ class Ruler:
         real: clips that distributions are compared with.
         splits: whose, in the order of the prompts; two of them have columns of their own for the compositional one.
         seed: of the draws.
+        beat: heard in every repeat.
     """
 
     evaluator: Evaluator
     real: Reference
     splits: tuple[str, ...]
     seed: int
+    beat: Beat = unheard
 
     def values(
         self, side: Side, found: Found | None, prompts: NDArray[np.int64], *, distances: bool
@@ -76,7 +78,7 @@ def truth_row(ruler: Ruler) -> Row:
     rows = np.arange(len(split.clips))
     found = [(clip.obeyed, clip.quality) for clip in split.clips if clip.quality is not None]
     values = ruler.values(
-        real_side(split, split.motion, ruler.evaluator),
+        real_side(split, split.motion, ruler),
         found if len(found) == len(split.clips) else None,
         rows,
         distances=False,
@@ -117,17 +119,18 @@ def generated_rows(measured: Measured, sides: tuple[Side, Side], ruler: Ruler) -
     )
 
 
-def sides_of(measured: Measured, labels: NDArray[np.int64]) -> tuple[Side, Side]:
+def sides_of(measured: Measured, labels: NDArray[np.int64], beat: Beat = unheard) -> tuple[Side, Side]:
     """Raw and exported motions; `labels` (N,) are those of their prompts."""
     raw, exported = (
-        Side(motion, measured.text, labels, measured.variants) for motion in (measured.raw, measured.exported)
+        Side(motion, measured.text, labels, measured.variants, beat) for motion in (measured.raw, measured.exported)
     )
     return raw, exported
 
 
-def real_side(split: ReferenceSplit, motion: Embeddings, evaluator: Evaluator) -> Side:
+def real_side(split: ReferenceSplit, motion: Embeddings, ruler: Ruler) -> Side:
     """Embeddings (N, E) made of the clips of a split, with the clips' captions."""
-    return Side(motion, evaluator.embed_text(split.prompts), split.labels, np.zeros(len(split.clips), np.int64))
+    text = embed_prompts(split.prompts, ruler.evaluator, ruler.beat)
+    return Side(motion, text, split.labels, np.zeros(len(split.clips), np.int64), ruler.beat)
 
 
 def _named(splits: Sequence[str]) -> str:

@@ -19,7 +19,7 @@ from workers.evaluator.measuring import Measured
 from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 from workers.evaluator.metrics.intervals import redraw, repeated
 from workers.evaluator.metrics.retrieval import RPrecision, clip_score, matching_score, r_precision
-from workers.evaluator.port import Embeddings, Evaluator
+from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from workers.evaluator.report import Metric, Value
 from workers.training.checks.quality import Quality
 
@@ -44,19 +44,21 @@ class Side:
     text: Embeddings  # (N, E)
     labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
     variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
+    beat: Beat = unheard
     _pools: dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]] = field(
         default_factory=dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]], repr=False
     )
 
     def only(self, rows: NDArray[np.bool_]) -> Side:
         """Some of the motions."""
-        return Side(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows])
+        return Side(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows], self.beat)
 
     def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
         """For each of the 20 repeats the rows that it takes, and its random numbers."""
         generated = repeats_of(self.variants)
         for number, rng in enumerate(redraw(lambda rng: rng, repeats=REPEATS, seed=seed)):
             yield np.flatnonzero(self.variants == number % generated), rng
+            self.beat()
 
     def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
         """For each repeat its rows, and retrieval among them; drawn once, however often it is asked for.

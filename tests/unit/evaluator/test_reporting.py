@@ -25,10 +25,11 @@ from shared.measures.comparing import OBEYED, RETRIEVED
 from shared.motion.features import HUMANML3D_263
 from shared.motion.finish import finish_motion
 from shared.runtime.scoring import ScoreInput
-from workers.evaluator.measuring import Measured, encoded, measure
+from workers.evaluator.measuring import TOGETHER, Measured, embed_prompts, encoded, measure
 from workers.evaluator.reference import Reference, ReferenceSplit
 from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from workers.evaluator.reporting import report_of, summary_of
+from workers.evaluator.scoring import REPEATS
 from workers.evaluator.tmr import TMREvaluator
 from workers.training.data.prepared import PreparedData
 
@@ -122,6 +123,23 @@ def test_the_report_says_how_motions_came_and_what_made_them(report: Report, eva
     assert 0 < len(report.worst) <= 6
     assert not {e.prompt + str(e.seed) for e in report.best} & {e.prompt + str(e.seed) for e in report.worst}
     assert summary_of(report)[OBEYED] == report.row("exported").values[OBEYED].mean
+
+
+def test_a_report_is_heard_of_in_each_repeat_of_each_number_that_takes_long(
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference
+) -> None:
+    heard: list[None] = []
+    report_of(source, measured, evaluator, real, beat=lambda: heard.append(None))
+    drawn, rows = ("clip_score", "mm_dist", "diversity"), ("ground truth", "raw", "exported")
+    assert len(heard) >= REPEATS * len(drawn) * len(rows)
+
+
+def test_sentences_are_embedded_a_few_at_a_time_and_each_once(evaluator: TMREvaluator) -> None:
+    prompts = [f"a person walks {count} steps" for count in range(TOGETHER + 1)]
+    heard: list[None] = []
+    found = embed_prompts([*prompts, prompts[0]], evaluator, lambda: heard.append(None))
+    assert len(heard) == 2
+    np.testing.assert_array_equal(found, evaluator.embed_text([*prompts, prompts[0]]))
 
 
 def test_fewer_motions_than_a_pool_make_a_report_without_retrieval(
