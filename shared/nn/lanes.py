@@ -33,6 +33,10 @@ class Lanes:
         self._inside = threading.local()
         self._pool: ThreadPoolExecutor | None = None
 
+    def __deepcopy__(self, memo: object) -> Lanes:
+        """Itself: a copied network computes in the same lanes."""
+        return self
+
     @contextmanager
     def open(self) -> Generator[None]:
         """While lanes compute, the caller has one torch thread as well: another would take a lane's processor."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Iterator
 
@@ -71,3 +72,9 @@ def test_an_error_of_one_part_is_raised_when_all_are_through() -> None:
     with pytest.raises(ValueError, match="part 0 is broken"):
         lanes.map(fail_first, [0, 1, 2, 3])
     assert sorted(through) == [1, 2, 3]
+
+
+def test_a_copy_of_what_holds_lanes_computes_in_the_same_ones() -> None:
+    lanes = Lanes(2)
+    lanes.map(lambda part: part, [0, 1])  # started: threads cannot be copied
+    assert copy.deepcopy({"lanes": lanes})["lanes"] is lanes
