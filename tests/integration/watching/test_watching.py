@@ -43,6 +43,10 @@ class Numbers:
         """One number; KeyError where it is not told."""
         return self._samples[name, frozenset(labels.items())]
 
+    def told(self, name: str, **labels: str) -> bool:
+        """Whether there is such a number yet."""
+        return (name, frozenset(labels.items())) in self._samples
+
     @property
     def names(self) -> set[str]:
         """Of all samples."""
@@ -149,6 +153,10 @@ def test_every_line_about_work_names_its_job_lease_and_trace_and_no_line_a_promp
 
 
 def test_a_worker_counts_each_item_once_with_its_batches_and_stages(seen: Seen) -> None:
+    committed = {"queue": "hgm3", "stage": "commit"}  # counted behind the commit that the command has seen
+    seen.cluster.wait(
+        lambda: seen.numbers(WORKER).told("marey_stage_seconds_count", **committed), "the worker counts its commit"
+    )
     numbers = seen.numbers(WORKER)
     assert numbers("marey_items_total", queue="text", state="parsed") == 4
     assert numbers("marey_items_total", queue="hgm3", state="succeeded") == 3
@@ -161,8 +169,15 @@ def test_a_worker_counts_each_item_once_with_its_batches_and_stages(seen: Seen) 
 
 
 def test_the_scheduler_counts_its_rounds_and_hints(seen: Seen) -> None:
+    parts = ("relay", "sweeper", "evaluations")
+
+    def all_went_round() -> bool:
+        numbers = seen.numbers(SCHEDULER)
+        return all(numbers.told("marey_scheduler_rounds_total", part=part, outcome="done") for part in parts)
+
+    seen.cluster.wait(all_went_round, "every part goes round once")
     numbers = seen.numbers(SCHEDULER)
-    for part in ("relay", "sweeper", "evaluations"):
+    for part in parts:
         assert numbers("marey_scheduler_rounds_total", part=part, outcome="done") >= 1
     assert numbers("marey_hints_total", queue="hgm3") >= 1
     assert numbers("marey_leases_lost_total") == 0
