@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import psutil
 import sqlalchemy as sa
 
-from benchmarks.platform import BUNDLE, Platform, platform
+from benchmarks.platform import BUNDLE, Platform, platform, processor_seconds
 from shared.jobs import transaction
 
 CLIENTS = (100, 500, 1000, 2000, 4000)
@@ -110,13 +110,13 @@ async def _product(cluster: Platform, server: psutil.Process, count: int) -> Cro
         crowd.connections = _connections(cluster) - connections
         crowd.megabytes = (server.memory_info().rss - memory) / 2**20
         for number in range(CHANGES):
-            before = _cpu(server)
+            before = processor_seconds(server)
             verb = "resume" if number % 2 else "pause"
             row = await asyncio.to_thread(client.post, f"/v1/jobs/{job}/{verb}")
             committed = time.perf_counter()
             await _all_have(readers, row["event_seq"])
             crowd.delays.append([reader.at - committed for reader in readers])
-            crowd.cpu += (_cpu(server) - before) / CHANGES
+            crowd.cpu += (processor_seconds(server) - before) / CHANGES
             await asyncio.sleep(SETTLE)
         for reader in readers:
             reader.close()
@@ -138,12 +138,12 @@ async def _floor(count: int) -> Crowd:
     server = await asyncio.start_server(serve, "127.0.0.1", 0, backlog=2048)
     readers = await _connect(crowd, server.sockets[0].getsockname()[1], b"GET / HTTP/1.1\r\n\r\n")
     for number in range(CHANGES):
-        before, told = _cpu(own), time.perf_counter()
+        before, told = processor_seconds(own), time.perf_counter()
         for writer in writers:
             writer.write(message % (2 * number + 2) + message % (2 * number + 3))
         await _all_have(readers, 2 * number + 3)
         crowd.delays.append([reader.at - told for reader in readers])
-        crowd.cpu += (_cpu(own) - before) / CHANGES
+        crowd.cpu += (processor_seconds(own) - before) / CHANGES
     for reader in readers:
         reader.close()
     server.close()
@@ -175,11 +175,6 @@ async def _all_have(readers: list[Reader], seq: int) -> None:
     async with asyncio.timeout(LIMIT):
         while any(reader.seen < seq for reader in readers):
             await asyncio.sleep(0.02)
-
-
-def _cpu(process: psutil.Process) -> float:
-    times = process.cpu_times()
-    return times.user + times.system
 
 
 def _connections(cluster: Platform) -> int:

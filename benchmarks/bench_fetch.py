@@ -15,7 +15,7 @@ from pathlib import Path
 import httpx2
 import psutil
 
-from benchmarks.platform import BUNDLE, Platform, marey, platform
+from benchmarks.platform import BUNDLE, Platform, marey, platform, processor_seconds
 from services.cli.fetching import PARALLEL, Download, plan
 from shared.jobs import (
     DEFAULT_TENANT,
@@ -68,9 +68,9 @@ def _measure(home: Path, api: psutil.Process, ways: dict[str, Callable[[Path], f
         for name, way in ways.items():
             folder = home / "fetched"
             folder.mkdir()
-            before, started = _cpu(api), time.perf_counter()
+            before, started = processor_seconds(api), time.perf_counter()
             own = way(folder)
-            taken[name].append((time.perf_counter() - started, own, _cpu(api) - before))
+            taken[name].append((time.perf_counter() - started, own, processor_seconds(api) - before))
             assert len(list(folder.glob("*.npz"))) + len(list(folder.glob("*.bvh"))) == files
             shutil.rmtree(folder)
     for name, runs in taken.items():
@@ -134,11 +134,6 @@ def _motion(store: AssetStore, item: ClaimedItem) -> NewMotion:
         digests[ending] = AssetDigest(hashlib.sha256(content).hexdigest(), len(content))
         store.put(asset_key(DEFAULT_TENANT, digests[ending].sha256), content)
     return NewMotion(item.id, digests, 80, 20.0, "MIT", 0.5, {})
-
-
-def _cpu(process: psutil.Process) -> float:
-    times = process.cpu_times()
-    return times.user + times.system
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.platform import BUNDLE, Platform, forget_peak, marey, peak_megabytes, platform
+from benchmarks.platform import BUNDLE, Platform, forget_peak, marey, peak_megabytes, platform, processor_seconds
 from shared.items import MAX_BODY_BYTES, MAX_ITEMS
 
 SIZES = {1_000: 3, 10_000: 5, 100_000: 1}
@@ -58,7 +58,7 @@ def _submit(cluster: Platform, api: psutil.Process, size: int) -> Run:
     if not path.exists():
         _write(path, size)
     forget_peak(api.pid)
-    before = _cpu(api)
+    before = processor_seconds(api)
     started = time.perf_counter()
     command = subprocess.Popen(
         marey("submit", "-f", str(path)), env=cluster.command_environment(), stdout=subprocess.PIPE
@@ -73,7 +73,9 @@ def _submit(cluster: Platform, api: psutil.Process, size: int) -> Run:
     with cluster.client() as client:
         row = client.get(f"/v1/jobs/{job}")
     assert row["total"] == size
-    return Run(seconds, used.ru_utime + used.ru_stime, _cpu(api) - before, peak.stop(), peak_megabytes(api.pid))
+    return Run(
+        seconds, used.ru_utime + used.ru_stime, processor_seconds(api) - before, peak.stop(), peak_megabytes(api.pid)
+    )
 
 
 def _write(path: Path, size: int) -> None:
@@ -106,11 +108,6 @@ class _Peak:
         self._stopping.set()
         self._thread.join()
         return self._most
-
-
-def _cpu(process: psutil.Process) -> float:
-    times = process.cpu_times()
-    return times.user + times.system
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import statistics
 import psutil
 import sqlalchemy as sa
 
-from benchmarks.platform import Platform, platform
+from benchmarks.platform import Platform, platform, processor_seconds
 from shared.jobs import transaction
 from tests.support.toy_jobs import ended, job_row, submit_toys
 
@@ -55,7 +55,7 @@ def _work(cluster: Platform, workers: int) -> tuple[float, float, float, float]:
 
 def _cpu(cluster: Platform, names: list[str]) -> float:
     children = [psutil.Process(cluster.child(name)) for name in names]
-    return sum(sum(process.cpu_times()[:2]) for process in children)
+    return sum(map(processor_seconds, children))
 
 
 def _postgres_cpu(cluster: Platform) -> float:

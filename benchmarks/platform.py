@@ -4,7 +4,6 @@ Postgres and Valkey."""
 from __future__ import annotations
 
 import shutil
-import socket
 import sys
 import tempfile
 import urllib.error
@@ -13,15 +12,15 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import psutil
 
 from services.cli.client import Client
 from services.cli.place import Server
-from shared.bundles import BundleWriter, TextSpec
 from shared.jobs import create_key, transaction
 from shared.settings import Settings
 from tests.chaos.driver import Cluster
+from tests.servers.ports import free_ports
+from tests.support.live_api import write_bundle
 from tests.support.toy import QUEUE, REFERENCE, TEXT_REFERENCE
 
 BUNDLE = "toy-nothing"
@@ -34,7 +33,7 @@ class Platform(Cluster):
 
     def __init__(self, home: Path, environment: Mapping[str, str]) -> None:
         models = home / "models"
-        self.port = _free_port()
+        (self.port,) = free_ports(1)
         self.environment = {
             "MAREY_MODELS": str(models),
             "MAREY_STORE": str(home / "assets"),
@@ -43,7 +42,7 @@ class Platform(Cluster):
             **environment,
         }
         super().__init__(home, self.environment)
-        _write_bundle(models)
+        write_bundle(models, BUNDLE, QUEUE)
         with transaction(self.engine) as conn:
             self.key = create_key(conn, "benchmark", ["admin"]).secret
         self.url = f"http://127.0.0.1:{self.port}"
@@ -107,6 +106,12 @@ def marey(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "services.cli", *arguments]
 
 
+def processor_seconds(process: psutil.Process) -> float:
+    """What a process has used of processors, its own and the kernel's time."""
+    times = process.cpu_times()
+    return times.user + times.system
+
+
 def peak_megabytes(process: int) -> float:
     """The most memory a process has had resident (VmHWM), MB."""
     for line in Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines():
@@ -118,26 +123,3 @@ def peak_megabytes(process: int) -> float:
 def forget_peak(process: int) -> None:
     """Let `peak_megabytes` count from here."""
     Path(f"/proc/{process}/clear_refs").write_text("5", encoding="ascii")
-
-
-def _write_bundle(models: Path) -> None:
-    """A generator's bundle for the queue of the toy; nothing loads it."""
-    with BundleWriter(models / BUNDLE) as writer:
-        writer.add_part("masked", {"w": np.zeros(3, np.float32)})
-        writer.finish(
-            name=BUNDLE,
-            version="1",
-            kind="generator",
-            model=QUEUE,
-            config="tiny",
-            parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 1}},
-            fps=20.0,
-            licence="MIT",
-            text=TextSpec(labeller="none", encoder_sha256="0" * 64),
-        )
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

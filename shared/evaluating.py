@@ -7,7 +7,8 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from shared.bundles import Bundle, choose_bundle, choose_evaluator
+from shared.bundles import Bundle, choose_bundle, choose_evaluator, named_by
+from shared.bundles.choose import unlike
 from shared.bundles.reference import reference_prompts
 from shared.errors import InvalidInput
 from shared.evaluation_prompts import EvaluationPrompt
@@ -16,6 +17,7 @@ from shared.jobs import (
     EVALUATOR_QUEUE,
     NO_TEXT,
     PRIORITY_LIMIT,
+    TEST_SPLIT,
     EvaluationRequest,
     EvaluationRow,
     NewItem,
@@ -71,15 +73,18 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
         prompts: its own; None = those of the evaluator's bundle.
 
     Raises:
-        NotFound, InvalidBundle, Refused: of the bundles.
+        NotFound, InvalidBundle, Refused: of the bundles; `where` is the field that names it.
         InvalidItems: with every prompt whose length the model cannot make.
         InvalidInput: a setting that the model has not, too many motions, a seed that is too high.
     """
-    evaluator = choose_evaluator(request.evaluator, config=config)
-    offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
-    if prompts is None:
-        prompts = tuple(p for split in request.splits for p in reference_prompts(evaluator, split))
-    _check_skeleton(offer.bundle, evaluator)
+    with named_by("bundle"):
+        offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
+    with named_by("evaluator"):
+        evaluator = choose_evaluator(request.evaluator, generator=offer.bundle, config=config)
+        _check_layout(offer.bundle, evaluator)
+        # Own prompts have real motion beside them too: whether it is there shall not be found out after the last one.
+        captions = tuple(p for split in request.splits or (TEST_SPLIT,) for p in reference_prompts(evaluator, split))
+    prompts = captions if prompts is None else prompts
     offer.check_settings(request.settings)
     if not request.splits:
         _check_seconds(prompts, offer)
@@ -117,14 +122,16 @@ def scoring_job(row: EvaluationRow) -> NewJob:
     )
 
 
-def _check_skeleton(generator: Bundle, evaluator: Bundle) -> None:
+def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
     """Better said now than when thousands of motions were made."""
-    made, measured = generator.manifest.skeleton, evaluator.manifest.skeleton
-    if made is not None and measured is not None and made != measured:
+    found = unlike(generator.manifest, evaluator.manifest)
+    if found is not None:
+        what, made, measured = found
         raise InvalidInput(
-            f"{evaluator.manifest.name} measures motions of the skeleton {measured}, not of {made}",
+            f"{evaluator.manifest.name} measures motions of the {what} {measured}; {generator.manifest.name} makes "
+            f"them of {made}",
             where="evaluator",
-            hint="Choose an evaluator of the generator's skeleton.",
+            hint=f"Choose an evaluator of the generator's {what}: to another one its motions have no meaning.",
         )
 
 

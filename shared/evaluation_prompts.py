@@ -13,7 +13,7 @@ from typing import Any
 
 from shared.errors import InvalidInput, TooLarge
 from shared.expected import read_expected
-from shared.items import CHECKS, Problem, collect, read_fields
+from shared.items import CHECKS, Problem, checked, read_fields
 
 COLUMNS = ("prompt", "seconds", "expected")
 MIN_PROMPTS = 2
@@ -44,7 +44,7 @@ def read_prompts(
         InvalidInput: fewer than `MIN_PROMPTS`.
         TooLarge: more than `MAX_PROMPTS`.
     """
-    prompts = tuple(collect(_counted(raws, where), _read, where=where))
+    prompts = tuple(checked(_counted(raws, where), _read, where=where))
     if len(prompts) < MIN_PROMPTS:
         raise InvalidInput(
             "there is a single prompt in it, and nothing can be measured over one",

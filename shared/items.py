@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
@@ -176,11 +176,12 @@ def read_fields(
     return values, problems
 
 
-def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None = None) -> list[Item]:
-    """All items, or one error with all problems.
+def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None = None) -> Iterator[Item]:
+    """Items as they are read, as `checked` gives them.
 
     Raises:
         InvalidItems: at least one is wrong.
+        InvalidInput: there are none.
         TooLarge: more than `MAX_ITEMS` with their variants.
     """
     count = 0
@@ -188,7 +189,7 @@ def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None =
     def read(raw: object, line: int | None) -> tuple[Item | None, list[Problem]]:
         nonlocal count
         item, problems = read_item(raw, line)
-        count += 0 if item is None else item.variants
+        count += 1 if item is None else item.variants
         if count > MAX_ITEMS:  # what is far too long is not read to its end
             raise TooLarge(
                 f"is over the limit of {MAX_ITEMS:,} motions (prompts times variants) a job",
@@ -197,35 +198,35 @@ def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None =
             )
         return item, problems
 
-    return collect(raws, read, where=where)
+    return checked(raws, read, where=where)
 
 
-def collect(
+def checked(
     raws: Iterable[tuple[int | None, object]],
     read: Callable[[object, int | None], tuple[T | None, list[Problem]]],
     *,
     where: str | None = None,
-) -> list[T]:
-    """What `read` makes of each, or one error with all problems.
+) -> Iterator[T]:
+    """What `read` makes of each, one after another; after the last, one error with all problems. What came before
+    counts only if none follows.
 
     Raises:
         InvalidItems: at least one is wrong.
         InvalidInput: there are none.
     """
-    made: list[T] = []
     problems: list[Problem] = []
-    total = 0
+    good = total = 0
     for line, raw in raws:
         value, found = read(raw, line)
         total += len(found)
         problems.extend(found[: MAX_PROBLEMS - len(problems)])
-        if value is not None:
-            made.append(value)
+        if value is not None and not problems:
+            good += 1
+            yield value
     if problems:
         raise InvalidItems(problems, where=where, total=total)
-    if not made:
+    if not good:
         raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
-    return made
 
 
 def _name(value: object) -> str:

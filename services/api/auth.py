@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import Depends, Security
-from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
 
 from services.api.context import Context, Shared
 from shared.errors import Refused, Unauthenticated
@@ -58,18 +58,23 @@ def check_scope(key: ApiKey, scope: str) -> None:
         raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
 
 
-def requires(scope: str, kind: str | None = None) -> Callable[[Context, ApiKey], ApiKey]:
-    """A dependency: the caller's key, if `admit` lets it pass."""
+def requires(kind: str | None = None) -> Callable[[Context, ApiKey, SecurityScopes], ApiKey]:
+    """A dependency: the caller's key, if `admit` lets it pass for the scopes that the route's `Security` names.
 
-    def check(shared: Shared, key: Annotated[ApiKey, Depends(caller)]) -> ApiKey:
-        admit(shared, key, scope, kind)
+    The OpenAPI document says them, too.
+    """
+
+    def check(shared: Shared, key: Annotated[ApiKey, Depends(caller)], wanted: SecurityScopes) -> ApiKey:
+        for scope in wanted.scopes:
+            admit(shared, key, scope, kind)
         return key
 
     return check
 
 
-Reader = Annotated[ApiKey, Depends(requires("read"))]
-Submitter = Annotated[ApiKey, Depends(requires("submit"))]
-Operator = Annotated[ApiKey, Depends(requires("operate"))]
-Parser = Annotated[ApiKey, Depends(requires("read", "parse"))]
-Watcher = Annotated[ApiKey, Depends(requires(METRICS))]
+allowed = requires()
+Reader = Annotated[ApiKey, Security(allowed, scopes=["read"])]
+Submitter = Annotated[ApiKey, Security(allowed, scopes=["submit"])]
+Operator = Annotated[ApiKey, Security(allowed, scopes=["operate"])]
+Parser = Annotated[ApiKey, Security(requires("parse"), scopes=["read"])]
+Watcher = Annotated[ApiKey, Security(allowed, scopes=[METRICS])]

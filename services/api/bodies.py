@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import time
-from contextlib import suppress
+from collections.abc import AsyncGenerator, AsyncIterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from typing import BinaryIO
 
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
@@ -14,9 +16,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from services.api.problems import problem_response
 from shared.errors import InvalidInput, MareyError, TooLarge, TooSlow
 from shared.items import MAX_BODY_BYTES
+from shared.spool import Spool
 
 MAX_OTHER_BODY = 2**20
 """Bytes of any body but those that hold many prompts."""
+NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
 PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
 """Where such bodies go; their routes read them, once they know who sends them."""
 MIN_RATE = 4096
@@ -153,6 +157,29 @@ async def read_body(request: Request, limit: int = MAX_BODY_BYTES) -> bytes:
     """The body of a request; by default one that holds many prompts.
 
     Raises:
+        TooLarge, TooSlow, InvalidInput: as `_parts`.
+    """
+    return b"".join([part async for part in _parts(request, limit)])
+
+
+@asynccontextmanager
+async def kept_body(request: Request) -> AsyncGenerator[BinaryIO]:
+    """The body of a request that holds many prompts, in a file once it is long; the file is gone after the block.
+
+    Raises:
+        TooLarge, TooSlow, InvalidInput: as `_parts`.
+        Unreachable: there is no room for the file.
+    """
+    with Spool("body", NO_ROOM) as spool:
+        async for part in _parts(request, MAX_BODY_BYTES):
+            spool.write(part)
+        yield spool.rewound()
+
+
+async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
+    """The body of a request as it comes.
+
+    Raises:
         TooLarge: over `limit` bytes; it is not read further.
         TooSlow: it does not come fast enough.
         InvalidInput: the length it declares is not a number, it is compressed, or the client left in its middle.
@@ -165,17 +192,15 @@ async def read_body(request: Request, limit: int = MAX_BODY_BYTES) -> bytes:
         raise InvalidInput(f"{encoding[:40]!r} is not taken", where="Content-Encoding", hint="Send the body as it is.")
     if int(declared) > limit:
         raise _too_large(limit)
-    parts: list[bytes] = []
     size = 0
     try:
         async for part in request.stream():
             size += len(part)
             if size > limit:
                 raise _too_large(limit)
-            parts.append(part)
+            yield part
     except ClientDisconnect:  # nobody reads this, but it is no bug either
         raise InvalidInput("the client went away before it was whole", where="body") from None
-    return b"".join(parts)
 
 
 def _holds_prompts(scope: Scope) -> bool:

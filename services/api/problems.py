@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -14,6 +15,7 @@ from starlette.exceptions import HTTPException
 
 from shared.errors import Busy, InvalidInput, MareyError, NotFound, QuotaUsedUp, Unauthenticated, Unreachable
 from shared.items import InvalidItems
+from shared.jobs import Room
 
 TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"
@@ -32,13 +34,18 @@ class FieldProblem(BaseModel):
 
 
 class QuotaBody(BaseModel):
-    """A quota that had no room; items or bytes."""
+    """A quota and what was asked of it; items or bytes."""
 
     name: str
     limit: int
     used: int
     left: int
     asked: int
+
+    @classmethod
+    def of(cls, found: Room | QuotaUsedUp) -> QuotaBody:
+        """From what was looked up, or from what was refused."""
+        return cls(name=found.quota, limit=found.limit, used=found.used, left=found.left, asked=found.asked)
 
 
 class ProblemBody(BaseModel):
@@ -78,7 +85,7 @@ def problem_body(error: MareyError) -> ProblemBody:
             FieldProblem(line=p.line, field=_clean(p.field), message=_clean(p.message) or "") for p in error.problems
         ]
     if isinstance(error, QuotaUsedUp):
-        body.quota = QuotaBody(name=error.quota, limit=error.limit, used=error.used, left=error.left, asked=error.asked)
+        body.quota = QuotaBody.of(error)
     return body
 
 
@@ -121,9 +128,7 @@ def install(app: FastAPI) -> None:
 
 
 def _validation(error: RequestValidationError) -> JSONResponse:
-    problems = [
-        FieldProblem(field=_clean(_field(e["loc"])), message=_clean(str(e["msg"])) or "") for e in error.errors()
-    ]
+    problems = [_field_problem(e) for e in error.errors()]
     names = ", ".join(dict.fromkeys(p.field or "body" for p in problems))
     body = ProblemBody(
         type=TYPE_PREFIX + InvalidInput.problem_type,
@@ -140,6 +145,8 @@ def _validation(error: RequestValidationError) -> JSONResponse:
 def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     if error.status_code == NotFound.status:
         return problem_response(NotFound("there is nothing at this path", where=_clean(request.url.path)))
+    if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that is no UTF-8 or nested too deeply
+        return problem_response(InvalidInput("the body cannot be read", where="body", hint="Send JSON in UTF-8."))
     phrase = HTTPStatus(error.status_code).phrase
     body = ProblemBody(
         type=TYPE_PREFIX + phrase.lower().replace(" ", "-"),
@@ -152,9 +159,13 @@ def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     )
 
 
-def _field(location: tuple[int | str, ...]) -> str:
-    """`("query", "limit")` → `limit`; the kind of place says nothing a client does not see."""
-    return ".".join(str(part) for part in location[1:]) or str(location[0])
+def _field_problem(error: Mapping[str, Any]) -> FieldProblem:
+    """One of pydantic's. `("query", "limit")` is called `limit`: the rest says nothing that a client does not see."""
+    place, *path = error["loc"]
+    if error["type"] == "json_invalid":  # its path is a position
+        return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
+    field = ".".join(str(part) for part in path) or str(place)
+    return FieldProblem(field=_clean(field), message=_clean(str(error["msg"])) or "")
 
 
 def _clean(text: str | None) -> str | None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import random
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 from uuid import uuid4
 
 import httpx2
 
+from services.cli.lines import Lines
 from services.cli.place import Server, find_server
 from shared import tracing
 from shared.errors import (
@@ -91,25 +92,31 @@ class Client:
         """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
         return self._send("POST", path, repeatable=False, json=body).json()
 
-    def patch(self, path: str, body: Any) -> Any:
+    def patch(self, path: str, body: Any, **params: Any) -> Any:
         """PATCH with a JSON body; the answer's JSON."""
-        return self._send("PATCH", path, json=body).json()
+        return self._send("PATCH", path, json=body, params=_given(params)).json()
 
     def delete(self, path: str) -> None:
         """DELETE."""
         self._send("DELETE", path)
 
-    def submit(self, lines: list[dict[str, Any]], *, validate_only: bool = False, **params: Any) -> Any:
+    def submit(self, items: Lines | Iterable[Mapping[str, Any]], *, validate_only: bool = False, **params: Any) -> Any:
         """Submit items as NDJSON; the job, or with `validate_only` what it would be.
 
         Raises:
             InvalidItems: with the problems of every line.
         """
-        body = "\n".join(json.dumps(line, ensure_ascii=False) for line in lines).encode()
-        headers = {"Content-Type": "application/x-ndjson", "Idempotency-Key": str(uuid4())}
+        if not isinstance(items, Lines):
+            with Lines(items) as lines:
+                return self.submit(lines, validate_only=validate_only, **params)
+        headers = {
+            "Content-Type": "application/x-ndjson",
+            "Content-Length": str(len(items)),
+            "Idempotency-Key": str(uuid4()),
+        }
         query = _given({**params, "validate_only": validate_only or None})
         timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
-        return self._send("POST", "/v1/jobs", params=query, content=body, headers=headers, timeout=timeout).json()
+        return self._send("POST", "/v1/jobs", params=query, content=items, headers=headers, timeout=timeout).json()
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
         """Every element of a listing, page after page."""

@@ -96,5 +96,14 @@ def length_of_time(seconds: float) -> str:
     return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
 
 
+def size(count: int) -> str:
+    """`512 B`, `1.5 GiB`."""
+    for place, unit in enumerate("TGMK"):
+        of_it = 2 ** (40 - 10 * place)
+        if count >= of_it:
+            return f"{count / of_it:.3g} {unit}iB"
+    return f"{count} B"
+
+
 def _cell(value: object) -> str:
     return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value).replace("\n", " ")

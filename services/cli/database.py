@@ -23,7 +23,7 @@ def settings_here() -> Settings:
     Raises:
         InvalidInput: the extra `server` is not installed.
     """
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from shared.runtime.embedded import postgres_url

@@ -65,7 +65,7 @@ def main() -> int:
 def _ensure_bundle(home: Path) -> bool:
     """Whether the model that will be used has random weights; makes such a bundle where there is no model at all."""
     os.environ["MAREY_HOME"] = str(home)
-    from services.cli.roles import make_random_bundle
+    from services.cli.roles.oneshot import make_random_bundle
     from shared.bundles import choose_bundle
 
     try:

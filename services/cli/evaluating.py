@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from services.cli import console
-from shared.errors import InvalidInput, ItemsFailed, Regressed, TimedOut, Unreachable
+from shared.errors import InvalidInput, ItemsFailed, NotFound, Regressed, TimedOut, Unreachable
 
 if TYPE_CHECKING:
     from services.cli.client import Client
@@ -93,6 +93,12 @@ class Asked:
             return {"split": self.split}
         from services.cli.rows import evaluation_prompts_from_file
 
+        if self.split != "-" and not Path(self.split).suffix and not Path(self.split).exists():
+            raise NotFound(
+                "is neither a split of the evaluator nor a file",
+                where=f"--split {self.split}",
+                hint=f"Splits are {', '.join(SPLITS)}; a file of prompts ends in .csv, .jsonl or .txt.",
+            )
         prompts = evaluation_prompts_from_file(self.split)
         source = "stdin" if self.split == "-" else Path(self.split).name
         return {"prompts": [prompt.as_json() for prompt in prompts], "source": source}

@@ -81,7 +81,18 @@ def _local_server() -> Server:
 
 def _key() -> str:
     path = os.environ.get("MAREY_KEY_FILE")
-    key = Path(path).expanduser().read_text(encoding="utf-8").strip() if path else os.environ.get("MAREY_KEY", "")
+    key = _key_of(Path(path).expanduser()) if path else os.environ.get("MAREY_KEY", "")
     if not key:
-        raise Unauthenticated("MAREY_SERVER names a server, but MAREY_KEY is empty", hint="Set MAREY_KEY to your key.")
+        empty = "the file of MAREY_KEY_FILE" if path else "MAREY_KEY"
+        raise Unauthenticated(f"MAREY_SERVER names a server, but {empty} is empty", hint="Set MAREY_KEY to your key.")
     return key
+
+
+def _key_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise InvalidFile(
+            f"cannot be read: {reason}", where=str(path), hint="MAREY_KEY_FILE names the file that holds your key."
+        ) from error

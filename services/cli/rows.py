@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -22,13 +22,13 @@ Lines = Iterator[tuple[int, str]]
 TAG_SEPARATOR = ";"
 
 
-def items_from_prompts(prompts: Sequence[str]) -> list[Item]:
+def items_from_prompts(prompts: Sequence[str]) -> Iterator[Item]:
     """Items of prompts given as arguments; a problem names the number of the argument."""
     return read_items([(i, {"prompt": p}) for i, p in enumerate(prompts, 1)], where="PROMPT")
 
 
-def items_from_file(path: str, file_format: Format | None = None) -> list[Item]:
-    """Items of a file, or of stdin for `-`.
+def items_from_file(path: str, file_format: Format | None = None) -> Iterator[Item]:
+    """Items of a file, or of stdin for `-`, as they are read; they count only once all are (`shared.items.checked`).
 
     Args:
         path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also packed
@@ -66,14 +66,14 @@ def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence
 
 
 def with_defaults(
-    items: Sequence[Item], *, model: str | None = None, seconds: float | None = None, seed: int | None = None,
+    items: Iterable[Item], *, model: str | None = None, seconds: float | None = None, seed: int | None = None,
     variants: int | None = None,
     fps: float | None = None,
-) -> list[Item]:  # fmt: skip
+) -> Iterator[Item]:  # fmt: skip
     """The items with the options of the command where an item itself says nothing; checked anew if any was given."""
     if (model, seconds, seed, variants, fps) == (None,) * 5:
-        return list(items)
-    changed = [
+        return iter(items)
+    changed = (
         replace(
             item,
             model=item.model or model,
@@ -83,8 +83,8 @@ def with_defaults(
             settings=item.settings if fps is None else {"fps": fps, **item.settings},
         )
         for item in items
-    ]
-    return read_items([(None, item.as_json()) for item in changed])
+    )
+    return read_items((None, item.as_json()) for item in changed)
 
 
 def _by_ending(path: str) -> Format:
@@ -93,7 +93,9 @@ def _by_ending(path: str) -> Format:
         if name.endswith(f".{ending}"):
             return ending
     raise InvalidInput(
-        "the file's ending does not tell its format", where=path, hint="Use --input-format csv|jsonl|txt."
+        "the file's ending does not tell its format",
+        where=path,
+        hint="Name it .csv, .jsonl or .txt (.gz too); where the command has --input-format, that will do.",
     )
 
 

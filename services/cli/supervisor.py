@@ -18,7 +18,7 @@ from io import TextIOWrapper
 from services.cli import console
 from services.cli.children import Child, marey, metrics_port, stop_all
 from services.cli.place import Server, read_server, write_server
-from services.cli.roles import GENERATORS, SHOWS, role_of, threads_of
+from services.cli.roles.serving import GENERATORS, SHOWS, role_of, threads_of
 from shared.errors import Conflict, InvalidInput, MareyError
 from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
 from shared.jobs.types import DEFAULT_TENANT

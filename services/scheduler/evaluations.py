@@ -12,6 +12,7 @@ from shared.errors import MareyError, QuotaUsedUp, Unreachable
 from shared.evaluating import plan_evaluation, scoring_job
 from shared.items import InvalidItems
 from shared.jobs import (
+    MAX_MISSING,
     EvaluationJob,
     EvaluationRow,
     EvaluationState,
@@ -36,8 +37,6 @@ from shared.settings import Settings
 log = logger(__name__)
 
 FAILED = (ItemState.FAILED, ItemState.DEAD)
-MAX_NOT_MADE = 0.01
-"""Share of motions that may be missing from a report: with more, its numbers are those of another set."""
 
 
 class Evaluations:
@@ -126,7 +125,7 @@ def _after_generation(conn: sa.Connection, row: EvaluationRow) -> None:
         _end(conn, row, EvaluationState.CANCELLED, f"the job that made its motions was cancelled (job {job.id})")
     elif job.state in ENDED:
         missing = job.total - job.succeeded
-        if missing > MAX_NOT_MADE * job.total:
+        if missing > MAX_MISSING * job.total:
             _end(conn, row, EvaluationState.FAILED, _too_few(conn, row, job, missing))
             return
         scoring = submit(conn, scoring_job(row))
@@ -152,7 +151,7 @@ def _end(conn: sa.Connection, row: EvaluationRow, state: EvaluationState, reason
 
 
 def _too_few(conn: sa.Connection, row: EvaluationRow, job: EvaluationJob, missing: int) -> str:
-    share = f"{missing} of {job.total} motions were not made, {missing / job.total:.1%} where {MAX_NOT_MADE:.0%} may be"
+    share = f"{missing} of {job.total} motions were not made, {missing / job.total:.1%} where {MAX_MISSING:.0%} may be"
     why = _first_problem(conn, row.tenant, job.id)
     return f"{share} (job {job.id})" + (f"; the first: {why}" if why else "")
 

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.auth import Parser
 from services.api.problems import RESPONSES
-from shared.bundles import TextSpec, choose_bundle
+from shared.bundles import TextSpec, choose_bundle, named_by
 from shared.errors import InvalidInput, Unreachable
 from shared.items import MODEL
 from shared.text.keys import as_served
@@ -88,7 +88,8 @@ def pipeline_of(model: str) -> TextPipeline:
         NotFound, InvalidBundle: as `choose_bundle` and `TextPipeline.load`.
         Unreachable: this server was installed without what parsing needs.
     """
-    bundle = choose_bundle(model, verify=False)
+    with named_by("model"):
+        bundle = choose_bundle(model, verify=False)
     if bundle.manifest.text is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="model", hint="Name a generator.")
     with _loading:

@@ -1,7 +1,7 @@
 """Model bundles: a folder with `manifest.json`, safetensors shards and a model card. No pickle, ever."""
 
 from shared.bundles.bundle import Bundle, find_bundle, list_bundles
-from shared.bundles.choose import choose_bundle, choose_evaluator
+from shared.bundles.choose import choose_bundle, choose_evaluator, named_by
 from shared.bundles.manifest import BundleManifest, DataSource, FileEntry, TextSpec
 from shared.bundles.writer import BundleWriter
 
@@ -16,4 +16,5 @@ __all__ = [
     "choose_evaluator",
     "find_bundle",
     "list_bundles",
+    "named_by",
 ]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
+
 from shared.bundles.bundle import Bundle, find_bundle, list_bundles
-from shared.bundles.manifest import MANIFEST_NAME
-from shared.errors import InvalidBundle, NotFound
+from shared.bundles.manifest import MANIFEST_NAME, BundleManifest
+from shared.errors import InvalidBundle, NotFound, Refused
 from shared.settings import Settings, settings
 
 
@@ -34,10 +37,21 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
     return find_bundle(chosen.manifest.name, config=config, verify=verify)
 
 
-def choose_evaluator(name: str | None, *, config: Settings | None = None) -> Bundle:
+@contextmanager
+def named_by(field: str) -> Generator[None]:
+    """What is wrong with a bundle is told as about the field of a request that names it, not about the server's folder
+    in which it lies."""
+    try:
+        yield
+    except (NotFound, InvalidBundle, Refused) as error:
+        raise type(error)(error.message, where=field, hint=error.hint) from error
+
+
+def choose_evaluator(name: str | None, *, generator: Bundle | None = None, config: Settings | None = None) -> Bundle:
     """The evaluator's bundle of this name or exact reference, hashes not checked; None = the one that is here.
 
-    Of several, that is the first, by name, that was trained; else the first with random weights.
+    Of several, that is the first, by name, that was trained; else the first with random weights. Those that measure
+    other motions than the generator makes come last.
 
     Raises:
         NotFound: there is none.
@@ -50,11 +64,27 @@ def choose_evaluator(name: str | None, *, config: Settings | None = None) -> Bun
             raise NotFound(
                 "there is no evaluator's bundle here", hint="`marey train evaluator` makes one; MAREY_MODELS names it."
             )
-        name = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name)).manifest.name
+        name = min(
+            (bundle.manifest for bundle in found),
+            key=lambda each: (bool(generator and unlike(generator.manifest, each)), each.random, each.name),
+        ).name
     bundle = find_bundle(name, config=config, verify=False)
     if bundle.manifest.kind != "evaluator":
         raise InvalidBundle(f"{bundle.manifest.name!r} is a {bundle.manifest.kind}, not an evaluator", where=name)
     return bundle
+
+
+def unlike(generator: BundleManifest, evaluator: BundleManifest) -> tuple[str, object, object] | None:
+    """In what the motions that one makes are not those that the other measures: what, there, here. None = in nothing
+    that both tell."""
+    for what, made, measured in (
+        ("skeleton", generator.skeleton, evaluator.skeleton),
+        ("feature layout", generator.layout, evaluator.layout),
+        ("frame rate", generator.fps, evaluator.fps),
+    ):
+        if made is not None and measured is not None and made != measured:
+            return what, made, measured
+    return None
 
 
 def _is_there(name: str, config: Settings) -> bool:

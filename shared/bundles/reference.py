@@ -11,7 +11,7 @@ from shared.errors import InvalidBundle, InvalidInput, MareyError
 from shared.evaluation_prompts import EvaluationPrompt, read_prompts
 from shared.expected import read_expected
 
-FILE = "reference.json"
+FILE, PART = "reference.json", "reference"
 
 
 def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...]:
@@ -20,30 +20,63 @@ def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...
     A clip has several captions; clip n gives its n-th, counted round, so that all ways of saying things come about.
 
     Raises:
-        InvalidBundle: it carries no such prompts, broken ones, or too few or too many for an evaluation.
+        InvalidBundle: it carries no such prompts, broken ones, some without the embedding of their motion, too few, or
+            too many for an evaluation.
     """
+    if FILE not in bundle.manifest.files:
+        raise InvalidBundle(
+            f"{bundle.manifest.name} carries no captions of real clips, which every report stands beside",
+            where=str(bundle.path),
+            hint="`marey train evaluator reference` writes it again with them.",
+        )
     document = bundle.read_json(FILE)
     fps = bundle.manifest.fps
     if not isinstance(document, dict) or split not in document or not fps:
-        raise InvalidBundle(f"carries no captions of the split {split!r}", where=str(bundle.path))
+        raise InvalidBundle(
+            f"{bundle.manifest.name} carries no captions of the split {split!r}", where=str(bundle.path)
+        )
     clips = cast("list[Mapping[str, Any]]", document[split])
+    _check_motions(bundle, split, len(clips))
     try:
         rows = [(number + 1, _row(clip, number, fps)) for number, clip in enumerate(clips)]
     except (LookupError, TypeError, ValueError, ZeroDivisionError) as error:
-        raise InvalidBundle(f"its captions cannot be read ({error!r})", where=str(bundle.path / FILE)) from error
+        raise InvalidBundle(
+            f"the captions of {bundle.manifest.name} cannot be read: {_why(error)}", where=str(bundle.path / FILE)
+        ) from error
     try:
         return read_prompts(rows, where=str(bundle.path / FILE))
     except MareyError as error:
         raise InvalidBundle(str(error), where=str(bundle.path / FILE)) from error
 
 
+def _check_motions(bundle: Bundle, split: str, clips: int) -> None:
+    """Refuse captions whose motions the bundle does not know, before anything is generated for them."""
+    if PART not in bundle.manifest.parts:
+        return  # whoever loads the network says what it lacks
+    known = bundle.tensors(PART, dtype=None).get(split)
+    if known is None or len(known) != clips:
+        raise InvalidBundle(
+            f"{bundle.manifest.name} has captions of {clips} clips of the split {split!r} and embeddings of "
+            f"{0 if known is None else len(known)} motions",
+            where=str(bundle.path),
+            hint="`marey train evaluator reference` writes both again.",
+        )
+
+
 def _row(clip: Mapping[str, Any], number: int, fps: float) -> dict[str, Any]:
     captions = clip["captions"]
+    if not captions:
+        raise ValueError(f"clip {clip['id']} has none")
     return {
         "prompt": captions[number % len(captions)],
         "seconds": int(clip["frames"]) / fps,
         "expected": expected_of(clip["acts"], clip["sides"]),
     }
+
+
+def _why(error: Exception) -> str:
+    """What was wrong, where that is not said by its kind alone."""
+    return str(error) if isinstance(error, ValueError | TypeError) else repr(error)
 
 
 def expected_of(acts: Sequence[str], sides: Sequence[str]) -> str | None:

@@ -35,6 +35,7 @@ from shared.jobs.evaluation_types import (
     BUNDLE_SOURCES,
     COMPOSITIONAL,
     EVALUATOR_QUEUE,
+    MAX_MISSING,
     REPORT_FORMATS,
     TEST_SPLIT,
     EarlierRun,
@@ -93,7 +94,7 @@ from shared.jobs.lease_types import (
 )
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
-from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_priority
+from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
 from shared.jobs.policy import Policy, policy
 from shared.jobs.quotas import check_room, usage
 from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
@@ -126,7 +127,7 @@ from shared.jobs.streams import (
 )
 from shared.jobs.submit import submit
 from shared.jobs.sweep import sweep
-from shared.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, TenantRow, Usage
+from shared.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, Room, TenantRow, Usage
 from shared.jobs.tenants import (
     create_tenant,
     get_tenant,
@@ -196,6 +197,7 @@ __all__ = [
     "EVENT_CHANNEL",
     "KEPT",
     "MAX_KEEP_DAYS",
+    "MAX_MISSING",
     "MAX_REVIEWED",
     "NO_TEXT",
     "PRIORITY_LIMIT",
@@ -262,6 +264,7 @@ __all__ = [
     "ReportFile",
     "Reroll",
     "Review",
+    "Room",
     "ScheduleChange",
     "ScheduleRow",
     "ScoreRows",
@@ -384,6 +387,7 @@ __all__ = [
     "send_test",
     "server_version",
     "set_comment",
+    "set_fail_early",
     "set_priority",
     "set_quotas",
     "store_prompts",

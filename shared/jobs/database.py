@@ -71,8 +71,11 @@ def transaction(engine: sa.Engine) -> Generator[sa.Connection]:
 
 
 def unreachable(error: BaseException) -> Unreachable:
-    """The expected error for a database that does not answer."""
+    """The expected error for a database that does not answer, or has no room."""
     cause = getattr(error, "orig", None) or error
+    if isinstance(cause, psycopg.errors.DiskFull):  # its text names a file of the server
+        hint = "Make room on the disk of Postgres; what waits goes on by itself."
+        return Unreachable("the database has no room left", where="database", hint=hint)
     first_line = (str(cause).splitlines() or [type(cause).__name__])[0]
     return Unreachable(
         f"the database does not answer ({first_line})",

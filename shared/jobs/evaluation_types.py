@@ -21,6 +21,8 @@ TEST_SPLIT, COMPOSITIONAL = "test", "compositional"
 style none was."""
 BUNDLE_SOURCES = (TEST_SPLIT, COMPOSITIONAL, f"{TEST_SPLIT}+{COMPOSITIONAL}")
 """Sources of prompts that are not their owner's: one of the splits, or both, in this order."""
+MAX_MISSING = 0.01
+"""Share of motions that may be missing from a report: with more, its numbers are those of another set."""
 
 Summary = Mapping[str, float | None]
 """What was measured, by name; None = it could not be."""

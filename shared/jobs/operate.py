@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -12,8 +13,9 @@ from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
 from shared.jobs.evaluation_types import EVALUATOR_QUEUE
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
 from shared.jobs.listings import get_job
-from shared.jobs.quotas import check_room
+from shared.jobs.quotas import take_room
 from shared.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
+from shared.jobs.submit import check_share
 from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, JobRow
 
 
@@ -49,7 +51,7 @@ def resume(conn: sa.Connection, tenant: str, job: UUID, reason: str = "resumed b
 
 
 def cancel(conn: sa.Connection, tenant: str, job: UUID, reason: str = "cancelled by operator") -> JobRow:
-    """Cancel every open item and take leases away; workers learn it at their next heartbeat. Ended already: no change.
+    """Cancel every open item and take leases away; workers learn it within a second. Ended already: no change.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -80,7 +82,7 @@ def retry(
             where=f"job {job}",
             hint=f"Items that are {', '.join(sorted(wanted))} can.",
         )
-    check_room(conn, tenant, sum(moved.values()), lock=True)
+    take_room(conn, tenant, sum(moved.values()))
     table = schema.item
     ours = (table.c.job_id == job) & table.c.state.in_(sorted(wanted))
     _refuse_unread(conn, job, ours)
@@ -104,7 +106,7 @@ def retry(
     return get_job(conn, tenant, job)
 
 
-def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int) -> JobRow:
+def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int, reason: str = "set by operator") -> JobRow:
     """Order of the job among its tenant's, −1000 … 1000, higher first.
 
     Raises:
@@ -115,7 +117,24 @@ def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int) -> 
         raise InvalidInput(f"{priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
     locked = lock_job_of(conn, tenant, job)
     conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(priority=priority))
-    record(conn, locked, [NewEvent("priority", f"priority set to {priority}", data={"priority": priority})])
+    record(conn, locked, [NewEvent("priority", f"priority {priority}: {reason}", data={"priority": priority})])
+    return get_job(conn, tenant, job)
+
+
+def set_fail_early(
+    conn: sa.Connection, tenant: str, job: UUID, share: float | None, reason: str = "set by operator"
+) -> JobRow:
+    """Cancel what is open once more than this share of the job's items has failed: at once, if it has. None = never.
+
+    Raises:
+        NotFound: the tenant has no such job.
+        InvalidInput: no share between 0 and 1.
+    """
+    check_share(share)
+    locked = replace(lock_job_of(conn, tenant, job), fail_early=share)
+    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(fail_early=share))
+    told = "never fails early" if share is None else f"fails early above a share of {share:g}"
+    cancel_if_failing(conn, record(conn, locked, [NewEvent("fail_early", f"{told}: {reason}", data={"share": share})]))
     return get_job(conn, tenant, job)
 
 
@@ -168,6 +187,15 @@ def cancel_open_items(
     moved = {(ItemState.READY, ItemState.CANCELLED): job.ready, (ItemState.LEASED, ItemState.CANCELLED): job.leased}
     event = NewEvent("cancelled", reason, data={"items": job.ready + job.leased, "cause": cause})
     record(conn, job, [event], moved=moved, control=control)
+
+
+def cancel_if_failing(conn: sa.Connection, job: LockedJob) -> None:
+    """Cancel what is open of a job under lock of which more items failed or died than it allows; most allow all."""
+    broken = job.failed + job.dead
+    if job.fail_early is None or broken <= job.fail_early * job.total or job.ready + job.leased == 0:
+        return
+    reason = f"{broken} of {job.total} items failed, more than the share of {job.fail_early:g} allowed"
+    cancel_open_items(conn, job, Cause.FAIL_EARLY, reason, control=None)
 
 
 def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 
 from shared.errors import QuotaUsedUp
 from shared.jobs import schema
-from shared.jobs.tenant_types import Usage
+from shared.jobs.tenant_types import Room, Usage
 from shared.jobs.tenants import get_tenant
 
 EXPECTED_BYTES = 512 * 2**10
@@ -52,30 +52,52 @@ def usage(conn: sa.Connection, tenant: str) -> Usage:
     )
 
 
-def check_room(conn: sa.Connection, tenant: str, items: int, *, lock: bool) -> None:
-    """Nothing, if a tenant may have so many more items in the queue.
-
-    Args:
-        lock: until the transaction ends nobody else takes of the same room. Without it only the queue is looked at,
-            which is cheap: bytes are summed once a submit.
+def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
+    """Nothing, if a tenant's queue has room for so many more items now. Bytes, which cost a sum over the files, are not
+    looked at, and others may take of the same room.
 
     Raises:
-        QuotaUsedUp: it may not.
+        QuotaUsedUp: it has not.
+        NotFound: there is no such tenant.
+    """
+    quotas = get_tenant(conn, tenant).quotas
+    if quotas.queued is not None:
+        _refuse_beyond(tenant, _in_queue(quotas.queued, _open_items(conn, tenant)[0], items))
+
+
+def check_room(conn: sa.Connection, tenant: str, items: int) -> tuple[Room, ...]:
+    """What so many more items would take of each quota that a tenant has; others may take of the same room.
+
+    Raises:
+        QuotaUsedUp: one has no room for them.
         NotFound: there is no such tenant.
     """
     quotas = get_tenant(conn, tenant).quotas
     if quotas.queued is None and quotas.bytes is None:
-        return
-    if lock:
-        _lock(conn, tenant)
-        quotas = get_tenant(conn, tenant).quotas
+        return ()
     queued, _ = _open_items(conn, tenant)
-    if quotas.queued is not None and queued + items > quotas.queued:
-        raise _queue_full(tenant, items, queued, quotas.queued)
-    if lock and quotas.bytes is not None:
-        each, stored = bytes_of_a_motion(conn, tenant), _stored(conn, tenant)
-        if stored + (queued + items) * each > quotas.bytes:
-            raise _store_full(tenant, items * each, stored, queued * each, quotas.bytes)
+    rooms: list[Room] = []
+    if quotas.queued is not None:
+        rooms.append(_in_queue(quotas.queued, queued, items))
+        _refuse_beyond(tenant, rooms[-1])
+    if quotas.bytes is not None:
+        each = bytes_of_a_motion(conn, tenant)
+        rooms.append(Room("bytes", quotas.bytes, _stored(conn, tenant), queued * each, items * each))
+        _refuse_beyond(tenant, rooms[-1])
+    return tuple(rooms)
+
+
+def take_room(conn: sa.Connection, tenant: str, items: int) -> None:
+    """`check_room`, and nobody else takes of the same room until the transaction ends.
+
+    Raises:
+        QuotaUsedUp, NotFound: as it.
+    """
+    quotas = get_tenant(conn, tenant).quotas
+    if quotas.queued is None and quotas.bytes is None:
+        return
+    _lock(conn, tenant)
+    check_room(conn, tenant, items)
 
 
 def room_to_run(conn: sa.Connection, tenant: str, wanted: int) -> int:
@@ -109,31 +131,42 @@ def _stored(conn: sa.Connection, tenant: str) -> int:
     return conn.execute(STORED, {"tenant": tenant}).scalar_one()
 
 
-def _queue_full(tenant: str, asked: int, used: int, limit: int) -> QuotaUsedUp:
-    fits = "Ask again when some are done." if asked <= limit else "Submit it as several jobs, one after the other."
-    return QuotaUsedUp(
-        f"{asked} items are more than the quota of queued items has room for: "
-        f"{used} of {limit} are queued, {max(limit - used, 0)} are left",
+def _in_queue(limit: int, queued: int, asked: int) -> Room:
+    return Room("queued", limit, queued, 0, asked)
+
+
+def _refuse_beyond(tenant: str, room: Room) -> None:
+    if room.asked <= room.limit - room.used:
+        return
+    message, hint, seconds = (_queue_full if room.quota == "queued" else _store_full)(room)
+    raise QuotaUsedUp(
+        message,
         where=f"tenant {tenant}",
-        hint=fits,
-        seconds=QUEUE_SECONDS,
-        quota="queued",
-        limit=limit,
-        used=used,
-        asked=asked,
+        hint=hint,
+        seconds=seconds,
+        quota=room.quota,
+        limit=room.limit,
+        used=room.used,
+        asked=room.asked,
     )
 
 
-def _store_full(tenant: str, asked: int, stored: int, expected: int, limit: int) -> QuotaUsedUp:
-    used = stored + expected
-    return QuotaUsedUp(
-        f"some {asked} bytes are more than the quota of stored bytes has room for: {stored} of {limit} are stored, "
-        f"{expected} expected of what is queued, {max(limit - used, 0)} are left",
-        where=f"tenant {tenant}",
-        hint="Delete jobs whose motions are fetched; the operator's next `marey admin gc` frees their bytes.",
-        seconds=BYTES_SECONDS,
-        quota="bytes",
-        limit=limit,
-        used=used,
-        asked=asked,
+def _queue_full(room: Room) -> tuple[str, str, int]:
+    """What is said, what to do, and when to ask again."""
+    return (
+        f"{room.asked} items are more than the quota of queued items has room for: "
+        f"{room.used} of {room.limit} are queued, {room.left} are left",
+        "Ask again when some are done."
+        if room.asked <= room.limit
+        else "Submit it as several jobs, one after the other.",
+        QUEUE_SECONDS,
+    )
+
+
+def _store_full(room: Room) -> tuple[str, str, int]:
+    return (
+        f"some {room.asked} bytes are more than the quota of stored bytes has room for: {room.stands} of {room.limit} "
+        f"are stored, {room.expected} expected of what is queued, {room.left} are left",
+        "Delete jobs whose motions are fetched; the operator's next `marey admin gc` frees their bytes.",
+        BYTES_SECONDS,
     )

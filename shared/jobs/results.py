@@ -26,7 +26,7 @@ from shared.jobs.journal import (
     returned,
 )
 from shared.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
-from shared.jobs.operate import cancel_open_items
+from shared.jobs.operate import cancel_if_failing
 from shared.jobs.policy import Policy, policy
 from shared.jobs.states import Cause, ItemState, Stage
 from shared.jobs.types import Problem
@@ -171,7 +171,7 @@ def fail_items(
         moved = {(ItemState.LEASED, state): count for state, count in Counter(states.values()).items()}
         job = record(conn, held.job, events, moved=moved)
         drop_empty_lease(conn, lease_token)
-        _fail_early(conn, job)
+        cancel_if_failing(conn, job)
     return replace(held.committed([failure.item for failure in failures]), states=states)
 
 
@@ -403,11 +403,3 @@ def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Poli
     )
     data = {"attempts": attempts, "delay": delay, "problem": told}
     return ItemState.READY, NewEvent("item_retried", f"again in {delay:g} s: {message}", item.id, data)
-
-
-def _fail_early(conn: sa.Connection, job: LockedJob) -> None:
-    broken = job.failed + job.dead
-    if job.fail_early is None or broken <= job.fail_early * job.total or job.ready + job.leased == 0:
-        return
-    reason = f"{broken} of {job.total} items failed, more than the share of {job.fail_early:g} allowed"
-    cancel_open_items(conn, job, Cause.FAIL_EARLY, reason, control=None)

@@ -15,7 +15,7 @@ from shared.jobs import schema
 from shared.jobs.journal import CLOCK, LaneChange, LockedJob, NewEvent, among, change_lanes, lock_job_of, record
 from shared.jobs.listings import items_of, motions_of
 from shared.jobs.operate import refuse_erased, refuse_needed
-from shared.jobs.quotas import check_room
+from shared.jobs.quotas import take_room
 from shared.jobs.states import ENDED, ItemState, JobControl, Review
 from shared.jobs.submit import check_text, write_items
 from shared.jobs.types import SEED_LIMIT, ItemRow, MotionRow, NewItem, Reroll
@@ -131,7 +131,7 @@ def _roll_again(
     if not sources:
         return set()
     _refuse_streams(conn, [item.id for item in sources])
-    check_room(conn, job.tenant, len(sources), lock=True)
+    take_room(conn, job.tenant, len(sources))
     numbers = _Numbers(conn, job.id, {item.index for item in sources})
     takes = [
         replace(

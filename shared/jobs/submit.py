@@ -18,7 +18,7 @@ from shared.jobs import schema
 from shared.jobs.idempotency import take_key
 from shared.jobs.ids import new_id
 from shared.jobs.journal import Lane, LaneChange, NewEvent, among, change_lanes, lock_job, record
-from shared.jobs.quotas import check_room
+from shared.jobs.quotas import check_queue, take_room
 from shared.jobs.states import JobState, Stage
 from shared.jobs.types import (
     MAX_KEEP_DAYS,
@@ -56,8 +56,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     """
     if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
         raise InvalidInput(f"{job.priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
-    if job.fail_early is not None and not 0 <= job.fail_early <= 1:
-        raise InvalidInput(f"{job.fail_early} is not a share between 0 and 1", where="fail_early")
+    check_share(job.fail_early)
     if job.keep_days is not None and not 1 <= job.keep_days <= MAX_KEEP_DAYS:
         raise InvalidInput(f"{job.keep_days} is not between 1 and {MAX_KEEP_DAYS} days", where="keep_days")
     for where, text in (("name", job.name), ("comment", job.comment), ("idempotency key", job.idempotency_key)):
@@ -67,7 +66,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if earlier is not None:
         return earlier
     if job.metered:
-        check_room(conn, job.tenant, job.count or 1, lock=False)
+        check_queue(conn, job.tenant, job.count or 1)
     conn.execute(
         sa.insert(schema.job).values(
             id=identifier,
@@ -85,7 +84,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
     if job.metered:
-        check_room(conn, job.tenant, total, lock=True)  # last: others of the tenant wait from here to the commit
+        take_room(conn, job.tenant, total)  # last: others of the tenant wait from here to the commit
     _begin(conn, identifier, total)
     change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
     return SubmittedJob(identifier, replayed=False, items=total)
@@ -153,6 +152,16 @@ def _check_item(item: NewItem) -> None:
         check_text(tag, f"{where}.tags")
     if not 0 <= item.seed < SEED_LIMIT:
         raise InvalidInput(f"{item.seed} is not a seed: 0 … {SEED_LIMIT - 1}", where=f"{where}.seed")
+
+
+def check_share(share: float | None) -> None:
+    """Nothing, if a job may fail early above this share of failed items; None = it never does.
+
+    Raises:
+        InvalidInput: it is not between 0 and 1.
+    """
+    if share is not None and not 0 <= share <= 1:
+        raise InvalidInput(f"{share} is not a share between 0 and 1", where="fail_early", hint="0.1 is one in ten.")
 
 
 def check_text(text: str | None, where: str) -> None:

@@ -12,6 +12,7 @@ from shared.jobs.database import transaction
 from shared.jobs.deliveries import forget_events
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
 from shared.jobs.lease_types import SweepReport
+from shared.jobs.operate import cancel_if_failing
 from shared.jobs.policy import Policy, policy
 from shared.jobs.results import drop_empty_lease, end_dead, give_back, held_items
 from shared.jobs.states import Cause, ItemState
@@ -60,6 +61,7 @@ def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:
     for token, worker, solo in expired:
         job, lost = _lose(conn, job, token, worker, rules, solo=solo)
         report = _added(report, lost)
+    cancel_if_failing(conn, job)
     return report
 
 

@@ -37,6 +37,30 @@ class Usage:
 
 
 @dataclass(frozen=True)
+class Room:
+    """What something would take of a quota: items, or bytes."""
+
+    quota: str
+    """`queued` or `bytes`."""
+    limit: int
+    stands: int
+    """Queued, or stored."""
+    expected: int
+    """Bytes that the queued items will likely leave."""
+    asked: int
+
+    @property
+    def used(self) -> int:
+        """What stands and what is expected."""
+        return self.stands + self.expected
+
+    @property
+    def left(self) -> int:
+        """What there is still room for, with nothing asked."""
+        return max(self.limit - self.used, 0)
+
+
+@dataclass(frozen=True)
 class TenantRow:
     """A tenant."""
 

@@ -16,6 +16,7 @@ from services.cli.client import Client
 from services.cli.place import Server
 from shared.errors import NotFound
 from shared.runtime.embedded import postgres_url, valkey_url
+from tests.servers.ports import free_ports
 from tests.support.marey import Marey, Serving
 
 
@@ -114,7 +115,7 @@ def test_models_texts_and_this_machine_can_be_looked_at(marey: Marey, offline: M
 
 
 def test_texts_can_be_served_alone(marey: Marey, offline: Marey) -> None:
-    port = free_port()
+    (port,) = free_ports(1)
     own = {"MAREY_DATABASE_URL": postgres_url(marey.home), "MAREY_QUEUE_URL": valkey_url(marey.home)}
     process = replace(offline, environment={**own, "MAREY_PORT": str(port)}).start("text", "serve")
     try:
@@ -128,12 +129,6 @@ def test_texts_can_be_served_alone(marey: Marey, offline: Marey) -> None:
     finally:
         process.terminate()
         process.wait(20)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def wait_for_port(port: int) -> None:

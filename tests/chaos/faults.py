@@ -136,8 +136,9 @@ class Breaker:
             self._cluster.kill_child(name)
 
     def _parent(self, fault: Fault) -> None:
-        """Its child goes on until its drain ends, for all it knows."""
+        """Its child goes on until its drain ends, for all it knows: what it held shows as lost only if it was."""
         name = self._some_worker()
+        self._note_held(fault, name)
         self._cluster.kill(name, children=False)
         self._away(3.0)
         self._start[name]()

@@ -5,20 +5,27 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
 
+from shared.measures.comparing import OBEYED, RETRIEVED
 from tests.support import chromium
 from tests.support.reports import sample_report
 from tests.support.tab import Tab, open_tab
 from tests.support.walker import walker
-from workers.evaluator.report import Report, to_html
+from workers.evaluator.port import Evaluator
+from workers.evaluator.report import Change, HeatCell, Report, Value, to_html
+from workers.evaluator.scoring import metrics_of
 
 pytestmark = pytest.mark.slow
 
 HOSTILE = "</script><script>document.documentElement.dataset.taken='yes'</script><img src=x onerror=alert(1)>"
 FRAMES = "[...document.querySelectorAll('.player')].map((box) => Number(box.dataset.frame ?? -1))"
+WIDER = (
+    "[...document.querySelectorAll('.wide')].filter((box) => box.scrollWidth > box.clientWidth).map((b) => b.ariaLabel)"
+)
 STILL = """const media = window.matchMedia;
 window.matchMedia = (query) => query.includes("reduced-motion") ? { matches: true } : media.call(window, query);"""
 PICTURE = """(() => {{
@@ -99,6 +106,50 @@ def test_pages_and_players_follow_the_theme(tab: Tab, report: Report, tmp_path: 
     assert light[5, 5, :3].min() > 200
     assert dark[5, 5, :3].max() < 60
     assert tab.complaints == []
+
+
+def with_all_columns(report: Report) -> Report:
+    """The report with every column that an evaluation over both splits has, and a number in each place."""
+
+    class Network:
+        name = "evaluator-starter@5f0c2b7d91ae"
+
+    metrics = metrics_of(cast("Evaluator", Network()), ("test", "compositional"))
+    values = {metric.key: Value(88.8888, 0.44444, 928, dimensions=128) for metric in metrics}
+    rows = tuple(dataclasses.replace(row, values=values) for row in report.rows)
+    change = Change(OBEYED, "last run", 94.4, 88.8, -9.8, -2.9, "worse")
+    changes = (change, dataclasses.replace(change, metric=RETRIEVED, low=-9.8, high=0.1, verdict="no difference found"))
+    styles = ("active", "childish", "elderly", "exhausted", "feminine", "happy", "masculine", "normal", "not-confident")
+    heat = [
+        HeatCell(act, style, 105, 100) for act in ("2 acts in order", "walk") for style in (*styles, "sad", "giant")
+    ]
+    return dataclasses.replace(report, metrics=metrics, rows=rows, changes=changes, trend=(), heat=tuple(heat))
+
+
+@pytest.mark.parametrize("width", [1280, 1000])
+def test_tables_of_every_metric_need_no_sideways_scrolling(
+    tab: Tab, report: Report, tmp_path: Path, width: int
+) -> None:
+    opened(tab, with_all_columns(report), tmp_path)
+    tab.size(width, 900)
+    assert tab.ask(WIDER) == []
+    assert tab.ask("document.querySelectorAll('#numbers table').length") == 4
+
+
+def test_in_a_narrow_window_the_name_of_a_row_stays_beside_its_numbers(
+    tab: Tab, report: Report, tmp_path: Path
+) -> None:
+    opened(tab, with_all_columns(report), tmp_path)
+    tab.size(420, 800, phone=True)
+    assert len(tab.ask(WIDER)) > 0
+    for part in ("#numbers", "#heat"):
+        tab.ask(f"document.querySelector('{part} .wide').scrollLeft = 200")
+        head, box = (
+            tab.ask(f"document.querySelector('{part} .wide {of}').getBoundingClientRect().left")
+            for of in ("tbody th", "tbody td:last-child")
+        )
+        assert head == pytest.approx(tab.ask(f"document.querySelector('{part} .wide').getBoundingClientRect().left"))
+        assert box > head
 
 
 def test_on_a_phone_nothing_but_tables_is_wider_than_the_screen(tab: Tab, report: Report, tmp_path: Path) -> None:

@@ -5,36 +5,22 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import tempfile
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from uuid import uuid4
 
 import httpx2
 import pytest
 
+from services.api.jobs.service import MAX_VALUES
 from shared.errors import NotFound
 from shared.jobs import WorkerBeat, beat, transaction
-from shared.runtime.embedded import EmbeddedServer
-from tests.support.live_api import BUNDLE, LiveApi, running_api, settings_of
+from shared.spool import IN_MEMORY
+from tests.support.live_api import BUNDLE, LiveApi
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
-
-
-@pytest.fixture(scope="module")
-def api(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[LiveApi]:
-    config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
-    with running_api(config, module_database_url) as api:
-        yield api
-
-
-@pytest.fixture
-def http(api: LiveApi) -> Iterator[httpx2.Client]:
-    with api.http() as client:
-        yield client
 
 
 def submit(http: httpx2.Client, *items: dict[str, object], **fields: object) -> dict[str, object]:
@@ -146,6 +132,28 @@ def test_too_many_items_and_too_large_a_body_are_413(http: httpx2.Client) -> Non
     refused(http.post("/v1/jobs", content=(b"x" * 2**20 for _ in range(70)), headers=headers), 413, "too-large")
     job = submit(http)
     refused(http.patch(f"/v1/jobs/{job['id']}", content=b" " * (2**20 + 1)), 413, "too-large")
+
+
+def test_a_document_of_far_too_many_values_is_refused_before_it_is_read(http: httpx2.Client) -> None:
+    body = b'{"items": [' + b"{}," * (MAX_VALUES // 2 + 1) + b"{}]}"
+    refused(http.post("/v1/jobs", content=body), 413, "too-large")
+
+
+def test_a_long_body_that_cannot_be_kept_is_a_503_and_no_job(
+    http: httpx2.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = jobs_there(http)
+    line = json.dumps({"prompt": "a person walks"}).encode() + b"\n"
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "unmounted"))
+    problem = refused(
+        http.post(
+            "/v1/jobs", content=line * (IN_MEMORY // len(line) + 1), headers={"Content-Type": "application/x-ndjson"}
+        ),
+        503,
+        "unreachable",
+    )
+    assert problem["where"] == "body"
+    assert jobs_there(http) == before
 
 
 def test_a_thousand_prompts_are_one_job(http: httpx2.Client) -> None:

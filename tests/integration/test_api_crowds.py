@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import httpx2
-import pytest
 
-from shared.runtime.embedded import EmbeddedServer
-from tests.support.live_api import LiveApi, running_api, settings_of
+from tests.support.live_api import LiveApi
 
 REQUESTS = 80
 """Twice the threads of a process, four times its connections."""
 FOLLOWERS = 50
-
-
-@pytest.fixture(scope="module")
-def api(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[LiveApi]:
-    config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
-    with running_api(config, module_database_url) as api:
-        yield api
 
 
 def test_more_requests_at_once_than_connections_are_all_answered(api: LiveApi) -> None:

@@ -6,15 +6,13 @@ import hashlib
 import itertools
 import json
 import re
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
-from uuid import UUID, uuid4
+from uuid import UUID
 
 import httpx2
 import pytest
-import sqlalchemy as sa
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from websockets.exceptions import ConnectionClosed
 
@@ -25,12 +23,12 @@ from shared.jobs import (
     create_tenant,
     list_audit,
     revoke_key,
-    schema,
     set_quotas,
     suspend_tenant,
     transaction,
 )
 from shared.runtime.embedded import EmbeddedServer
+from tests.support.auth_states import ENDINGS, end_key
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
@@ -181,20 +179,6 @@ def test_no_socket_shows_what_another_tenant_has(place: Studio, mine: Mine) -> N
         assert viewer.until("stream").of("stream")[0]["stream"]["id"] == mine.ids["stream"]
 
 
-def test_every_route_that_tells_of_a_tenant_wants_a_key(place: Studio, mine: Mine) -> None:
-    for method, template in [*requests(), *(("GET", path) for path in OF_ALL)]:
-        response = httpx2.request(method, place.api.url + mine.path(template), json=mine.body(f"{method} {template}"))
-        assert response.status_code == 401, f"{method} {template}: {response.status_code}"
-
-
-def test_what_tells_of_all_tenants_wants_a_scope_that_no_other_holds(place: Studio) -> None:
-    with place.http("admin", "read", "submit", "operate", tenant="rival") as rival, place.http("metrics") as watcher:
-        for path in OF_ALL:
-            assert rival.get(path).status_code == 403
-            assert watcher.get(path).status_code == 200
-        assert watcher.get("/v1/jobs").status_code == 403
-
-
 def test_the_hash_of_content_opens_nothing(place: Studio, mine: Mine) -> None:
     """Whoever knows what a file holds, or has the same content, has no way to the file of another."""
     path = f"/v1/motions/{mine.ids['motion']}/files/npz"
@@ -282,10 +266,14 @@ def test_the_command_line_has_the_same_verbs_with_their_reasons(place: Studio) -
         job = accepted(http.post("/v1/jobs", json=BODIES["POST /v1/jobs"]))["id"]
         for verb in ("pause", "resume", "cancel", "retry"):
             marey("jobs", verb, job, "--reason", f"{verb} it").ok()
-        marey("jobs", "priority", job, "--", -7).ok()
+        marey("jobs", "priority", job, "--reason", "it is late", "--", -7).ok()
+        assert "fails early above 0.25" in marey("jobs", "fail-early", job, 0.25, "--reason", "it is dear").ok().err
+        marey("jobs", "fail-early", job, "none").ok()
+        marey("jobs", "fail-early", job, "nan").refused(2, "is not a share")
         assert json.loads(marey("jobs", "comment", job, "for Monday", "--json").ok().out)["priority"] == -7
         events = [event for event in http.get(f"/v1/jobs/{job}/events").json()["items"] if event["kind"] != "state"]
-        told = ["pause it", "resume it", "cancel it", "retry it", "priority set to -7", "for Monday"]
+        told = ["pause it", "resume it", "cancel it", "retry it", "priority -7: it is late"]
+        told += ["fails early above a share of 0.25: it is dear", "never fails early: set by all", "for Monday"]
         assert [event["reason"] for event in events[1:]] == told
         marey("jobs", "cancel", job).ok()
 
@@ -352,29 +340,7 @@ def test_a_revoked_key_loses_its_open_socket(place: Studio, mine: Mine) -> None:
         assert viewer.closed()[0] == 4401
 
 
-def test_on_no_route_is_anybody_answered_without_a_valid_key(place: Studio) -> None:
-    with transaction(place.api.engine) as conn:
-        create_tenant(conn, "closed")
-    keys = {ending: place.key("admin", tenant="closed") for ending in ("revoked", "expired", "suspended")}
-    with transaction(place.api.engine) as conn:
-        for ending in keys:  # suspended last: then the others are still told what they are
-            end_key(conn, ending, "closed", authenticate(conn, keys[ending]).id)
-    shown = {"no key": None, "garbage": "Bearer marey_0_0", "of another kind": "Basic bWU6bWU=", "empty": ""}
-    shown |= {ending: f"Bearer {secret}" for ending, secret in keys.items()}
-    asked = [*requests(), ("GET", "/metrics"), ("GET", "/v1/models"), ("POST", "/v1/texts/parse")]
-    nobody = Mine(defaultdict(lambda: str(uuid4())), "")
-    with httpx2.Client(base_url=place.api.url, timeout=30) as http:
-        for method, template in asked:
-            path, body = nobody.path(template), nobody.body(f"{method} {template}")
-            for state, header in shown.items():
-                headers = {} if header is None else {"Authorization": header}
-                response = http.request(method, path, json=body, headers=headers)
-                told = (response.status_code, response.json()["type"].rpartition(":")[2])
-                wanted = (403, "refused") if state == "suspended" else (401, "unauthenticated")
-                assert told == wanted, f"{state}: {method} {template}: {response.text[:200]}"
-
-
-@pytest.mark.parametrize("ending", ["revoked", "expired", "suspended"])
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_an_event_stream_ends_with_its_key(place: Studio, ending: str) -> None:
     tenant = f"tenant-{ending}"
     with transaction(place.api.engine) as conn:
@@ -393,15 +359,6 @@ def test_an_event_stream_ends_with_its_key(place: Studio, ending: str) -> None:
     if ending != "suspended":
         with httpx2.Client(base_url=place.api.url, headers={"Authorization": f"Bearer {other}"}) as http:
             accepted(http.post(f"/v1/jobs/{job}/cancel"))
-
-
-def end_key(conn: sa.Connection, ending: str, tenant: str, key: UUID) -> None:
-    if ending == "revoked":
-        revoke_key(conn, tenant, key)
-    elif ending == "suspended":
-        suspend_tenant(conn, tenant)
-    else:
-        conn.execute(sa.update(schema.api_key).where(schema.api_key.c.id == key).values(expires_at=sa.func.now()))
 
 
 def key_id(place: Studio, secret: str) -> UUID:

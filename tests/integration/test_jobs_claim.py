@@ -298,6 +298,19 @@ def test_an_item_that_kills_its_worker_dies_and_its_neighbours_succeed(engine: s
     assert dead.problem["type"] == "worker-lost"
 
 
+def test_items_that_kill_their_worker_end_a_job_early_too(engine: sa.Engine) -> None:
+    job = submit_items(engine, 8, fail_early=0.0)
+    parse_texts(engine)
+    while not nothing_left(engine, job):
+        claimed = claim_some(engine)
+        let_expire(engine, claimed.lease_token)
+        sweep(engine)
+    with transaction(engine) as conn:
+        row = get_job(conn, "default", job)
+        assert (row.dead, row.cancelled, row.state) == (1, 7, JobState.FAILED)
+        assert audit(conn) == []
+
+
 def nothing_left(engine: sa.Engine, job: UUID) -> bool:
     with transaction(engine) as conn:
         row = get_job(conn, "default", job)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from uuid import UUID
 
 import sqlalchemy as sa
@@ -35,6 +37,8 @@ from shared.jobs import (
     release,
     resume,
     retry,
+    set_fail_early,
+    set_priority,
     set_quotas,
     sweep,
     transaction,
@@ -43,7 +47,16 @@ from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, let_expire, make_due, motion_of, new_item, submit_items
 from tests.support.webhooks import new_webhook
 
-VERBS = {"pause": pause, "resume": resume, "cancel": cancel, "retry": retry}
+VERBS: dict[str, Callable[[sa.Connection, str, UUID], object]] = {
+    "pause": pause,
+    "resume": resume,
+    "cancel": cancel,
+    "retry": retry,
+    "retry failed": partial(retry, failed_only=True),
+    "priority": partial(set_priority, priority=7),
+    "fail early": partial(set_fail_early, share=0.3),
+    "fail never": partial(set_fail_early, share=None),
+}
 PROMPTS = st.sampled_from(["walk", "run", "jump", "wave"])
 
 

@@ -28,6 +28,7 @@ from shared.jobs import (
     resume,
     retry,
     set_comment,
+    set_fail_early,
     set_priority,
     transaction,
 )
@@ -127,6 +128,22 @@ def test_priority_and_comment_are_kept_and_told(engine: sa.Engine) -> None:
                 set_priority(conn, "default", job, priority)
 
 
+def test_a_running_job_is_told_to_fail_early_and_does_at_once_if_too_much_has_failed(engine: sa.Engine) -> None:
+    job = finish(engine, succeeded=3, failed=1, left=4)
+    with transaction(engine) as conn:
+        for share in (-0.1, 1.1, float("nan")):
+            with pytest.raises(InvalidInput, match="not a share"):
+                set_fail_early(conn, "default", job, share)
+        assert set_fail_early(conn, "default", job, 0.5).ready == 4
+        assert set_fail_early(conn, "default", job, None).fail_early is None
+        row = set_fail_early(conn, "default", job, 0.1, "it is dear")
+        assert (row.fail_early, row.ready, row.cancelled, row.state) == (0.1, 0, 4, JobState.PARTIAL)
+        told = [event.reason for event in events_after(conn, "default", job)]
+        assert "fails early above a share of 0.1: it is dear" in told
+        assert "1 of 8 items failed, more than the share of 0.1 allowed" in told
+        assert audit(conn) == []
+
+
 def test_delete_takes_everything_of_an_ended_job_and_of_no_other(engine: sa.Engine) -> None:
     kept, job, running = finish(engine, succeeded=1), finish(engine, succeeded=2, failed=1), finish(engine, left=1)
     with transaction(engine) as conn:
@@ -148,6 +165,7 @@ VERBS: dict[str, Verb] = {
     "retry": retry,
     "delete": delete,
     "set_priority": lambda conn, tenant, job: set_priority(conn, tenant, job, 1),
+    "set_fail_early": lambda conn, tenant, job: set_fail_early(conn, tenant, job, 0.5),
     "set_comment": lambda conn, tenant, job: set_comment(conn, tenant, job, "x"),
     "get_job": get_job,
     "list_items": list_items,

@@ -22,6 +22,7 @@ from shared.jobs import (
     retry,
     schema,
     set_comment,
+    set_fail_early,
     set_priority,
     transaction,
 )
@@ -37,11 +38,18 @@ VERBS: dict[str, Verb] = {
     "cancel": lambda conn, job: cancel(conn, "default", job, REASON),
     "retry": lambda conn, job: retry(conn, "default", job, reason=REASON),
     "retry failed": lambda conn, job: retry(conn, "default", job, failed_only=True, reason=REASON),
-    "priority": lambda conn, job: set_priority(conn, "default", job, 7),
+    "priority": lambda conn, job: set_priority(conn, "default", job, 7, REASON),
+    "fail early": lambda conn, job: set_fail_early(conn, "default", job, 0.5, REASON),
     "comment": lambda conn, job: set_comment(conn, "default", job, REASON),
     "delete": lambda conn, job: delete(conn, "default", job),
 }
 GONE, REFUSED = "gone", "refused"
+ALWAYS = {
+    "priority": f"priority 7: {REASON}",
+    "comment": REASON,
+    "fail early": f"fails early above a share of 0.5: {REASON}",
+}
+"""Verbs that are always allowed and change no state, and what their events tell."""
 
 # What a verb makes of a job in a state. Each job has one item that failed, but for those that cannot.
 OUTCOMES: dict[JobState, dict[str, JobState | str]] = {
@@ -123,7 +131,7 @@ def test_every_verb_does_to_a_job_in_every_state_what_the_table_says(engine: sa.
     assert set(OUTCOMES) == set(JobState)
     for state, expected in OUTCOMES.items():
         job = made(engine, state)
-        expected = {"priority": state, "comment": state} | expected  # always allowed, and change no state
+        expected = dict.fromkeys(ALWAYS, state) | expected
         assert set(expected) == set(VERBS)
         for name, verb in VERBS.items():
             with engine.connect() as conn:
@@ -144,7 +152,7 @@ def tell_why(conn: sa.Connection, verb: str, before: JobRow) -> None:
     events = events_after(conn, "default", before.id, before.event_seq)
     after = get_job(conn, "default", before.id)
     same = (after.control, after.state, after.ready) == (before.control, before.state, before.ready)
-    if same and verb not in ("priority", "comment"):
+    if same and verb not in ALWAYS:
         assert events == [], verb
     else:
-        assert events[0].reason == ("priority set to 7" if verb == "priority" else REASON), verb
+        assert events[0].reason == ALWAYS.get(verb, REASON), verb

@@ -19,6 +19,7 @@ from shared.jobs import (
     Quotas,
     begin_assets,
     cancel,
+    check_room,
     claim,
     commit_motions,
     create_key,
@@ -232,6 +233,20 @@ def test_bytes_are_estimated_at_submit_and_settled_at_commit(engine: sa.Engine) 
     with transaction(engine) as conn:
         assert (usage(conn, tenant).bytes, usage(conn, tenant).expected) == (3 * 36, 0)
     submit_items(engine, 1000, tenant=tenant)  # as those before: 36 bytes each
+
+
+def test_a_look_at_the_room_tells_of_each_quota_and_refuses_as_a_submit_does(engine: sa.Engine) -> None:
+    tenant = new_tenant(engine, queued=5, bytes=4 * EXPECTED_BYTES)
+    submit_items(engine, 1, tenant=tenant)
+    with transaction(engine) as conn:
+        queued, size = check_room(conn, tenant, 3)
+        assert (queued.quota, queued.limit, queued.used, queued.left, queued.asked) == ("queued", 5, 1, 4, 3)
+        assert (size.quota, size.used, size.left) == ("bytes", EXPECTED_BYTES, 3 * EXPECTED_BYTES)
+        for count, quota in ((4, "bytes"), (5, "queued")):
+            with pytest.raises(QuotaUsedUp) as refused:
+                check_room(conn, tenant, count)
+            assert refused.value.quota == quota
+        assert check_room(conn, "default", 10**6) == ()
 
 
 def test_a_finished_item_is_kept_though_it_is_larger_than_what_is_left(engine: sa.Engine) -> None:

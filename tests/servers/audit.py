@@ -45,6 +45,10 @@ CHECKS = {
         SELECT tenant.id, sum(job.ready + job.leased), sum(job.leased) FROM tenant JOIN job ON job.tenant_id = tenant.id
         GROUP BY tenant.id HAVING sum(job.ready + job.leased) > max_queued OR sum(job.leased) > max_running
     """,
+    "a job goes on though more of it failed than it allows": """
+        SELECT id, failed, dead, total, fail_early FROM job
+        WHERE failed + dead > fail_early * total AND ready + leased > 0
+    """,
     "a motion's file is not stored": """
         SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
         WHERE asset.state <> 'stored'

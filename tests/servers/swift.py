@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import http.client
 import itertools
-import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 from shared.storage.s3 import S3Options, S3Store
+from tests.servers.ports import free_ports
 
 ACCOUNT = "AUTH_test"
 HASH_PREFIX = HASH_SUFFIX = "marey"
@@ -26,7 +26,7 @@ class Swift:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._ports = _free_ports(4)
+        self._ports = free_ports(4)
         self._buckets = itertools.count()
         self._process: subprocess.Popen[str] | None = None
 
@@ -99,11 +99,3 @@ class Swift:
         store = S3Store(self.options(f"marey-{next(self._buckets)}"))
         store.prepare()
         return store
-
-
-def _free_ports(count: int) -> list[int]:
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    ports = [opened.getsockname()[1] for opened in sockets]
-    for opened in sockets:
-        opened.close()
-    return ports

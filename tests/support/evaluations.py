@@ -56,7 +56,7 @@ def write_generator(models: Path, name: str = GENERATOR, *, model: str = toy.QUE
         writer.add_part("masked", {"w": np.full(3, weight, np.float32)})
         writer.finish(
             name=name, version="1", kind="generator", model=model, config="tiny", fps=20.0, licence="MIT",
-            skeleton="humanml3d",
+            skeleton="humanml3d", layout="humanml3d-263",
             parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 10}},
             text=TextSpec(labeller="none", encoder_sha256="0" * 64),
         )  # fmt: skip
@@ -69,12 +69,17 @@ def write_evaluator(
     clips: Sequence[dict[str, Any]] = CLIPS,
     weight: float = 0.0,
     skeleton: str = "humanml3d",
+    layout: str = "humanml3d-263",
+    fps: float = 20.0,
+    motions: int | None = None,
 ) -> None:
-    """An evaluator's bundle with the captions of these clips."""
+    """An evaluator's bundle with the captions of these clips, and embeddings of so many motions if it has any."""
     full = [{"id": f"c{n}", "label": "x", "captured": True, **clip} for n, clip in enumerate(clips)]
     with BundleWriter(models / name, overwrite=True) as writer:
         writer.add_part("motion", {"w": np.full(3, weight, np.float32)})
         writer.add_json("reference.json", {"test": full})
+        if motions is not None:
+            writer.add_part("reference", {"test": np.zeros((motions, 4), np.float16)})
         writer.finish(
             name=name,
             version="1",
@@ -82,8 +87,9 @@ def write_evaluator(
             model="toy",
             config="tiny",
             parameters={},
-            fps=20.0,
+            fps=fps,
             skeleton=skeleton,
+            layout=layout,
             licence="MIT",
         )
 

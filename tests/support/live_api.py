@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import socket
 import sys
 import threading
 import time
@@ -42,6 +41,7 @@ from shared.jobs import (
 )
 from shared.settings import Settings
 from shared.storage import AssetStore, open_store
+from tests.servers.ports import free_ports
 from tests.servers.receiver import LOOPBACK
 from tests.support.webhooks import KEY
 
@@ -110,17 +110,17 @@ class LiveApi:
         return found is not None
 
 
-def write_bundle(models: Path) -> None:
+def write_bundle(models: Path, name: str = BUNDLE, model: str = "hgm3") -> None:
     """A generator's bundle that is only looked at."""
-    with BundleWriter(models / BUNDLE) as writer:
+    with BundleWriter(models / name) as writer:
         writer.add_part("masked", {"w": np.zeros(3, np.float32)})
         writer.finish(
-            name=BUNDLE,
+            name=name,
             version="1",
             kind="generator",
-            model="hgm3",
+            model=model,
             config="tiny",
-            parameters={"min_frames": 16, "max_frames": 196},
+            parameters={"min_frames": 16, "max_frames": 196, "inference": {"steps": 1}},
             fps=20.0,
             licence="MIT",
             text=TextSpec(labeller="none", encoder_sha256="0" * 64),
@@ -138,7 +138,7 @@ def settings_of(home: Path, database_url: str, queue_url: str) -> Settings:
             "models": models,
             "database_url": database_url,
             "queue_url": queue_url,
-            "port": _free_port(),
+            "port": free_ports(1)[0],
             "webhook_key": KEY,
             "webhook_allow": ["public", *LOOPBACK],
         }
@@ -185,9 +185,3 @@ def running_api(config: Settings, database_url: str) -> Iterator[LiveApi]:
     with ApiThread(config) as url:
         yield LiveApi(url, key, engine, open_store(config))
     engine.dispose()
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

@@ -12,7 +12,7 @@ from shared.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Ha
 from shared.runtime.scoring import ScoreInput
 from shared.settings import settings
 from workers.evaluator.loading import load_evaluator
-from workers.evaluator.measuring import measure
+from workers.evaluator.measuring import check_measured, measure
 from workers.evaluator.port import Evaluator
 from workers.evaluator.reconstruction import find_reconstruction
 from workers.evaluator.reference import Reference
@@ -69,6 +69,7 @@ class EvaluatorHandler:
 
 def _scored(item: ClaimedItem, source: ScoreInput, loaded: _Loaded, control: BatchControl) -> Scored:
     measured = measure(source.items, source.npz, loaded.evaluator, progress=control.progress)
+    check_measured(measured, len(source.items))
     reconstruction = find_reconstruction(loaded.bundle, source.request.bundle)
     made = len(measured.motions)
     report = report_of(

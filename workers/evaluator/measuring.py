@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shared.errors import InvalidFile, InvalidInput, NotFound
 from shared.expected import read_expected
-from shared.jobs import MadeItem
+from shared.jobs import MAX_MISSING, MadeItem
 from shared.motion.clip import MotionClip, parse_npz
 from shared.motion.features import FeatureLayout, layout
 from shared.motion.resample import resample
@@ -132,6 +132,26 @@ def measure(
         embed_prompts([motion.item.prompt for motion in found], evaluator, lambda: progress(done, len(made))),
         tuple(broken),
     )
+
+
+def check_measured(measured: Measured, asked: int) -> None:
+    """Refuse to report where too many motions are missing: the numbers would be those of another set.
+
+    Args:
+        measured: what could be measured, and what was made but could not.
+        asked: motions that were asked for.
+
+    Raises:
+        InvalidFile: some are lost, damaged, or hold NaN, and with those more than `MAX_MISSING` are missing.
+    """
+    broken, missing = measured.broken, asked - len(measured.motions)
+    if broken and missing > MAX_MISSING * asked:
+        raise InvalidFile(
+            f"{missing} of {asked} motions cannot be measured, {missing / asked:.1%} where {MAX_MISSING:.0%} may be; "
+            f"the first of {len(broken)} that are broken: {broken[0].reason}",
+            where=f"prompt {broken[0].item.index}, repeat {broken[0].item.variant}",
+            hint="Look at the store and at the bundle that made them, then evaluate again.",
+        )
 
 
 def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Checked:

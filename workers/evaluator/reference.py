@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from shared.bundles import Bundle, BundleWriter
-from shared.bundles.reference import expected_of
+from shared.bundles.reference import FILE, PART, expected_of
 from shared.errors import InvalidBundle, NotFound
 from workers.evaluator.labels import label_ids, label_of
 from workers.evaluator.measuring import check
@@ -21,7 +21,6 @@ from workers.training.data.manifest import Clip
 
 SPLITS = ("val", "test", "compositional")
 """`test` judges; `val` is to choose by; `compositional` are pairs of act and style that training never saw."""
-FILE, PART = "reference.json", "reference"
 
 
 class ReferenceClip(BaseModel):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import statistics
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -238,12 +239,14 @@ def bundle_of(reference: str) -> Reference:
 
 
 def _command(source: ScoreInput) -> str:
+    """What a person types to run it again; a file of prompts may have any name."""
     request = source.request
-    settings = "".join(f" --set {name}={value:g}" for name, value in sorted(request.settings.items()))
-    return (
-        f"marey eval run --bundle {request.bundle} --evaluator {request.evaluator} --split {request.source} "
-        f"--repeats {request.repeats} --seed {request.seed}{settings}"
-    )
+    words = ["marey", "eval", "run", "--bundle", request.bundle, "--evaluator", str(request.evaluator)]
+    words += ["--split", request.source, "--repeats", str(request.repeats), "--seed", str(request.seed)]
+    for name, value in sorted(request.settings.items()):
+        short = f"{value:g}"
+        words += ["--set", f"{name}={short if float(short) == value else repr(value)}"]
+    return shlex.join(words)
 
 
 def _software(measured: Measured, source: ScoreInput) -> Mapping[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,18 @@ from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from workers.evaluator.reference import Reference, ReferenceSplit
 from workers.evaluator.report import Row, Value
 from workers.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
-from workers.evaluator.scoring import POOLS, QUALITY, Side, apart, embedded, on_joints, retrieval, several
+from workers.evaluator.scoring import (
+    POOLS,
+    QUALITY,
+    Side,
+    apart,
+    embedded,
+    keys_of,
+    label_ceilings,
+    on_joints,
+    retrieval,
+    several,
+)
 from workers.training.checks.quality import Quality
 
 UNMEASURED = "nobody measured this generator's tokenizer on real motion (`marey train evaluator reconstruct`)"
@@ -83,6 +94,10 @@ def truth_row(ruler: Ruler) -> Row:
         rows,
         distances=False,
     )
+    for pool, note in _ceilings(split.labels, ruler.seed).items():
+        values |= {
+            key: replace(value, note=value.note or note) for key, value in values.items() if key in keys_of(pool)
+        }
     return Row(
         GROUND_TRUTH, "Real motion", f"{len(split.clips)} clips of {_named(ruler.splits)} with their captions", values
     )
@@ -131,6 +146,19 @@ def real_side(split: ReferenceSplit, motion: Embeddings, ruler: Ruler) -> Side:
     """Embeddings (N, E) made of the clips of a split, with the clips' captions."""
     text = embed_prompts(split.prompts, ruler.evaluator, ruler.beat)
     return Side(motion, text, split.labels, np.zeros(len(split.clips), np.int64), ruler.beat)
+
+
+def _ceilings(labels: NDArray[np.int64], seed: int) -> dict[int, str]:
+    """By pool, what R-precision of clips with these labels (N,) has as its most; of pools that they fill."""
+    return {
+        pool: (
+            f"A motion of the prompt's own label counts as found, so a model that knows every label, and nothing more, "
+            f"has 100 % in pools of {pool}. Were the clip of the prompt alone to count, it would have "
+            f"{', '.join(f'{ceiling:.1f} % at {k}' for k, ceiling in label_ceilings(labels, pool, seed).items())}."
+        )
+        for pool in POOLS
+        if len(labels) >= pool
+    }
 
 
 def _named(splits: Sequence[str]) -> str:

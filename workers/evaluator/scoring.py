@@ -18,7 +18,13 @@ from shared.measures.comparing import OBEYED
 from workers.evaluator.measuring import Measured
 from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 from workers.evaluator.metrics.intervals import redraw, repeated
-from workers.evaluator.metrics.retrieval import RPrecision, clip_score, matching_score, r_precision
+from workers.evaluator.metrics.retrieval import (
+    RPrecision,
+    clip_score,
+    label_ceiling,
+    matching_score,
+    r_precision,
+)
 from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from workers.evaluator.report import Metric, Value
 from workers.training.checks.quality import Quality
@@ -244,6 +250,22 @@ def _interval(found: Sequence[float], count: int, *, dimensions: int | None = No
         return Value(found[0], None, count, dimensions=dimensions)
     interval = repeated(found)
     return Value(interval.mean, interval.half_width, count, dimensions=dimensions)
+
+
+def label_ceilings(labels: NDArray[np.int64], pool: int, seed: int) -> dict[int, float]:
+    """By k, what a model that knows every label and nothing else has of R-precision where the pair alone counts, in
+    per cent; of labels (N,), mean over the repeats.
+
+    Raises:
+        InvalidInput: fewer labels than a pool.
+    """
+    drawn = redraw(lambda rng: label_ceiling(labels, pool=pool, top=TOP, rng=rng), repeats=REPEATS, seed=seed)
+    return {k: 100 * float(np.mean([found.at(k) for found in drawn])) for k in TOP}
+
+
+def keys_of(pool: int) -> tuple[str, ...]:
+    """The metrics of R-precision in pools of so many."""
+    return tuple(_key(pool, k) for k in TOP)
 
 
 def _key(pool: int, k: int) -> str:

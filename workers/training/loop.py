@@ -26,6 +26,7 @@ from torch.utils.tensorboard import SummaryWriter
 
 from shared.errors import InvalidInput, MareyError
 from shared.nn import distributed
+from shared.nn.devices import fast_bf16
 from shared.nn.ema import WeightAverage
 from workers.training.budget import Budget, learning_rate
 from workers.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
@@ -86,7 +87,7 @@ class RunOptions:
     budget: Budget
     seed: int = 0
     resume: bool = False
-    bf16: bool = True
+    bf16: bool = True  # where it pays: processors without its instructions take ten times as long
     checkpoint_minutes: float = 3.0
     validate_times: int = 8  # over the whole budget, the end included
     log_every: int = 20
@@ -214,7 +215,7 @@ class _Run:
         self.seconds += float(distributed.broadcast(elapsed))
 
     def _autocast(self) -> Any:
-        if not self.options.bf16:
+        if not (self.options.bf16 and fast_bf16(self.device)):
             return nullcontext()
         return torch.autocast(self.device.type, dtype=torch.bfloat16)
 

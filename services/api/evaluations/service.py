@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -41,7 +42,7 @@ class Asked:
         try:
             return plan_evaluation(self.request, self.prompts, config)
         except NotFound as error:  # what is not found is not at this path
-            raise InvalidInput(error.message, where=error.where or "bundle", hint=error.hint) from error
+            raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
 
 
 def read_asked(model: type[Fields], document: Mapping[str, Any]) -> tuple[Fields, Asked]:
@@ -78,7 +79,7 @@ def create(
             name=fields.name,
             comment=fields.comment,
             idempotency_key=idempotency_key,
-            body_sha256=request_sha256("evaluations", body) if idempotency_key else None,
+            body_sha256=request_sha256("evaluations", io.BytesIO(body)) if idempotency_key else None,
         )
         made = jobs.create_evaluation(conn, new)
         assert made is not None  # only one of a schedule can be there already

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 from uuid import UUID
 
 from fastapi import APIRouter, Header, Query, Request, Response
@@ -12,7 +12,7 @@ from fastapi.sse import EventSourceResponse
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import read_body
+from services.api.bodies import kept_body
 from services.api.context import Connection, Context, Shared
 from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
@@ -30,7 +30,7 @@ from services.api.jobs.schemas import (
 )
 from services.api.motions.routes import Found
 from services.api.motions.schemas import MotionView
-from services.api.problems import RESPONSES
+from services.api.problems import RESPONSES, QuotaBody
 from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs, metrics, tracing
 from shared.errors import InvalidInput
@@ -83,7 +83,6 @@ async def submit_job(
     For NDJSON, what concerns the job as a whole stands in the query. All problems of all lines are told at once, and
     then nothing is written.
     """
-    body = await read_body(request)
     kind = request.headers.get("content-type", JSON).partition(";")[0].strip().lower()
     fields = {
         "name": name,
@@ -92,14 +91,17 @@ async def submit_job(
         "fail_early": fail_early,
         "keep_days": keep_days,
     }
-    submission = await run_in_threadpool(_read, kind, body, fields, shared)
-    if validate_only:
-        return await run_in_threadpool(_check, shared, key, submission)
-    sha256 = service.request_sha256(str(request.url.query), body)
-    return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
+    async with kept_body(request) as body:
+        submission = await run_in_threadpool(_read, kind, body, fields, shared)
+        if validate_only:
+            return await run_in_threadpool(_check, shared, key, submission)
+        sha256 = None
+        if idempotency_key:
+            sha256 = await run_in_threadpool(service.request_sha256, str(request.url.query), body)
+        return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
 
 
-def _read(kind: str, body: bytes, fields: dict[str, Any], shared: Context) -> service.Submission:
+def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) -> service.Submission:
     if kind == NDJSON:
         return service.read_ndjson(body, service.job_fields(fields), shared.catalogue)
     if kind == JSON:
@@ -112,7 +114,7 @@ def _read(kind: str, body: bytes, fields: dict[str, Any], shared: Context) -> se
 def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) -> JSONResponse:
     by_bundle = submission.by_bundle
     with jobs.transaction(shared.engine) as conn:
-        jobs.check_room(conn, key.tenant, submission.count, lock=False)
+        rooms = jobs.check_room(conn, key.tenant, submission.count)
         estimate = jobs.estimate(conn, by_bundle)
         waiting = jobs.waiting_items(conn)
     checked = CheckedView(
@@ -120,13 +122,14 @@ def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) ->
         items=submission.count,
         bundles=submission.bundles,
         estimate=EstimateView.of(estimate),
+        quotas=[QuotaBody.of(room) for room in rooms],
         waiting=sum(waiting.get(queue, 0) for queue in {jobs.TEXT_QUEUE, *(model for model, _ in by_bundle)}),
     )
     return JSONResponse(checked.model_dump(mode="json"))
 
 
 def _write(
-    shared: Context, key: jobs.ApiKey, submission: service.Submission, idempotency_key: str | None, sha256: str
+    shared: Context, key: jobs.ApiKey, submission: service.Submission, idempotency_key: str | None, sha256: str | None
 ) -> JSONResponse:
     new = jobs.NewJob(
         items=submission.new_items(),
@@ -134,7 +137,7 @@ def _write(
         count=submission.count,
         traceparent=tracing.current(),
         idempotency_key=idempotency_key,
-        body_sha256=sha256 if idempotency_key else None,
+        body_sha256=sha256,
         **submission.fields.model_dump(),
     )
     with tracing.span("submit", tenant=key.tenant) as span, jobs.transaction(shared.engine) as conn:
@@ -176,15 +179,22 @@ def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
 
 
 @router.patch("/{job}")
-def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator) -> JobView:
-    """Change the priority or the comment."""
+def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
+    """Change the priority, the comment or the share of failed items that ends the job early.
+
+    Where more than that share has failed already, the rest is cancelled at once.
+    """
     row = jobs.get_job(conn, key.tenant, job)
+    why = reason or f"set by {key.name}"
     if patch.priority is not None:
-        row = jobs.set_priority(conn, key.tenant, job, patch.priority)
+        row = jobs.set_priority(conn, key.tenant, job, patch.priority, why)
+    if "fail_early" in patch.model_fields_set:
+        row = jobs.set_fail_early(conn, key.tenant, job, patch.fail_early, why)
     if "comment" in patch.model_fields_set:
         row = jobs.set_comment(conn, key.tenant, job, patch.comment)
     if patch.model_fields_set:
-        note(conn, key, "job.change", job, fields=sorted(patch.model_fields_set), priority=patch.priority)
+        fields = sorted(patch.model_fields_set)
+        note(conn, key, "job.change", job, fields=fields, priority=patch.priority, reason=reason)
     return JobView.of(row)
 
 

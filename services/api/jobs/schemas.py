@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
+from services.api.problems import QuotaBody
 from services.api.schemas import View
 from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
@@ -61,6 +62,9 @@ class JobPatch(BaseModel):
 
     priority: int | None = Field(None, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
     comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+    fail_early: float | None = Field(
+        None, ge=0, le=1, description="Share of failed items above which the rest is cancelled; null = none."
+    )
 
 
 class CheckedView(View):
@@ -71,6 +75,7 @@ class CheckedView(View):
     """Motions that would be made."""
     bundles: list[str]
     estimate: EstimateView
+    quotas: list[QuotaBody] = Field(description="Those the tenant has, of queued items and of bytes; with room for it.")
     waiting: int = Field(description="Items that wait for the same models now, or to be read, whoever's.")
 
 

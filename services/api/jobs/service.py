@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -19,6 +19,10 @@ from shared.jobs import NewItem
 from shared.offers import Offer, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
+Raws = Callable[[], Iterator[tuple[int, object]]]
+"""What a body holds, with its lines, from its beginning at each call."""
+MAX_VALUES = 40 * MAX_ITEMS
+"""Of a JSON document: an item with all fields and twenty tags has fewer."""
 
 
 @dataclass(frozen=True)
@@ -26,47 +30,42 @@ class Submission:
     """A checked request body."""
 
     fields: JobFields
-    items: list[Item]
-    offers: list[Offer]
-    """The exact bundle of each item."""
-
-    @property
-    def count(self) -> int:
-        """Motions to make."""
-        return sum(item.variants for item in self.items)
+    count: int
+    """Motions to make."""
+    by_bundle: Counter[tuple[str, str]]
+    """Motions by model and exact bundle."""
+    _raws: Raws
+    _offers: Mapping[str | None, Offer]
+    """The exact bundle by what the item says of its model."""
 
     @property
     def bundles(self) -> list[str]:
         """Exact bundles, each once."""
-        return sorted({offer.bundle.reference for offer in self.offers})
-
-    @property
-    def by_bundle(self) -> Counter[tuple[str, str]]:
-        """Motions by model and exact bundle."""
-        counts: Counter[tuple[str, str]] = Counter()
-        for item, offer in zip(self.items, self.offers, strict=True):
-            counts[offer.bundle.manifest.model, offer.bundle.reference] += item.variants
-        return counts
+        return sorted({reference for _, reference in self.by_bundle})
 
     def new_items(self) -> Iterator[NewItem]:
-        """One row a motion."""
-        return new_items(zip(self.items, self.offers, strict=True))
+        """One row a motion: the body is read a second time, so that it is never in memory as a whole."""
+        items = read_items(self._raws())
+        return new_items((item, self._offers[item.model]) for item in items)
 
 
-def read_ndjson(body: bytes, fields: JobFields, catalogue: Catalogue) -> Submission:
-    """A job of one item a line; `fields` stood in the query.
+def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Submission:
+    """A job of one item a line; `fields` stood in the query. The body stays in use.
 
     Raises:
         InvalidItems: with the problems of all lines.
+        InvalidInput: there are none.
         TooLarge: more than 100,000 items.
     """
-    lines = body.split(b"\n")
-    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
-    _check_length(len(filled))
-    return _checked(fields, ((number, read_json(line)) for number, line in filled), catalogue)
+
+    def raws() -> Iterator[tuple[int, object]]:
+        body.seek(0)
+        return ((number, read_json(line)) for number, line in enumerate(body, 1) if line.strip())
+
+    return _checked(fields, raws, catalogue)
 
 
-def read_document(body: bytes, catalogue: Catalogue) -> Submission:
+def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
     """A job as one JSON object with `items`.
 
     Raises:
@@ -74,12 +73,11 @@ def read_document(body: bytes, catalogue: Catalogue) -> Submission:
         InvalidInput: the object itself is wrong.
         TooLarge: more than 100,000 items.
     """
-    document = read_object(body, hint='Write {"items": [{"prompt": "…"}]}.')
+    document = read_object(body.read(), hint='Write {"items": [{"prompt": "…"}]}.')
     raws = document.pop("items", None)
     if not isinstance(raws, list) or not raws:
         raise InvalidInput("is missing, empty or not a list", where="items", hint='Write {"items": [{"prompt": "…"}]}.')
-    _check_length(len(raws))
-    return _checked(job_fields(document), enumerate(raws, 1), catalogue)
+    return _checked(job_fields(document), lambda: enumerate(raws, 1), catalogue)
 
 
 def read_object(body: bytes, *, hint: str | None = None) -> dict[str, Any]:
@@ -87,7 +85,10 @@ def read_object(body: bytes, *, hint: str | None = None) -> dict[str, Any]:
 
     Raises:
         InvalidInput: it is none.
+        TooLarge: it holds more values than any real one, each of which takes many times its bytes in memory.
     """
+    if sum(map(body.count, (b",", b"[", b"{"))) > MAX_VALUES:
+        raise TooLarge(f"the body holds over {MAX_VALUES:,} values", where="body", hint="Send it in several requests.")
     try:
         document = json.loads(body)
     except (ValueError, RecursionError) as error:
@@ -97,31 +98,29 @@ def read_object(body: bytes, *, hint: str | None = None) -> dict[str, Any]:
     return document
 
 
-def _check_length(lines: int) -> None:
-    if lines > MAX_ITEMS:
-        raise TooLarge(f"{lines} items are over the limit of {MAX_ITEMS} a job", hint="Submit them as several jobs.")
+def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
+    by_bundle: Counter[tuple[str, str]] = Counter()
+    offers: dict[str | None, Offer] = {}
+    problems: dict[Problem, None] = {}
+    line = 0
 
-
-def _checked(fields: JobFields, raws: Iterator[tuple[int, object]], catalogue: Catalogue) -> Submission:
-    lines: list[int] = []
-
-    def remembered() -> Iterator[tuple[int, object]]:
-        for line, raw in raws:
-            lines.append(line)
+    def counted() -> Iterator[tuple[int, object]]:
+        nonlocal line
+        for line, raw in raws():
             yield line, raw
+        if not line:
+            raise InvalidInput("there is no prompt in it", where="body", hint='Write {"prompt": "…"}, one a line.')
 
-    items = read_items(remembered())
-    offers: list[Offer] = []
-    problems: list[Problem] = []
-    for line, item in zip(lines, items, strict=True):
+    for item in read_items(counted()):  # one by one: `line` is where this item stood
         found = _offer(line, item, catalogue)
-        if isinstance(found, Offer):
-            offers.append(found)
-        elif found not in problems:
-            problems.append(found)
+        if isinstance(found, Problem):
+            problems[found] = None
+            continue
+        offers[item.model] = found
+        by_bundle[found.bundle.manifest.model, found.bundle.reference] += item.variants
     if problems:
         raise InvalidItems(problems)
-    return Submission(fields, items, offers)
+    return Submission(fields, by_bundle.total(), by_bundle, raws, offers)
 
 
 def _offer(line: int, item: Item, catalogue: Catalogue) -> Offer | Problem:
@@ -163,6 +162,10 @@ def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
         raise InvalidItems(problems) from error
 
 
-def request_sha256(query: str, body: bytes) -> str:
+def request_sha256(query: str, body: BinaryIO) -> str:
     """What makes two submits the same request."""
-    return hashlib.sha256(query.encode() + b"\n" + body).hexdigest()
+    digest = hashlib.sha256(query.encode() + b"\n")
+    body.seek(0)
+    while part := body.read(2**16):
+        digest.update(part)
+    return digest.hexdigest()

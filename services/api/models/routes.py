@@ -10,6 +10,7 @@ from services.api.auth import Reader
 from services.api.context import Shared
 from services.api.models.schemas import ModelsView, ModelView
 from services.api.problems import RESPONSES
+from shared.bundles import named_by
 from shared.offers import offers
 
 router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
@@ -26,4 +27,5 @@ def get_model(
     name: Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,180}$")], shared: Shared, key: Reader
 ) -> ModelView:
     """The bundle that a model's or bundle's name means."""
-    return ModelView.of(shared.catalogue.offer(name))
+    with named_by("name"):
+        return ModelView.of(shared.catalogue.offer(name))

@@ -14,6 +14,7 @@ from services.api.catalogue import Catalogue
 from services.api.context import Context
 from services.api.streams.hub import Hub
 from services.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
+from shared.bundles import named_by
 from shared.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
 from shared.items import MAX_SEED, Item, read_item
 from shared.jobs import (
@@ -166,9 +167,10 @@ def _checked(body: NewStreamBody) -> Item:
 def _offer(item: Item, catalogue: Catalogue) -> Offer:
     """What the stream is made with."""
     try:
-        offer = catalogue.offer(item.model)
+        with named_by("model"):
+            offer = catalogue.offer(item.model)
     except NotFound as error:  # what is not found is not at this path
-        raise InvalidInput(error.message, where="model", hint=error.hint) from error
+        raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
     manifest = offer.bundle.manifest
     if manifest.model != MODEL:
         raise InvalidInput(

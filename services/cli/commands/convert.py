@@ -48,7 +48,7 @@ def convert(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Convert a motion between BVH and npz, with another rate, unit or axis if wanted."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from shared.motion.convert import convert as convert_file
@@ -79,7 +79,7 @@ def render(
     from_up: FromUp = Up.Y,
 ) -> None:
     """Draw motions: a contact sheet as PNG, or a page with a 3D player."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from shared.motion.player import html_player

@@ -39,11 +39,11 @@ def pack(
     processes: Processes = 2,
 ) -> None:
     """Only retarget archives: small files to carry to the machine that prepares and trains."""
-    from services.cli import roles
+    from services.cli.roles import data
 
-    sources = roles.CaptureSources(_named(pairs), splits, captions, processes)
+    sources = data.CaptureSources(_named(pairs), splits, captions, processes)
     with _progress() as progress:
-        paths = roles.pack_data(sources, output, progress)
+        paths = data.pack_data(sources, output, progress)
     for path in paths:
         console.result(str(path))
 
@@ -57,11 +57,11 @@ def prepare(
     processes: Processes = 2,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
-    from services.cli import roles
+    from services.cli.roles import data
 
-    sources = roles.CaptureSources(_named(pairs), splits, captions, processes)
+    sources = data.CaptureSources(_named(pairs), splits, captions, processes)
     with _progress() as progress:
-        manifest = roles.prepare_data(sources, output, progress)
+        manifest = data.prepare_data(sources, output, progress)
     console.say(f"{output}: {manifest}")
     console.result(str(output))
 
@@ -86,9 +86,9 @@ def inspect(
     as_json: console.Json = False,
 ) -> None:
     """Check a prepared folder's hashes and show what it holds."""
-    from services.cli import roles
+    from services.cli.roles import data
 
-    found = roles.inspect_data(folder, clip)
+    found = data.inspect_data(folder, clip)
     if as_json:
         console.result_json(found)
         return
@@ -114,9 +114,9 @@ def text(
     ] = None,
 ) -> None:
     """Parse and encode the captions, once for all training runs."""
-    from services.cli import roles
+    from services.cli.roles import data
 
     with console.bar() as bar:
         task = bar.add_task("captions", total=None)
-        count = roles.encode_captions(folder, model, lambda done, total: bar.update(task, completed=done, total=total))
+        count = data.encode_captions(folder, model, lambda done, total: bar.update(task, completed=done, total=total))
     console.say(f"{count} captions encoded")

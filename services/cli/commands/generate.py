@@ -16,7 +16,7 @@ from shared.errors import Conflict, InvalidBundle, InvalidInput
 from shared.items import MAX_SEED, InvalidItems, Item, Problem
 
 if TYPE_CHECKING:
-    from services.cli.roles import Wanted
+    from services.cli.roles.oneshot import Wanted
     from shared.bundles import Bundle
     from shared.motion.clip import MotionClip
 
@@ -48,12 +48,13 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Make motions here and now, without a server or a queue."""
+    from services.cli.extras import needs_extra
     from services.cli.fetching import check_folder
-    from services.cli.roles import OneShot, needs_extra
+    from services.cli.roles.oneshot import OneShot
 
     check_template(name_template)
     items = read_prompts(prompts, file, input_format)
-    items = rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    items = list(rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps))
     try:
         from shared.bundles import choose_bundle
         from shared.settings import settings
@@ -97,7 +98,7 @@ def _check(items: Iterable[Item], bundle: Bundle) -> None:
         InvalidBundle: not a bundle of a model that runs here.
         InvalidItems: a length it cannot make, a setting it has not.
     """
-    from services.cli.roles import GENERATORS
+    from services.cli.roles.serving import GENERATORS
     from shared.bundles.limits import check_seconds, check_settings
 
     if bundle.manifest.model not in GENERATORS:
@@ -133,7 +134,7 @@ def _one_model(items: Iterable[Item]) -> str:
 
 
 def _plan(items: list[Item], bundle: Bundle) -> list[Planned]:
-    from services.cli.roles import Wanted
+    from services.cli.roles.oneshot import Wanted
 
     def of(index: int, item: Item) -> Iterator[Planned]:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from services.cli import console
+from shared.errors import InvalidInput
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
@@ -18,7 +19,8 @@ Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wai
 Reason = Annotated[str | None, typer.Option("--reason", help="Why; it stands in the job's events.")]
 
 FIELDS = (
-    *("id", "name", "comment", "state", "control", "priority", "created", "started", "finished", "expires", "erased"),
+    *("id", "name", "comment", "state", "control", "priority", "fail_early"),
+    *("created", "started", "finished", "expires", "erased"),
 )
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
@@ -125,10 +127,22 @@ def retry(
 def priority(
     job: Job,
     value: Annotated[int, typer.Argument(metavar="PRIORITY", help="-1000 to 1000; higher runs first. `-- -5` is -5.")],
+    reason: Reason = None,
     as_json: console.Json = False,
 ) -> None:
     """Order a job among yours."""
-    _change(job, {"priority": value}, as_json)
+    _change(job, {"priority": value}, as_json, reason)
+
+
+@app.command("fail-early")
+def fail_early(
+    job: Job,
+    share: Annotated[str, typer.Argument(metavar="SHARE", help="0 to 1, as `0.1` for one in ten; `none` = never.")],
+    reason: Reason = None,
+    as_json: console.Json = False,
+) -> None:
+    """Cancel the rest of a job once more than a share of its items has failed; at once, if it has."""
+    _change(job, {"fail_early": _share(share)}, as_json, reason)
 
 
 @app.command()
@@ -199,15 +213,30 @@ def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
                 console.say(f"{job} {found['state']}")
 
 
-def _change(job: str, patch: dict[str, Any], as_json: bool) -> None:
+def _change(job: str, patch: dict[str, Any], as_json: bool, reason: str | None = None) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = client.patch(f"/v1/jobs/{job}", patch)
+        found = client.patch(f"/v1/jobs/{job}", patch, reason=reason)
     if as_json:
         console.result_json(found)
-    else:
-        console.say(f"{job}: priority {found['priority']}" + (f", {found['comment']}" if found["comment"] else ""))
+        return
+    told = [f"{found['state']}, priority {found['priority']}"]
+    if found["fail_early"] is not None:
+        told.append(f"fails early above {found['fail_early']:g}")
+    console.say(f"{job}: {', '.join([*told, *filter(None, [found['comment']])])}")
+
+
+def _share(text: str) -> float | None:
+    if text == "none":
+        return None
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise InvalidInput(f"{text[:40]!r} is not a share", where="SHARE", hint="Write 0.1 for one in ten, or none.")
+    return share
 
 
 def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:

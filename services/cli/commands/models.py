@@ -62,7 +62,7 @@ def _ask(path: str) -> Any:
 
 
 def _local_models() -> list[dict[str, Any]]:
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from services.api.models.schemas import ModelView
@@ -74,7 +74,7 @@ def _local_models() -> list[dict[str, Any]]:
 
 
 def _local_model(name: str) -> dict[str, Any]:
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from services.api.catalogue import Catalogue

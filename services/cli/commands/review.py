@@ -39,11 +39,11 @@ def review(
         int | None, typer.Option("--per-page", min=1, max=MOST_A_PAGE, help="Motions a page: 48, of a .png 24.")
     ] = None,
     skip: Annotated[int, typer.Option("--skip", min=0, help="Leave out so many at the start.")] = 0,
-    limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many.")] = 200,
+    limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many.")] = MOST,
 ) -> None:
     """Draw the motions of a job, in the order they were made, on pages to choose by or on contact sheets."""
     from services.cli.client import Client
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         import shared.motion.gallery  # noqa: F401

@@ -24,7 +24,8 @@ def serve(
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
-    from services.cli.roles import default_roles, needs_extra, parse_roles
+    from services.cli.extras import needs_extra
+    from services.cli.roles.serving import default_roles, parse_roles
 
     try:
         from services.cli.supervisor import Supervisor, any_port
@@ -57,7 +58,8 @@ def worker(
     ] = None,
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
-    from services.cli.roles import SHOWS, needs_extra, parse_roles, role_of
+    from services.cli.extras import needs_extra
+    from services.cli.roles.serving import SHOWS, parse_roles, role_of
 
     queues = parse_roles(model.replace(",", "+"))[0]
     shown = [queue for queue in queues if queue in SHOWS]
@@ -86,7 +88,7 @@ def worker(
 
 def scheduler() -> None:
     """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from services.scheduler.main import scheduler_main
@@ -98,7 +100,7 @@ def scheduler() -> None:
 
 def api() -> None:
     """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from services.api.app import serve as serve_api

@@ -11,6 +11,8 @@ from services.cli import console, options, rows
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from shared.items import Item
 
 
@@ -43,6 +45,7 @@ def submit(
 ) -> None:
     """Put prompts into the queue of a server; prints the job's id."""
     from services.cli.client import Client
+    from services.cli.lines import Lines
 
     if fetch is not None:
         from services.cli.fetching import check_folder
@@ -50,9 +53,9 @@ def submit(
         check_folder(fetch)  # before anything is enqueued
     items = read_prompts(prompts, file, input_format)
     items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants, fps=fps)
-    with Client.here() as client:
+    with Lines(item.as_json() for item in items) as lines, Client.here() as client:
         job = client.submit(
-            [item.as_json() for item in items],
+            lines,
             validate_only=dry_run,
             name=name,
             priority=priority or None,
@@ -77,6 +80,13 @@ def _tell_dry_run(checked: dict[str, Any]) -> None:
     console.say(
         f"{checked['items']} motions would be made, with {', '.join(checked['bundles'])}; nothing was submitted."
     )
+    for quota in checked["quotas"]:
+        size = console.size if quota["name"] == "bytes" else str
+        of_what = "queued items" if quota["name"] == "queued" else "stored bytes"
+        console.say(
+            f"It takes {size(quota['asked'])} of the quota of {of_what}: "
+            f"{size(quota['used'])} of {size(quota['limit'])} are used, {size(quota['left'])} left."
+        )
     estimate = checked["estimate"]
     if estimate["seconds"] is not None:
         behind = f", behind {checked['waiting']} that wait now" if checked["waiting"] else ""
@@ -84,8 +94,10 @@ def _tell_dry_run(checked: dict[str, Any]) -> None:
     console.say(estimate["basis"])
 
 
-def read_prompts(prompts: list[str] | None, file: str | None, input_format: options.InputFormat | None) -> list[Item]:
-    """The items of PROMPT… or of -f.
+def read_prompts(
+    prompts: list[str] | None, file: str | None, input_format: options.InputFormat | None
+) -> Iterator[Item]:
+    """The items of PROMPT… or of -f, as they are read (`rows.items_from_file`).
 
     Raises:
         InvalidInput: none or both are given, or what is there cannot be used.

@@ -172,10 +172,10 @@ def _used(view: dict[str, Any]) -> dict[str, str]:
     words = {
         "queued": f"{used['queued']}",
         "running": f"{used['running']}",
-        "bytes": f"{_bytes(used['bytes'])} (+{_bytes(used['expected'])} expected)",
+        "bytes": f"{console.size(used['bytes'])} (+{console.size(used['expected'])} expected)",
         "streams": f"{used['streams']}",
     }
-    limits = {"bytes": quotas["bytes"] and _bytes(quotas["bytes"]), "streams": _of_a_key(quotas["streams"])}
+    limits = {"bytes": quotas["bytes"] and console.size(quotas["bytes"]), "streams": _of_a_key(quotas["streams"])}
     return {
         name: text if quotas[name] is None else f"{text} of {limits.get(name, quotas[name])}"
         for name, text in words.items()
@@ -188,13 +188,6 @@ def _in_words(view: dict[str, Any]) -> str:
 
 def _of_a_key(limit: int | None) -> str | None:
     return None if limit is None else f"{limit} a key"
-
-
-def _bytes(count: int) -> str:
-    for unit, size in reversed(UNITS.items()):
-        if count >= size and size > 1:
-            return f"{count / size:.3g} {unit}iB"
-    return f"{count} B"
 
 
 def _tell(view: dict[str, Any], words: str, as_json: bool) -> None:

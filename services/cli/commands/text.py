@@ -26,7 +26,7 @@ def parse(
     as_json: console.Json = False,
 ) -> None:
     """Show the graph a prompt becomes. Needs no server."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     texts = [item.prompt for item in read_prompts(prompts, file, input_format)]
     try:
@@ -42,7 +42,7 @@ def parse(
 @app.command()
 def serve() -> None:
     """Serve `POST /v1/texts/parse` alone; MAREY_HOST and MAREY_PORT say where."""
-    from services.cli.roles import needs_extra
+    from services.cli.extras import needs_extra
 
     try:
         from services.api.app import TEXT_ROUTERS

@@ -44,9 +44,9 @@ Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat
 
 
 def _run(model: Model, stage: str, as_json: bool, **chosen: Any) -> None:
-    from services.cli import roles
+    from services.cli.roles import training
 
-    metrics = roles.train_stage(model, stage, **chosen)
+    metrics = training.train_stage(model, stage, **chosen)
     if as_json:
         console.result_json(metrics)
     else:
@@ -135,10 +135,12 @@ def hgm3_bundle(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the bundle from the parts of a run."""
-    from services.cli import roles
+    from services.cli.roles import training
 
     chosen = None if mask is None else mask.value
-    made = roles.assemble_bundle("hgm3", data, run, output, config=config, card=card, overwrite=overwrite, mask=chosen)
+    made = training.assemble_bundle(
+        "hgm3", data, run, output, config=config, card=card, overwrite=overwrite, mask=chosen
+    )
     console.result(made)
 
 
@@ -147,9 +149,9 @@ def mogo_bundle(
     data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
 ) -> None:
     """Write the bundle from the parts of a run."""
-    from services.cli import roles
+    from services.cli.roles import training
 
-    console.result(roles.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
+    console.result(training.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
 
 
 @evaluator.command("bundle")
@@ -157,9 +159,11 @@ def evaluator_bundle(
     data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
 ) -> None:
     """Write the bundle from the part of a run, with captions and embeddings of the real test clips."""
-    from services.cli import roles
+    from services.cli.roles import training
 
-    console.result(roles.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite))
+    console.result(
+        training.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite)
+    )
 
 
 @evaluator.command("reference")
@@ -170,9 +174,9 @@ def evaluator_reference(
     overwrite: Overwrite = False,
 ) -> None:
     """Write a bundle's networks again with captions, embeddings and measures of these data's test clips."""
-    from services.cli import roles
+    from services.cli.roles import training
 
-    console.result(roles.renew_reference(bundle, data, output, overwrite=overwrite))
+    console.result(training.renew_reference(bundle, data, output, overwrite=overwrite))
 
 
 @evaluator.command("reconstruct")
@@ -187,11 +191,11 @@ def evaluator_reconstruct(
 
     The row is kept beside the evaluator's bundle, for exactly these two bundles.
     """
-    from services.cli import roles
+    from services.cli.roles import tokenizers
 
     with console.bar() as bar:
         task = bar.add_task("clips", total=None)
-        found = roles.reconstruct(
+        found = tokenizers.reconstruct(
             bundle, generator, data, output, lambda done, total: bar.update(task, completed=done, total=total)
         )
     if as_json:
@@ -210,13 +214,13 @@ UNPACK = "Write the parts of a bundle into a run, to train on from them with `--
 
 @hgm3.command("unpack", help=UNPACK)
 def hgm3_unpack(bundle: Packed, run: Run) -> None:
-    from services.cli import roles
+    from services.cli.roles import training
 
-    console.result(roles.take_bundle_apart("hgm3", bundle, run))
+    console.result(training.take_bundle_apart("hgm3", bundle, run))
 
 
 @mogo.command("unpack", help=UNPACK)
 def mogo_unpack(bundle: Packed, run: Run) -> None:
-    from services.cli import roles
+    from services.cli.roles import training
 
-    console.result(roles.take_bundle_apart("mogo", bundle, run))
+    console.result(training.take_bundle_apart("mogo", bundle, run))

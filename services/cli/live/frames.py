@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli.roles import needs_extra
+from services.cli.extras import needs_extra
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
@@ -78,15 +79,23 @@ def test_lengths_that_the_bundle_cannot_make_fail_the_evaluation_before_anything
     assert "1 prompts cannot be made; the first: line 4: seconds: 30 is outside 0.8 to 9.8" in row.reason
 
 
-def test_an_evaluator_of_another_skeleton_is_refused_before_anything_is_made(
-    engine: sa.Engine, scheduler: Evaluations, config: Settings
+@pytest.mark.parametrize(
+    ("judge", "message"),
+    [
+        ({"skeleton": "hands"}, "of the skeleton hands; toy-starter makes them of humanml3d"),
+        ({"layout": "humanml3d-259"}, "of the feature layout humanml3d-259; toy-starter makes them of humanml3d-263"),
+        ({"fps": 30.0}, "of the frame rate 30.0; toy-starter makes them of 20.0"),
+    ],
+)
+def test_an_evaluator_of_other_motion_is_refused_before_anything_is_made(
+    engine: sa.Engine, scheduler: Evaluations, config: Settings, judge: dict[str, Any], message: str
 ) -> None:
-    write_evaluator(config.models, "judge-of-hands", skeleton="hands")
-    evaluation = new_evaluation(engine, evaluator="judge-of-hands")
+    write_evaluator(config.models, "judge-of-others", **judge)
+    evaluation = new_evaluation(engine, evaluator="judge-of-others")
     scheduler.round()
     row = evaluation_row(engine, evaluation)
     assert (row.state, jobs_there(engine)) == (S.FAILED, 0)
-    assert "measures motions of the skeleton hands, not of humanml3d" in row.reason
+    assert f"judge-of-others measures motions {message}" in row.reason
 
 
 def test_an_evaluator_that_refuses_fails_the_evaluation_with_its_message(

@@ -196,7 +196,7 @@ def test_a_broken_evaluators_bundle_fails_the_evaluation(
     evaluation = new_evaluation(engine, None, evaluator="broken")
     scheduler.round()
     row = evaluation_row(engine, evaluation)
-    assert (row.state, "its captions cannot be read" in row.reason) == (S.FAILED, True)
+    assert (row.state, "the captions of broken cannot be read" in row.reason) == (S.FAILED, True)
 
 
 # --- tables ---

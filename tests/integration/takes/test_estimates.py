@@ -17,8 +17,10 @@ from shared.jobs import (
     estimate,
     pause,
     place_of,
+    set_quotas,
     transaction,
 )
+from shared.jobs.quotas import EXPECTED_BYTES
 from tests.servers.jobs import claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
@@ -77,6 +79,27 @@ def test_a_job_waits_for_higher_priorities_and_older_jobs_of_its_tenant_and_shar
     with transaction(measured) as conn:
         cancel(conn, "default", jobs[1])
     assert told(1) == (0, 0, 1, None)
+
+
+def test_a_dry_run_tells_what_is_left_of_the_quotas_and_refuses_what_a_submit_would(
+    api: LiveApi, marey: Command
+) -> None:
+    try:
+        limit_to(api, queued=20, bytes=10 * EXPECTED_BYTES)
+        ran = marey("submit", "a person waves", "--variants", 5, "--dry-run", "--json").ok()
+        assert "It takes 5 of the quota of queued items: 0 of 20 are used, 20 left." in ran.err
+        assert "It takes 2.5 MiB of the quota of stored bytes: 0 B of 5 MiB are used, 5 MiB left." in ran.err
+        assert [quota["name"] for quota in ran.lines[0]["quotas"]] == ["queued", "bytes"]
+        marey("submit", "a person waves", "--variants", 11, "--dry-run").refused(5, "quota of stored bytes")
+        marey("submit", "a person waves", "--variants", 21, "--dry-run").refused(5, "quota of queued items")
+    finally:
+        limit_to(api, queued=None, bytes=None)
+    assert marey("submit", "a person waves", "--dry-run", "--json").ok().lines[0]["quotas"] == []
+
+
+def limit_to(api: LiveApi, **quotas: int | None) -> None:
+    with transaction(api.engine) as conn:
+        set_quotas(conn, "default", quotas)
 
 
 def test_the_command_line_says_where_the_number_comes_from(api: LiveApi, marey: Command) -> None:

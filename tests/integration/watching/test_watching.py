@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from shared.jobs import transaction
 from shared.jobs.schema import item, job, motion
 from tests.chaos.driver import Cluster
 from tests.servers.collector import Collector, Spanned
+from tests.servers.ports import free_ports
 from tests.support.live_api import BUNDLE, LiveApi, running_api, settings_of
 from tests.support.marey import Marey, Ran
 from tests.support.toy import REFERENCE, TEXT_REFERENCE
@@ -80,7 +80,7 @@ def seen() -> Iterator[Seen]:
     home = Path(tempfile.mkdtemp(prefix="marey-"))
     with pytest.MonkeyPatch.context() as patch, Collector() as collector:
         environment = collector.environment()
-        ports = {WORKER: free_port(), SCHEDULER: free_port()}
+        ports = dict(zip((WORKER, SCHEDULER), free_ports(2), strict=True))
         with Cluster(home, {"MAREY_STORE": str(home / "assets"), **environment}) as cluster:
             cluster.start_scheduler(MAREY_METRICS_PORT=str(ports[SCHEDULER]))
             cluster.start_worker(
@@ -222,10 +222,3 @@ def local_addresses() -> list[str]:
     """Addresses that TCP sockets of this machine listen at, as the kernel writes them."""
     rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     return [row[1] for row in rows if row[3] == "0A"]
-
-
-def free_port() -> int:
-    """A port that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

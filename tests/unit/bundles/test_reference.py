@@ -46,8 +46,33 @@ def test_a_bundle_without_captions_says_so(tmp_path: Path) -> None:
     with pytest.raises(InvalidBundle, match="no captions of the split 'blind'"):
         reference_prompts(Bundle.open(tmp_path / JUDGE), "blind")
     write_generator(tmp_path)
-    with pytest.raises(InvalidBundle, match=r"reference\.json"):
+    with pytest.raises(InvalidBundle, match="carries no captions of real clips"):
         reference_prompts(Bundle.open(tmp_path / "toy-starter"), "test")
+
+
+def test_captions_without_motions_are_refused_with_the_counts_of_both(tmp_path: Path) -> None:
+    write_evaluator(tmp_path, motions=2)
+    message = "captions of 3 clips of the split 'test' and embeddings of 2 motions"
+    with pytest.raises(InvalidBundle, match=message):
+        reference_prompts(Bundle.open(tmp_path / JUDGE), "test")
+    write_evaluator(tmp_path, motions=3)
+    assert len(reference_prompts(Bundle.open(tmp_path / JUDGE), "test")) == 3
+
+
+def test_a_clip_without_caption_is_named(tmp_path: Path) -> None:
+    write_evaluator(tmp_path, clips=[CLIPS[1], {**CLIPS[0], "captions": []}])
+    with pytest.raises(InvalidBundle, match="the captions of judge cannot be read: clip c1 has none"):
+        reference_prompts(Bundle.open(tmp_path / JUDGE), "test")
+
+
+def test_of_several_evaluators_one_that_measures_what_the_generator_makes_is_meant(tmp_path: Path) -> None:
+    config = Settings(home=tmp_path, models=tmp_path / "models")
+    write_generator(tmp_path / "models")
+    write_evaluator(tmp_path / "models", "judge-a", layout="kit-251")
+    write_evaluator(tmp_path / "models", "judge-b")
+    generator = Bundle.open(tmp_path / "models" / "toy-starter")
+    assert choose_evaluator(None, generator=generator, config=config).manifest.name == "judge-b"
+    assert choose_evaluator("judge-a", generator=generator, config=config).manifest.name == "judge-a"
 
 
 def test_the_evaluator_that_is_here_is_meant_unless_one_is_named(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import resource
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -16,6 +17,7 @@ import numpy as np
 
 from services.cli.client import Client
 from services.cli.fetching import Download, download_all
+from services.cli.lines import Lines
 from services.cli.manifest import COLUMNS, write_manifest
 from services.cli.place import Server
 from shared.errors import MareyError
@@ -24,6 +26,7 @@ from shared.motion.bvh import read_bvh
 from shared.motion.bvh_live import LiveBVH
 from shared.motion.files import write_atomically
 from shared.motion.skeleton import HUMANML3D
+from shared.spool import IN_MEMORY
 from shared.storage import FolderStore, NewObject
 
 FOLDER, LIMIT = Path(sys.argv[1]), int(sys.argv[2])
@@ -35,11 +38,11 @@ def limit(size: int) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
-def attempt(name: str, act: Callable[[Path], object]) -> dict[str, Any]:
+def attempt(name: str, act: Callable[[Path], object], size: int = LIMIT) -> dict[str, Any]:
     """What an act says that finds no room, and the files it leaves."""
     folder = FOLDER / name
     folder.mkdir(exist_ok=True)
-    limit(LIMIT)
+    limit(size)
     try:
         act(folder)
     except MareyError as error:
@@ -87,6 +90,13 @@ def stream(folder: Path, frames: list[int]) -> None:
             frames[0] = file.frames
 
 
+def submit(folder: Path, size: int) -> None:
+    tempfile.tempdir = str(folder)
+    prompt = {"prompt": "a person walks"}
+    with Lines([prompt] * (size // len(json.dumps(prompt)))):
+        raise AssertionError("there was room")
+
+
 def main() -> None:
     told: dict[str, Any] = {}
     store = FolderStore(FOLDER / "put")
@@ -112,6 +122,9 @@ def main() -> None:
     told["stream"] = attempt("stream", lambda folder: stream(folder, frames))
     clip = read_bvh(FOLDER / "stream" / "live.bvh")
     told["stream"] |= {"written": frames[0], "read": len(clip.root)}
+    told["prompts"] = attempt("prompts", lambda folder: submit(folder, 2 * IN_MEMORY))
+    room = IN_MEMORY + LIMIT  # the last of them are still buffered when all are written
+    told["last prompts"] = attempt("last prompts", lambda folder: submit(folder, room), room)
     print(json.dumps(told))
 
 

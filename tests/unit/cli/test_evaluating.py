@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from services.cli.commands import schedules
 from services.cli.evaluating import Asked, check_evaluation, repeats_of
-from services.cli.roles import default_roles, parse_roles
-from shared.errors import InvalidInput, ItemsFailed, Regressed
+from services.cli.roles.serving import default_roles, parse_roles
+from shared.errors import InvalidInput, ItemsFailed, NotFound, Regressed
 from shared.settings import Settings
 from tests.support.evaluations import write_evaluator, write_generator
 
@@ -52,6 +52,12 @@ def test_prompts_of_a_file_go_with_its_name(tmp_path: Path) -> None:
         "prompts": [{"prompt": "a person walks", "expected": "walk"}, {"prompt": "a person bows"}],
         "source": "studio.csv",
     }
+
+
+def test_a_split_that_is_none_is_told_with_those_there_are() -> None:
+    with pytest.raises(NotFound, match="neither a split") as told:
+        asked(split="validation").body()
+    assert "test, compositional, test+compositional" in (told.value.hint or "")
 
 
 @pytest.mark.parametrize("text", ["guidance", "guidance=", "guidance=high", "guidance=nan", "guidance=inf", "=3x"])

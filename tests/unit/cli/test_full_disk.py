@@ -56,3 +56,11 @@ def test_a_bvh_that_grows_keeps_its_whole_rows(told: dict[str, dict[str, Any]]) 
     assert (found["kind"], found["left"]) == ("InvalidInput", ["live.bvh"])
     assert "cannot be written" in found["said"]
     assert 1 < found["written"] == found["read"]
+
+
+@pytest.mark.parametrize("what", ["prompts", "last prompts"])
+def test_prompts_that_cannot_be_kept_until_they_are_sent_are_told(told: dict[str, dict[str, Any]], what: str) -> None:
+    found = told[what]
+    assert (found["kind"], found["left"]) == ("Unreachable", [])
+    assert "the prompts: cannot be kept: File too large" in found["said"]
+    assert "TMPDIR" in found["said"]

@@ -22,14 +22,14 @@ def write(folder: Path, name: str, content: str | bytes) -> str:
 
 def problems(folder: Path, name: str, content: str | bytes) -> list[str]:
     with pytest.raises(InvalidItems) as caught:
-        items_from_file(write(folder, name, content))
+        list(items_from_file(write(folder, name, content)))
     return [str(problem) for problem in caught.value.problems]
 
 
 def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
     header = "prompt,name,seconds,seed,variants,model,tags\n"
     text = header + '"walks, then runs",a,2.5,7,3,hgm3,walk; run\na person waves,,,,,,\n'
-    assert items_from_file(write(tmp_path, "p.csv", text)) == [
+    assert list(items_from_file(write(tmp_path, "p.csv", text))) == [
         Item("walks, then runs", "a", 2.5, 7, 3, "hgm3", ("walk", "run")),
         Item("a person waves"),
     ]
@@ -39,12 +39,12 @@ def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
 def test_a_byte_order_mark_and_windows_lines_change_nothing(tmp_path: Path, bom: bytes, newline: bytes) -> None:
     path = write(tmp_path, "p.csv", bom + newline.join([b"prompt,seed", b"a person waves,3", b""]))
-    assert items_from_file(path) == [Item("a person waves", seed=3)]
+    assert list(items_from_file(path)) == [Item("a person waves", seed=3)]
 
 
 def test_a_jsonl_line_may_hold_settings(tmp_path: Path) -> None:
     path = write(tmp_path, "p.jsonl", '{"prompt": "a person waves", "settings": {"guidance": 3}}\n\n')
-    assert items_from_file(path) == [Item("a person waves", settings={"guidance": 3.0})]
+    assert list(items_from_file(path)) == [Item("a person waves", settings={"guidance": 3.0})]
 
 
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
@@ -95,7 +95,7 @@ def test_broken_json_is_told_with_its_line_and_the_rest_is_still_read(tmp_path: 
 )
 def test_a_file_in_another_encoding_is_refused_with_what_to_do(tmp_path: Path, content: bytes, said: str) -> None:
     with pytest.raises(InvalidFile, match=said) as caught:
-        items_from_file(write(tmp_path, "p.csv", content))
+        list(items_from_file(write(tmp_path, "p.csv", content)))
     assert caught.value.hint is not None
     assert "UTF-8" in caught.value.hint
 
@@ -106,18 +106,18 @@ def test_a_csv_that_breaks_off_inside_a_quote_names_the_line(tmp_path: Path) -> 
 
 def test_a_file_that_is_not_there_or_tells_no_format_or_holds_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotFound):
-        items_from_file(str(tmp_path / "none.csv"))
+        list(items_from_file(str(tmp_path / "none.csv")))
     with pytest.raises(InvalidInput, match="ending"):
-        items_from_file(write(tmp_path, "prompts.xlsx", "a"))
+        list(items_from_file(write(tmp_path, "prompts.xlsx", "a")))
     with pytest.raises(InvalidInput, match="no prompt"):
-        items_from_file(write(tmp_path, "p.csv", "prompt\n"))
+        list(items_from_file(write(tmp_path, "p.csv", "prompt\n")))
 
 
 def test_options_of_the_command_stand_in_where_a_line_says_nothing() -> None:
     items = [Item("a person waves", seconds=2.0), Item("a person bows")]
     assert [i.seconds for i in with_defaults(items, seconds=4.0, seed=1)] == [2.0, 4.0]
     with pytest.raises(InvalidItems, match=r"seconds: 1000 is outside 0\.5 to 60"):
-        with_defaults(items, seconds=1000.0)
+        list(with_defaults(items, seconds=1000.0))
 
 
 @given(st.binary(max_size=300), st.sampled_from(["csv", "jsonl", "txt"]))
@@ -125,7 +125,7 @@ def test_no_file_breaks_the_reader(tmp_path_factory: pytest.TempPathFactory, con
     path = tmp_path_factory.getbasetemp() / f"any.{ending}"
     path.write_bytes(content)
     try:
-        items = items_from_file(str(path))
+        items = list(items_from_file(str(path)))
     except InvalidInput:
         return
     assert items

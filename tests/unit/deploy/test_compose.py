@@ -9,7 +9,7 @@ import typer
 
 from services.cli import children
 from services.cli.main import app
-from services.cli.roles import HANDLERS, parse_roles
+from services.cli.roles.serving import HANDLERS, parse_roles
 from services.scheduler import main as scheduler
 from shared.runtime import worker
 from shared.runtime.live import main as live

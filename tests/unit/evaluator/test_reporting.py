@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from uuid import uuid4
@@ -10,7 +11,7 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput, NotFound
+from shared.errors import InvalidFile, InvalidInput, NotFound
 from shared.jobs import (
     AssetDigest,
     EarlierRun,
@@ -22,14 +23,15 @@ from shared.jobs import (
     Problem,
 )
 from shared.measures.comparing import OBEYED, RETRIEVED
+from shared.motion.clip import parse_npz
 from shared.motion.features import HUMANML3D_263
 from shared.motion.finish import finish_motion
 from shared.runtime.scoring import ScoreInput
-from workers.evaluator.measuring import TOGETHER, Measured, embed_prompts, encoded, measure
+from workers.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
 from workers.evaluator.reference import Reference, ReferenceSplit
 from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from workers.evaluator.reporting import report_of, summary_of
-from workers.evaluator.scoring import REPEATS
+from workers.evaluator.scoring import REPEATS, label_ceilings
 from workers.evaluator.tmr import TMREvaluator
 from workers.training.data.prepared import PreparedData
 
@@ -261,6 +263,52 @@ def test_a_motion_that_is_lost_or_broken_is_named_and_counts_in_no_number(
     assert any("prompt 7" in note and "lost" in note for note in found.notes)
     assert any("prompt 9" in note and "too long" in note for note in found.notes)
     assert {score.index for score in found.scores} == set(range(40)) - {3, 7, 9}
+
+
+def test_motions_that_hold_nan_are_broken_and_more_than_one_percent_of_them_fail_the_report(
+    files: list[bytes], evaluator: TMREvaluator, real: Reference
+) -> None:
+    good = parse_npz(files[0])
+    features = good.features.copy()
+    features[7, 3] = np.nan
+    source = source_of([*files[1:], replace(good, features=features).to_npz()], evaluator, real)
+    found = measured_of(source, evaluator)
+    assert [(each.item.index, each.reason) for each in found.broken] == [
+        (39, "`features` holds NaN or infinite numbers")
+    ]
+    assert np.isfinite(found.raw).all()
+    with pytest.raises(InvalidFile, match=r"prompt 39, repeat 0: 1 of 40 motions cannot be measured, 2.5%"):
+        check_measured(found, asked=40)
+
+
+def test_a_hundredth_of_the_motions_may_be_missing(measured: Measured) -> None:
+    item = measured.motions[0].item
+    motions = (measured.motions * 3)[:99]
+    check_measured(replace(measured, motions=motions, broken=(Broken(item, "lost"),)), asked=100)
+    check_measured(replace(measured, motions=motions[:90], broken=()), asked=100)  # not made: the scheduler has judged
+    with pytest.raises(InvalidFile, match="2 of 100 motions"):
+        check_measured(replace(measured, motions=motions[:98], broken=(Broken(item, "lost"),)), asked=100)
+
+
+def test_the_command_to_repeat_it_is_one_that_a_shell_reads_as_it_was(
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference
+) -> None:
+    settings = {"guidance": 4.123456789, "steps": 10.0}
+    request = replace(source.request, source="our prompts (new).csv", settings=settings)
+    told = shlex.split(report_of(replace(source, request=request), measured, evaluator, real).command)
+    assert told[told.index("--split") + 1] == "our prompts (new).csv"
+    assert told[-3:] == ["guidance=4.123456789", "--set", "steps=10"]
+
+
+def test_the_ceiling_of_a_model_that_knows_labels_alone_stands_beside_retrieval(
+    report: Report, real: Reference
+) -> None:
+    truth = report.row("ground_truth").values
+    labels = real.split("test").labels
+    ceilings = label_ceilings(labels, 32, seed=0)
+    assert f"it would have {ceilings[1]:.1f} % at 1, {ceilings[2]:.1f} % at 2" in truth["r_precision_1_of_32"].note
+    assert 100 * len(set(labels.tolist())) / len(labels) - 20 < ceilings[1] < 100
+    assert "40" in truth["r_precision_1_of_100"].note  # clips, too few: that is what its note says
 
 
 def test_motions_of_another_feature_layout_are_refused(

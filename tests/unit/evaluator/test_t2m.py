@@ -131,7 +131,7 @@ def recurrent(state: State, x: torch.Tensor) -> torch.Tensor:
     return linear(state, "output_net.3", F.leaky_relu(x, 0.2))
 
 
-def embedded_by_hand(files: Path, checkpoint: dict[str, State], features: np.ndarray) -> torch.Tensor:
+def embedded_by_hand(files: Path, checkpoint: Mapping[str, State], features: np.ndarray) -> torch.Tensor:
     mean, std = (np.load(files / "Comp_v6_KLD005" / "meta" / f"{n}.npy").astype(np.float32) for n in ("mean", "std"))
     frames = len(features) // 4 * 4
     padded = torch.zeros(196, 263)
@@ -273,6 +273,44 @@ def test_the_bundle_holds_weights_words_and_statistics_in_full_precision(
     stored = bundle.tensors("motion", dtype=None)
     for name, value in checkpoint["motion_encoder"].items():
         np.testing.assert_array_equal(stored[f"motion.{name}"], value.numpy())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("zipped", [False, True])
+def test_files_of_exactly_the_public_names_shapes_and_entries_become_an_evaluator(
+    files: Path, tmp_path: Path, zipped: bool
+) -> None:
+    """As `TextMotionMatchTrainer.save` writes them (EricGuo5513/text-to-motion, networks/trainers.py), by a torch that
+    zips files and by one that does not yet. Filled from the list of shapes above, not by our networks."""
+    torch.manual_seed(0)
+    drawn = {name: {k: 0.02 * torch.randn(shape) for k, shape in shapes.items()} for name, shapes in PUBLIC.items()}
+    optimizer = torch.optim.Adam([torch.nn.Parameter(torch.ones(3))])
+    optimizer.param_groups[0]["params"][0].grad = torch.ones(3)
+    optimizer.step()
+    state = {
+        "text_encoder": drawn["text_encoder"],
+        "motion_encoder": drawn["motion_encoder"],
+        "movement_encoder": drawn["movement_encoder"],
+        "opt_text_encoder": optimizer.state_dict(),
+        "opt_motion_encoder": optimizer.state_dict(),
+        "epoch": 148,
+        "iter": 54000,
+    }
+    file = tmp_path / "text_mot_match" / "model" / "finest.tar"
+    file.parent.mkdir(parents=True)
+    torch.save(state, file, _use_new_zipfile_serialization=zipped)
+    (tmp_path / "Comp_v6_KLD005").symlink_to(files / "Comp_v6_KLD005")
+    glove = tmp_path / "glove"
+    glove.mkdir()
+    for name in ("our_vab_words.pkl", "our_vab_idx.pkl"):
+        (glove / name).write_bytes((files / "glove" / name).read_bytes())
+    np.save(glove / "our_vab_data.npy", np.random.default_rng(1).normal(size=(len(VOCABULARY) + 3, 300)))
+    made = import_t2m(tmp_path, glove, tmp_path / "bundle")
+    evaluator = load_evaluator(made, device="cpu", captions=files / "texts")
+    features = motion(75)
+    expected = embedded_by_hand(files, drawn, features)
+    np.testing.assert_allclose(evaluator.embed_motion([features])[0], expected.numpy(), atol=1e-4)
+    assert evaluator.embed_text(list(CAPTIONS)).shape == (3, 512)
 
 
 def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(files: Path, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from shared.motion.pages import asset
-from tests.support.reports import sample_report
+from tests.support.reports import UNMEASURED, sample_report
 from tests.support.walker import walker
 from workers.evaluator.report import (
     Baseline,
@@ -25,6 +25,7 @@ from workers.evaluator.report import (
     Report,
     Row,
     TrendPoint,
+    Value,
     from_json,
     to_html,
     to_json,
@@ -167,8 +168,21 @@ def test_ids_are_unique_and_every_link_leads_somewhere(page: Page) -> None:
     ids = page.attributes("id")
     assert len(ids) == len(set(ids))
     links = {link[1:] for link in page.attributes("href") if link.startswith("#")}
-    assert {"note-1", "note-2", "verdict", "numbers", "heat", "worst", "trends", "repeat"} <= links <= set(ids)
+    assert {"note-1-1", "note-2-2", "verdict", "numbers", "heat", "worst", "trends", "repeat"} <= links <= set(ids)
     assert {name for names in page.attributes("aria-labelledby") for name in names.split()} <= set(ids)
+
+
+def test_a_footnote_of_two_tables_stands_under_each_with_an_id_of_its_own(report: Report) -> None:
+    rows = tuple(
+        dataclasses.replace(row, values={**row.values, "skate": Value.missing(UNMEASURED)})
+        if row.key == "reconstruction"
+        else row
+        for row in report.rows
+    )
+    page = Page(to_html(dataclasses.replace(report, rows=rows)).decode())
+    ids = [name for name in page.attributes("id") if name.startswith("note-")]
+    assert ids == ["note-1-1", "note-2-2", "note-3-2"]
+    assert {f"#{name}" for name in ids} <= set(page.attributes("href"))
 
 
 def test_what_changed_comes_first_then_numbers_then_where_it_fails_then_how_to_repeat_it(page: Page) -> None:

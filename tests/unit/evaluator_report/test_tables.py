@@ -17,11 +17,8 @@ def lines(report: Report, table: int = 0):
 def test_numbers_of_different_evaluators_never_share_a_table(report: Report) -> None:
     other = Metric("t2m", "FID", measured_by="t2m@1")
     tables = tables_of(dataclasses.replace(report, metrics=(*report.metrics, other)))
-    assert [table.measured_by for table in tables] == [
-        report.metrics[0].measured_by,
-        "joints, without a network",
-        "t2m@1",
-    ]
+    network = report.metrics[0].measured_by
+    assert [table.measured_by for table in tables] == [network, network, "joints, without a network", "t2m@1"]
     for table in tables:
         assert {metric.measured_by for metric in table.metrics} == {table.measured_by}
 
@@ -30,13 +27,29 @@ def test_real_motion_and_reconstruction_stand_in_every_table_others_only_with_a_
     shown = [[line.label for line in table.lines if line.of == "values"] for table in tables_of(report)]
     assert shown == [
         ["ground truth", "reconstruction", "label-level ceiling", "raw", "exported"],
+        ["ground truth", "reconstruction", "label-level ceiling", "raw", "exported"],
         ["ground truth", "reconstruction", "exported"],
     ]
 
 
+def test_many_columns_are_cut_into_tables_that_a_window_shows_and_none_is_lost(report: Report) -> None:
+    names = [f"m{number}" for number in range(17)]
+    metrics = tuple(Metric(name, name, measured_by="a@1") for name in names)
+    bare = dataclasses.replace(report, metrics=(*report.metrics, *metrics))
+    cut = [[metric.key for metric in table.metrics] for table in tables_of(bare) if table.measured_by == "a@1"]
+    assert [len(keys) for keys in cut] == [6, 6, 5]
+    assert [key for keys in cut for key in keys] == names
+
+
+def test_a_table_in_which_nothing_was_compared_has_no_line_of_changes(report: Report) -> None:
+    told = [[line.label for line in table.lines if line.of == "changes"] for table in tables_of(report)]
+    last, pinned = "change against the last run", "change against the pinned baseline"
+    assert told == [[last, pinned], [last], [last, pinned]]
+
+
 def test_a_missing_value_is_marked_and_its_footnote_says_why(report: Report) -> None:
-    table = tables_of(report)[0]
-    cell = lines(report)["reconstruction"].cells[-1]
+    table = tables_of(report)[1]
+    cell = lines(report, 1)["reconstruction"].cells[-1]
     assert (cell.kind, cell.text) == ("missing", "not available")
     assert dict(table.footnotes)[cell.marks[0]] == "this tokenizer cannot encode clips of the compositional split"
 
@@ -67,7 +80,7 @@ def test_equal_footnotes_have_one_number(report: Report) -> None:
 
 
 def test_changes_stand_right_under_the_judged_row_with_arrow_word_and_interval(report: Report) -> None:
-    table = tables_of(report)[1]
+    table = tables_of(report)[2]
     labels = [line.label for line in table.lines]
     at = labels.index("exported")
     assert labels[at + 1 : at + 3] == ["change against the last run", "change against the pinned baseline"]

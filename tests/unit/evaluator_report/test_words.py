@@ -31,6 +31,12 @@ def test_a_run_without_alarm_names_what_became_better_and_what_stayed(report: Re
     )
 
 
+def test_one_metric_without_a_difference_is_named(report: Report) -> None:
+    same = tuple(c for c in report.changes if c.metric == "r3")
+    quiet = dataclasses.replace(report, regressed=False, alarms=(), changes=same, baselines=report.baselines[:1])
+    assert headline(quiet).sentence == "Against the last run no difference was found in R-precision top 3."
+
+
 def test_a_fall_that_raised_no_alarm_is_named_all_the_same(report: Report) -> None:
     fid = Change("fid", "last run", 0.08, 0.0964, 0.01, 0.02, "worse")
     head = headline(dataclasses.replace(report, regressed=False, alarms=(), changes=(fid,)))

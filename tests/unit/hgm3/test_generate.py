@@ -12,6 +12,7 @@ import torch
 
 from shared.errors import InvalidBundle, InvalidInput
 from tests.support.prepared import text_features
+from tests.support.processors import packs_bfloat16
 from workers.generating.port import Request
 from workers.hgm3.bundle import random_bundle
 from workers.hgm3.config import InferenceConfig
@@ -58,6 +59,7 @@ def test_motions_are_equal_in_a_shuffled_batch(generator: Generator, reference: 
     assert equal([reference[i] for i in order], shuffled)
 
 
+@packs_bfloat16
 def test_tokens_are_equal_in_any_batch_with_bfloat16_matrices(generator: Generator) -> None:
     lowered = Generator.load(generator.bundle, device="cpu", dtype=torch.bfloat16)
     together = lowered.generate(requests())

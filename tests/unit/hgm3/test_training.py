@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import torch
 
 from shared.bundles import Bundle
 from shared.errors import InvalidInput, NotFound
+from shared.nn.devices import fast_bf16
 from tests.support.prepared import farthest_move, text_features
 from workers.generating.port import Request
 from workers.hgm3.assembly import assemble, take_apart
@@ -165,6 +167,23 @@ def test_resuming_with_another_seed_is_refused(prepared: PreparedData, tmp_path:
             replace(run_options, resume=True, seed=1, budget=Budget(steps=2)),
             {},
         )
+
+
+@pytest.mark.parametrize("wanted", ["0", "1"])
+def test_matrices_are_in_bfloat16_only_where_that_pays(
+    wanted: str, prepared: PreparedData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MAREY_BF16", wanted)
+    stage = TokenizerStage(TINY, MotionData.load(prepared.path, CPU), Tokenizer(TINY))
+    loss, used = stage.loss, list[bool]()
+
+    def watched(context: StepContext) -> tuple[torch.Tensor, Mapping[str, torch.Tensor]]:
+        used.append(torch.is_autocast_enabled("cpu"))
+        return loss(context)
+
+    stage.loss = watched  # type: ignore[method-assign]
+    train(stage, RunOptions(tmp_path, Budget(steps=1), quiet=True), {})
+    assert used == [wanted == "1" and fast_bf16(CPU)]
 
 
 def test_the_tokenizer_learns(prepared: PreparedData, tmp_path: Path) -> None:

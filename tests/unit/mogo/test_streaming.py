@@ -9,6 +9,7 @@ import torch
 
 from shared.errors import InvalidInput
 from shared.nn.sampling import guide
+from tests.support.processors import PACKED_TYPES
 from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.streaming import Streams
@@ -64,7 +65,7 @@ def test_a_session_draws_the_same_tokens_beside_others(config: MOGOConfig) -> No
         assert torch.equal(found, alone(names[session], frames, transformer(config)))
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("dtype", PACKED_TYPES)
 @pytest.mark.parametrize(("width", "group"), [(256, 1), (1024, 1), (1024, 8)])
 def test_a_session_computes_the_same_bits_beside_others(width: int, group: int, dtype: torch.dtype) -> None:
     # wide enough for a plain product to take another kernel for one session than for many

@@ -7,6 +7,7 @@ import torch
 from torch import nn
 
 from shared.nn.packed import GroupedLinear, PackedLinear, pack_linears
+from tests.support.processors import PACKED_TYPES, packs_bfloat16
 
 pytestmark = pytest.mark.skipif(not torch.backends.mkldnn.is_available(), reason="this torch has no oneDNN")
 
@@ -28,7 +29,7 @@ def test_the_bits_of_a_row_depend_neither_on_other_rows_nor_on_its_place(before:
             assert torch.equal(packed(x[first : first + rows]), whole[first : first + rows])
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("dtype", PACKED_TYPES)
 @pytest.mark.parametrize("group", [1, 4, 8])
 @pytest.mark.parametrize(("before", "after", "rows"), [(192, 576, 1), (256, 513, 6), (1024, 1024, 6), (2048, 512, 12)])
 def test_the_bits_of_a_session_depend_neither_on_those_beside_it_nor_on_its_place(
@@ -50,6 +51,7 @@ def test_a_grouped_layer_gives_the_same_outputs(before: int, after: int, bias: b
     torch.testing.assert_close(packed(x[0]), linear(x[0]).detach(), atol=1e-5, rtol=0)
 
 
+@packs_bfloat16
 def test_bfloat16_weights_round_and_nothing_else() -> None:
     linear, x = nn.Linear(512, 256), torch.randn(50, 512)
     found = PackedLinear(linear, torch.bfloat16)(x)

@@ -11,6 +11,7 @@ from torch import nn
 from shared.nn.ema import WeightAverage, update_average, warm_momentum
 from shared.nn.ragged import pad_length
 from shared.nn.transformer import Transformer, dropout, sinusoidal_positions
+from tests.support.processors import PACKED_TYPES
 
 
 def transformer(*, norm_first: bool = True) -> Transformer:
@@ -43,7 +44,7 @@ def test_more_padding_and_another_batch_change_no_bit() -> None:
 
 
 @torch.inference_mode()
-@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+@pytest.mark.parametrize("dtype", PACKED_TYPES)
 def test_more_padding_and_another_batch_change_no_bit_after_packing(dtype: torch.dtype) -> None:
     model = transformer()
     model.lower(dtype)

@@ -21,6 +21,8 @@ from workers.evaluator.report.tables import (
 from workers.evaluator.report.words import CHANGES, LEGEND, direction, headline, intervals_of, moment
 
 ARROWS = {"higher": "↑", "lower": "↓", "": ""}
+MOST_STYLES = 8
+"""Columns of the heat map that have room to spare; more stand closer together, their names upright."""
 RAMP = (0.2, 0.4, 0.6, 0.8, 0.95)
 """Shares passed at which a cell of the heat map gets paler; the last step begins where a bar of 95 % would be met."""
 
@@ -66,7 +68,7 @@ def verdict(report: Report) -> Markup:
 
 def numbers(report: Report) -> Markup:
     """The tables, what ± is over, with what the numbers may be compared, and what the metrics are."""
-    tables = [_table(table, report.source.name) for table in tables_of(report)]
+    tables = [_table(number, table, report.source.name) for number, table in enumerate(tables_of(report), start=1)]
     told = [f"{LEGEND} {intervals_of(report.repeats)}", *([CHANGES] if report.changes else []), report.comparability]
     under = [element("p", sentence, class_="remark") for sentence in told]
     return section("Numbers", *tables, *under, _glossary(report.metrics), id="numbers")
@@ -77,12 +79,12 @@ def wide(label: str, *children: Markup) -> Markup:
     return element("div", *children, class_="wide", tabindex=0, role="region", aria_label=label)
 
 
-def _table(table: Table, source: str) -> Markup:
+def _table(number: int, table: Table, source: str) -> Markup:
     elsewhere = ", but where a column names other data" if any(m.measured_on for m in table.metrics) else ""
     by, on = element("b", table.measured_by), element("b", source)
     head = element("tr", element("td", ""), *(_column(metric) for metric in table.metrics))
-    body = join(*(_line(line) for line in table.lines))
-    notes = [element("li", text, id=f"note-{mark}", value=mark) for mark, text in table.footnotes]
+    body = join(*(_line(line, number) for line in table.lines))
+    notes = [element("li", text, id=_note(number, mark), value=mark) for mark, text in table.footnotes]
     return join(
         element("p", "Measured by ", by, " on ", on, elsewhere, class_="caption"),
         wide(
@@ -101,22 +103,28 @@ def _column(metric: Metric) -> Markup:
     return element("th", metric.label, Markup("&nbsp;") if way else "", arrow, *small, scope="col")
 
 
-def _line(line: Line) -> Markup:
+def _note(table: int, mark: int) -> str:
+    """The id of a footnote: the same one may stand under several tables."""
+    return f"note-{table}-{mark}"
+
+
+def _line(line: Line, table: int) -> Markup:
     label = element("th", line.label, element("small", line.note) if line.note else "", scope="row")
     kind = "judged" if line.judged else line.of
-    return element("tr", label, *(_cell(cell, line.of) for cell in line.cells), class_=kind)
+    return element("tr", label, *(_cell(cell, line.of, table) for cell in line.cells), class_=kind)
 
 
-def _cell(cell: Cell, of: str) -> Markup:
+def _cell(cell: Cell, of: str, table: int) -> Markup:
     if cell.kind == "blank":
         return element("td", element("span", "–", aria_label="does not apply", role="img"), class_="blank")
-    marks = [element("sup", element("a", str(mark), href=f"#note-{mark}")) for mark in cell.marks]
+    marks = [element("sup", element("a", str(mark), href=f"#{_note(table, mark)}")) for mark in cell.marks]
     number = element("span", cell.text, class_="number")
     if of == "changes":
         parts = [number, element("span", cell.detail, class_="word"), element("small", cell.interval)]
     else:
-        interval = element("span", " ", cell.interval, class_="interval") if cell.interval else ""
-        parts = [number, interval, *marks, element("small", cell.detail) if cell.detail else ""]
+        # In a narrow window the interval stands under its number: the marks stay with what ends the line.
+        behind = [element("span", " ", cell.interval, *marks, class_="interval")] if cell.interval else marks
+        parts = [number, *behind, element("small", cell.detail) if cell.detail else ""]
     return element("td", *parts, class_=cell.kind)
 
 
@@ -136,8 +144,8 @@ def heat(report: Report) -> Markup:
     found = heat_of(report)
     if not found.cells:
         return Markup("")
-    styles = [element("th", style, scope="col") for style in found.styles]
-    head = element("tr", element("td", ""), *styles, element("th", "all", scope="col"))
+    styles = [element("th", element("span", style), scope="col") for style in (*found.styles, "all")]
+    head = element("tr", element("td", ""), *styles)
     rows = [_heat_row(found, act) for act in found.acts]
     sums = [_heat_cell(found.total(style=style), "sum") for style in found.styles]
     foot = element("tr", element("th", "all", scope="row"), *sums, _heat_cell(found.total(), "sum"))
@@ -148,7 +156,7 @@ def heat(report: Report) -> Markup:
         label,
         element("p", weakest) if weakest else "",
         element("p", told, class_="caption"),
-        wide(label, element("table", *parts, class_="heat")),
+        wide(label, element("table", *parts, class_="heat" if len(found.styles) <= MOST_STYLES else "heat many")),
         id="heat",
     )
 

@@ -1,12 +1,14 @@
 """The numbers as tables of words, for the page and for Markdown alike.
 
-Columns of different evaluators never share a table, and a column on other data than the rest says so. Under the judged
-row stands what became of it since the last run and since the pinned baseline.
+Columns of different evaluators never share a table, and a column on other data than the rest says so. What one
+evaluator measured is several tables where one would be wider than a window. Under the judged row stands what became of
+it since the last run and since the pinned baseline.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -25,6 +27,8 @@ from workers.evaluator.report.words import (
 
 Kind = Literal["value", "missing", "blank", "better", "worse", "same"]
 NOT_AVAILABLE = "not available"
+MOST_COLUMNS = 6
+"""Of a table: with intervals and row names, what a window of 1,000 pixels shows. R-precision in both pools is six."""
 MOST_RUNS = 30
 """Of a trend: half a year of weekly runs."""
 LEAST_TRIALS = 3
@@ -74,17 +78,24 @@ class _Footnotes:
 
 
 def tables_of(report: Report) -> tuple[Table, ...]:
-    """A table for each evaluator, in the order of the metrics; footnotes are numbered through."""
+    """Tables of each evaluator, in the order of the metrics; footnotes are numbered through."""
     groups: dict[str, list[Metric]] = {}
     for metric in report.metrics:
         groups.setdefault(metric.measured_by, []).append(metric)
     footnotes, tables = _Footnotes(), list[Table]()
-    for measured_by, metrics in groups.items():
+    for metrics in (columns for group in groups.values() for columns in _cut(group)):
         lines = tuple(_lines(report, metrics, footnotes))
         used = {mark for line in lines for cell in line.cells for mark in cell.marks}
         notes = tuple((mark, text) for text, mark in footnotes.numbers.items() if mark in used)
-        tables.append(Table(measured_by, tuple(metrics), lines, notes))
+        tables.append(Table(metrics[0].measured_by, tuple(metrics), lines, notes))
     return tuple(tables)
+
+
+def _cut(metrics: Sequence[Metric]) -> Iterator[Sequence[Metric]]:
+    """The columns of one table after another, about as many in each."""
+    size = math.ceil(len(metrics) / math.ceil(len(metrics) / MOST_COLUMNS))
+    for begin in range(0, len(metrics), size):
+        yield metrics[begin : begin + size]
 
 
 def _lines(report: Report, metrics: Sequence[Metric], footnotes: _Footnotes) -> list[Line]:
@@ -96,7 +107,8 @@ def _lines(report: Report, metrics: Sequence[Metric], footnotes: _Footnotes) -> 
         cells = tuple(_value(row, metric, footnotes) for metric in metrics)
         lines.append(Line("values", row.label, row.note, cells, judged))
         if judged:
-            lines += [_change_line(report, baseline, metrics) for baseline in report.baselines]
+            compared = (_change_line(report, baseline, metrics) for baseline in report.baselines)
+            lines += [line for line in compared if any(cell.kind != "blank" for cell in line.cells)]
     return lines
 
 

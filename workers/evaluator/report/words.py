@@ -57,14 +57,13 @@ def _tally(report: Report, against: Against, changes: list[Change]) -> str:
         if names:
             more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
             parts.append(f"{_listed([*names[:MOST_NAMED], *more])} {'is' if len(names) == 1 else 'are'} {verdict}")
-    same = sum(c.verdict == "no difference found" for c in changes)
-    if same:
-        parts.append(f"no difference was found in {'any' if same == len(changes) else same} of {_counted(changes)}")
+    same = [report.metric(c.metric).name for c in changes if c.verdict == "no difference found"]
+    if len(same) == 1:
+        parts.append(f"no difference was found in {same[0]}")
+    elif same:
+        of = "any" if len(same) == len(changes) else len(same)
+        parts.append(f"no difference was found in {of} of {len(changes)} metrics")
     return f"against {SUBJECTS[against]} {_listed(parts)}"
-
-
-def _counted(changes: list[Change]) -> str:
-    return f"{len(changes)} metric{'s' if len(changes) > 1 else ''}"
 
 
 def _listed(names: list[str]) -> str:

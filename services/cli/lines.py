@@ -1,0 +1,48 @@
+"""A request body of one JSON object a line, kept in a file once it is long."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Self
+
+from shared.spool import Spool
+
+PIECE = 64 * 2**10
+"""Bytes that are sent at a time."""
+HINT = "Make room on the disk of temporary files, or name a folder with room by TMPDIR."
+
+
+class Lines:
+    """NDJSON that can be sent as often as it takes, and is never in memory as a whole."""
+
+    def __init__(self, objects: Iterable[Mapping[str, Any]]) -> None:
+        """Write all of them down; what reading them raises leaves nothing behind.
+
+        Raises:
+            Unreachable: there is no room for them.
+        """
+        self._spool = Spool("the prompts", HINT)
+        try:
+            for each in objects:
+                self._spool.write(json.dumps(each, ensure_ascii=False).encode() + b"\n")
+            self._spool.rewound()  # what is still to be written is written before anything is sent
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def __len__(self) -> int:
+        """Bytes."""
+        return len(self._spool)
+
+    def __iter__(self) -> Iterator[bytes]:
+        """The body from its beginning, in pieces."""
+        file = self._spool.rewound()
+        while piece := file.read(PIECE):
+            yield piece
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._spool.__exit__()

@@ -1,0 +1,125 @@
+"""Captures to training data: what `marey data` does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from services.cli.extras import needs_extra
+from shared.errors import InvalidInput, NotFound
+
+if TYPE_CHECKING:
+    from workers.training.data.pack import JointsPack
+
+
+@dataclass(frozen=True)
+class CaptureSources:
+    """What `marey data pack` and `prepare` read.
+
+    Attributes:
+        named: source (`bandai-namco`, `cmu` or `pack`) and its archive, folder or file.
+        splits: of bandai-namco; None = beside the archive.
+        captions: of cmu; None = beside the archive.
+        processes: how many retarget at once.
+    """
+
+    named: Sequence[tuple[str, Path]]
+    splits: Path | None = None
+    captions: Path | None = None
+    processes: int = 2
+
+
+def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | None], None]) -> list[JointsPack]:
+    """The clips of each source on the 22-joint skeleton, at 20 fps.
+
+    Raises:
+        InvalidInput: an unknown source.
+        NotFound, InvalidFile, TooLarge: from reading.
+    """
+    try:
+        from workers.training.data.pack import JointsPack
+        from workers.training.data.prepare import pack_bandai_namco, pack_cmu
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    options = {"processes": sources.processes}
+    readers: dict[str, Callable[[Path], JointsPack]] = {
+        "bandai-namco": lambda path: pack_bandai_namco(
+            path, splits=sources.splits, progress=partial(progress, "bandai-namco"), **options
+        ),
+        "cmu": lambda path: pack_cmu(path, captions=sources.captions, progress=partial(progress, "cmu"), **options),
+        "pack": JointsPack.load,
+    }
+    for name, _ in sources.named:
+        if name not in readers:
+            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join(readers)}.")
+    return [readers[name](path) for name, path in sources.named]
+
+
+def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> list[Path]:
+    """Write one joints pack a source into a folder: small enough to carry to the machine that trains.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
+    """
+    output.mkdir(parents=True, exist_ok=True)
+    paths = [output / f"{name}.pack.npz" for name, _ in sources.named]
+    for path, pack in zip(paths, read_captures(sources, progress), strict=True):
+        pack.save(path)
+    return paths
+
+
+def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> str:
+    """Prepare training data; a line that says what was made.
+
+    Raises:
+        InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
+        Conflict: the folder is in use.
+    """
+    packs = read_captures(sources, progress)
+    from workers.training.data.build import build
+
+    manifest = build(packs, output, progress=partial(progress, "building"))
+    return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
+
+
+def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
+    """What a prepared folder holds, its hashes checked; or one clip of it.
+
+    Raises:
+        NotFound, InvalidFile: no such folder or clip, or a changed file.
+    """
+    try:
+        from workers.training.data.inspect import summarize
+        from workers.training.data.prepared import PreparedData
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    data = PreparedData.open(folder)
+    if clip is None:
+        return summarize(data).model_dump(mode="json")
+    for found in data.clips:
+        if found.id == clip:
+            return found.model_dump(mode="json")
+    raise NotFound(f"there is no clip {clip!r}", where=str(folder), hint=f"The first is {data.clips[0].id}.")
+
+
+def encode_captions(folder: Path, model: str | None, progress: Callable[[int, int], None]) -> int:
+    """Write `texts.npz` of a prepared folder; how many captions it holds."""
+    try:
+        from shared.bundles import TextSpec, choose_bundle
+        from shared.text.pipeline import TextPipeline
+        from workers.training.data.prepared import PreparedData
+        from workers.training.texts import CaptionTexts
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    spec = TextSpec() if model is None else choose_bundle(model).manifest.text
+    if spec is None:
+        raise InvalidInput(f"{model!r} does not read prompts", where="--model")
+    data = PreparedData.open(folder)
+    captions = [clip.captions + clip.act_captions for clip in data.clips]
+    processes = os.cpu_count() or 1
+    CaptionTexts.build(captions, TextPipeline.load(spec), processes=processes, progress=progress).save(folder)
+    return sum(map(len, captions))

@@ -1,0 +1,93 @@
+"""A model in this process, without a server or a queue."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from services.cli.extras import needs_extra
+from services.cli.roles.serving import GENERATORS, threads_of
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from shared.bundles import Bundle
+    from shared.motion.clip import MotionClip
+    from shared.settings import Settings
+    from workers.generating.port import Generator
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """One motion to make without a server."""
+
+    prompt: str
+    seed: int
+    seconds: float | None
+    settings: Mapping[str, float]
+
+
+class OneShot:
+    """A model in this process: what `marey generate` runs."""
+
+    def __init__(self, bundle: Bundle, config: Settings) -> None:
+        """Load the bundle and what reads its prompts.
+
+        Raises:
+            InvalidInput: the extra `worker` is not installed, or there is no such device.
+            NotFound, InvalidBundle: weights are missing or damaged.
+        """
+        try:
+            from shared.text.keys import as_served
+            from shared.text.pipeline import TextPipeline
+
+            kind = import_module(GENERATORS[bundle.manifest.model]).Generator
+        except ImportError as error:
+            raise needs_extra("worker", error) from error
+        if bundle.manifest.text is None:
+            raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
+        self.bundle = bundle
+        self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
+        self._generator: Generator[Any] = kind.load(bundle, device=config.device, threads=threads_of(config, 1))
+
+    def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
+        """Each motion with the seconds it took, in the order given.
+
+        Raises:
+            InvalidInput: a length this bundle cannot make; before anything is made.
+        """
+        from workers.generating.export import finish, split_settings
+        from workers.generating.port import Request
+
+        features = self._text.features([w.prompt for w in wanted])
+        fps = self._generator.limits.fps
+        requests = [
+            Request(text, w.seed, None if w.seconds is None else round(w.seconds * fps))
+            for w, text in zip(wanted, features, strict=True)
+        ]
+        requests = [self._generator.settled(request) for request in requests]
+        start = 0
+        for _, group in groupby(wanted, key=lambda w: sorted(w.settings.items())):
+            rows = list(group)
+            values, output_fps = split_settings(rows[0].settings)
+            settings, size = self._generator.settings(values), self._generator.batch
+            for low in range(0, len(rows), size):
+                batch = requests[start + low : start + min(low + size, len(rows))]
+                began = time.monotonic()
+                made = self._generator.generate(batch, settings)
+                elapsed = (time.monotonic() - began) / len(batch)
+                for row, request, generated in zip(rows[low:], batch, made, strict=False):
+                    assert generated is not None  # nothing was dropped
+                    yield row, finish(self._generator, request, generated, settings, fps=output_fps), elapsed
+            start += len(rows)
+
+
+def make_random_bundle(path: Path) -> None:
+    """A tiny HGM³ with random weights: it exercises everything and generates nonsense."""
+    from workers.hgm3.bundle import random_bundle
+
+    random_bundle(path)

@@ -1,0 +1,70 @@
+"""Which workers `marey serve` and `marey worker` start."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from shared.runtime.handler import Role
+    from shared.settings import Settings
+
+HANDLERS = {
+    "hgm3": "workers.hgm3.handler:create_handler",
+    "mogo": "workers.mogo.handler:create_handler",
+    "text": "services.text.handler:create_handler",
+    "evaluator": "workers.evaluator.handler:create_handler",
+}
+"""Factories by queue, as strings: only a worker's child imports them, and with them torch."""
+SHOWS = {"mogo": "workers.mogo.live:create_show"}
+"""What the live loop of each model that streams serves."""
+GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
+"""Where each model's `Generator` is."""
+
+
+def default_roles(config: Settings) -> str:
+    """One child for every model that has a bundle here, for prompts, and for evaluations where there is an evaluator:
+    two would fight for the cores."""
+    from shared.bundles import list_bundles
+
+    here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
+    judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
+    return "+".join([*([model for model in GENERATORS if model in here] or ["hgm3"]), "text", *judges])
+
+
+def parse_roles(text: str) -> list[tuple[str, ...]]:
+    """`hgm3+text,hgm3` → one worker of both queues and one of the first.
+
+    Raises:
+        InvalidInput: an unknown queue.
+    """
+    roles = [tuple(part.strip() for part in role.split("+")) for role in text.split(",")]
+    for name in (name for role in roles for name in role):
+        if name not in HANDLERS:
+            raise InvalidInput(
+                f"there is no worker {name!r}",
+                where="--with",
+                hint=f"Known: {', '.join(HANDLERS)}; + joins them in one child, a comma separates children.",
+            )
+    return roles
+
+
+def role_of(queues: Sequence[str], config: Settings) -> Role:
+    """The role of a worker that serves these queues, its model loaded before it is ready.
+
+    Raises:
+        NotFound, InvalidBundle: there is no bundle for its model, or a broken one.
+    """
+    from shared.bundles import choose_bundle
+    from shared.runtime.handler import Role
+
+    preload = {q: choose_bundle(q, config=config).reference for q in queues if q in GENERATORS}
+    return Role("+".join(queues), {queue: HANDLERS[queue] for queue in queues}, preload)
+
+
+def threads_of(config: Settings, torch_children: int) -> int:
+    """Torch threads of one child: the cores, divided by the children that compute."""
+    return config.threads or max(1, len(os.sched_getaffinity(0)) // max(1, torch_children))

@@ -1,0 +1,83 @@
+"""What a tokenizer loses of real motion: `marey train evaluator reconstruct`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from services.cli.extras import needs_extra
+from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from shared.nn.motion_tokenizer import MotionTokenizer
+
+
+def reconstruct(
+    evaluator: str, generator: str, data: Path, output: Path | None, progress: Callable[[int, int], None]
+) -> dict[str, Any]:
+    """Measure a generator's tokenizer on real clips; a bundle's row is kept beside the evaluator's bundle.
+
+    Args:
+        evaluator: a bundle.
+        generator: a bundle, or a folder of finished parts, whose reconstruction only the report tells.
+        data: the prepared folder that the evaluator's reference is of.
+        output: a report, .html, .json or .md.
+        progress: called with (clips done, clips in all).
+
+    Raises:
+        NotFound, InvalidBundle, InvalidFile: of the bundles and the data.
+        InvalidInput: they do not belong together, or the report's file has another ending.
+    """
+    try:
+        from shared.bundles import find_bundle
+        from workers.evaluator import report, tokenizers
+        from workers.evaluator.loading import load_evaluator
+        from workers.evaluator.reconstruction import reconstruct
+        from workers.evaluator.reference import Reference
+        from workers.training.data.prepared import PreparedData
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    writers = {".html": report.to_html, ".json": report.to_json, ".md": report.to_markdown}
+    if output is not None and output.suffix not in writers:
+        raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(writers)}.")
+    judge = find_bundle(evaluator)
+    name, licence, tokenizer = _open_tokenizer(generator)
+    prepared, real = PreparedData.open(data), Reference.of(judge)
+    loaded = load_evaluator(judge, device="cpu")
+    rebuilt = reconstruct(prepared, real, loaded, name, tokenizer, progress=progress)
+    if licence is not None:
+        rebuilt.reconstruction.save(judge)
+    if output is not None:
+        told = tokenizers.tokenizer_report(rebuilt, loaded, real, prepared, licence=licence or "of its data")
+        output.write_bytes(writers[output.suffix](told))
+    return rebuilt.reconstruction.model_dump(mode="json")
+
+
+def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
+    """Exact name, licence (None = of a run, which has none yet) and tokenizer, in evaluation mode."""
+    from shared.bundles import choose_bundle
+    from shared.hashing import sha256_of
+    from workers.hgm3 import bundle as hgm3
+    from workers.hgm3 import config as hgm3_config
+    from workers.hgm3 import tokenizer as hgm3_tokenizer
+    from workers.mogo import bundle as mogo
+    from workers.mogo import config as mogo_config
+    from workers.mogo import tokenizer as mogo_tokenizer
+    from workers.training.parts import load_part
+
+    folder = Path(generator) / "tokenizer" / "part"
+    if (folder / "part.json").is_file():
+        part = load_part(folder)
+        if "masked" in part.config:
+            tokenizer = hgm3_tokenizer.Tokenizer(hgm3_config.HGM3Config.from_dict(part.config))
+        else:
+            tokenizer = mogo_tokenizer.Tokenizer(mogo_config.MOGOConfig.from_dict(part.config))
+        tokenizer.load_state_dict({name: value.float() for name, value in part.state.items()}, strict=False)
+        sha256 = sha256_of(folder / "weights.safetensors")[:12]
+        return f"{Path(generator).resolve().name}@{sha256}", None, tokenizer.eval()
+    found = choose_bundle(generator)
+    networks = {"hgm3": lambda: hgm3.load_networks(found)[1].tokenizer, "mogo": lambda: mogo.load_networks(found)[1]}
+    if found.manifest.model not in networks:
+        raise InvalidInput(f"{found.manifest.name!r} has no tokenizer", where=str(found.path))
+    return found.reference, found.manifest.licence, networks[found.manifest.model]()

@@ -1,0 +1,26 @@
+"""One API for the tests of a module; a module whose API is another brings its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+
+from shared.runtime.embedded import EmbeddedServer
+from tests.support.live_api import LiveApi, running_api, settings_of
+
+
+@pytest.fixture(scope="module")
+def api(
+    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[LiveApi]:
+    config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
+    with running_api(config, module_database_url) as api:
+        yield api
+
+
+@pytest.fixture
+def http(api: LiveApi) -> Iterator[httpx2.Client]:
+    with api.http() as client:
+        yield client

@@ -1,0 +1,68 @@
+"""An answer that refuses what was sent names the field: where it is no field that schemathesis could find."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+
+from shared.runtime.embedded import EmbeddedServer
+from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_generator
+from tests.support.live_api import running_api, settings_of
+
+JSON = {"Content-Type": "application/json"}
+PROMPTS = [{"prompt": "walk"}, {"prompt": "run"}]
+BROKEN = {
+    "no JSON": b'{"prompt": ',
+    "no UTF-8": b'{"prompt": "\xff"}',
+    "nested too deeply": b"[" * 200_000,
+    "no object": b"[1]",
+}
+WITH_BODY = ("/v1/jobs", "/v1/evaluations", "/v1/schedules", "/v1/streams", "/v1/webhooks", "/v1/texts/parse")
+
+
+@pytest.fixture(scope="module")
+def http(
+    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[httpx2.Client]:
+    config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
+    write_generator(config.models)
+    with running_api(config, module_database_url) as api, api.http() as http:
+        missing = http.post("/v1/evaluations", json={"bundle": GENERATOR, "prompts": PROMPTS})
+        assert told(missing) == (422, "evaluator")  # there is none yet
+        write_evaluator(config.models)
+        yield http
+
+
+def told(response: httpx2.Response) -> tuple[int, str]:
+    """The status, and what the problem is about."""
+    assert "/" not in response.json().get("where", ""), response.text  # nobody is told where the server has its files
+    return response.status_code, response.json()["where"]
+
+
+@pytest.mark.parametrize("path", WITH_BODY)
+@pytest.mark.parametrize("broken", BROKEN)
+def test_of_a_body_that_cannot_be_read_the_body_is_named(http: httpx2.Client, path: str, broken: str) -> None:
+    assert told(http.post(path, content=BROKEN[broken], headers=JSON)) == (422, "body")
+
+
+def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> None:
+    assert told(http.post("/v1/jobs", content=b"\n \n", headers={"Content-Type": "application/x-ndjson"})) == (
+        422, "body",
+    )  # fmt: skip
+
+
+def test_of_too_many_items_the_first_that_is_one_too_many_is_named(http: httpx2.Client) -> None:
+    assert told(http.post("/v1/jobs", json={"items": [{}] * 100_001})) == (413, "line 100001")
+
+
+def test_a_bundle_of_the_wrong_kind_or_of_nobody_is_told_by_the_field_that_names_it(http: httpx2.Client) -> None:
+    assert told(http.get(f"/v1/models/{JUDGE}")) == (422, "name")
+    assert told(http.post("/v1/texts/parse", json={"prompts": ["walk"], "model": "nobody"})) == (404, "model")
+    for model in (JUDGE, "nobody", GENERATOR):
+        assert told(http.post("/v1/streams", json={"prompt": "walk", "model": model})) == (422, "model")
+    for path, more in (("/v1/evaluations", {}), ("/v1/schedules", {"cron": "0 3 * * 1"})):
+        for field, name in (("bundle", JUDGE), ("bundle", "nobody"), ("evaluator", GENERATOR), ("evaluator", "nobody")):
+            body = {"bundle": GENERATOR, "prompts": PROMPTS, **more, field: name}
+            assert told(http.post(path, json=body)) == (422, field)

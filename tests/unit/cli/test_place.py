@@ -1,0 +1,47 @@
+"""Where the server is and which key it wants, from the environment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from services.cli.place import Server, find_server
+from shared.errors import InvalidFile, Unauthenticated
+
+URL = "https://marey.example.com"
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MAREY_SERVER", f"{URL}/")
+    monkeypatch.delenv("MAREY_KEY", raising=False)
+    monkeypatch.delenv("MAREY_KEY_FILE", raising=False)
+
+
+def test_a_key_may_stand_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "key").write_text("marey_key\n")
+    monkeypatch.setenv("MAREY_KEY_FILE", str(tmp_path / "key"))
+    assert find_server() == Server(URL, "marey_key")
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe"])
+def test_a_file_that_holds_no_key_is_told_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes | None
+) -> None:
+    path = tmp_path / "key"
+    if content is not None:
+        path.write_bytes(content)
+    monkeypatch.setenv("MAREY_KEY_FILE", str(path))
+    with pytest.raises(InvalidFile, match="cannot be read") as told:
+        find_server()
+    assert str(path) in str(told.value)
+
+
+def test_no_key_at_all_is_told_with_what_to_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(Unauthenticated, match="MAREY_KEY is empty"):
+        find_server()
+    (tmp_path / "key").write_text("")
+    monkeypatch.setenv("MAREY_KEY_FILE", str(tmp_path / "key"))
+    with pytest.raises(Unauthenticated, match="the file of MAREY_KEY_FILE is empty"):
+        find_server()
