@@ -72,9 +72,11 @@ def steered(joints: Array, fps: float, expected: EvaluationPrompt) -> Verdict:
     return next((v for v in verdicts if v.passed), verdicts[-1])
 
 
-def steers(generator: Generator, texts: dict[str, TextFeatures], count: int) -> list[Streamed]:
-    """Steer so many sessions from one act to another."""
-    pairs = pairs_of(evaluation_prompts(), count)
+def steers(
+    generator: Generator, prompts: Sequence[EvaluationPrompt], texts: dict[str, TextFeatures], count: int
+) -> list[Streamed]:
+    """Steer so many sessions from one act of these prompts to another."""
+    pairs = pairs_of(prompts, count)
     fps = generator.limits.fps
     found: list[Streamed] = []
     for start in range(0, count, SESSIONS):
@@ -91,10 +93,12 @@ def steers(generator: Generator, texts: dict[str, TextFeatures], count: int) -> 
     return found
 
 
-def walks(generator: Generator, texts: dict[str, TextFeatures], count: int) -> list[Streamed]:
+def walks(
+    generator: Generator, prompts: Sequence[EvaluationPrompt], texts: dict[str, TextFeatures], count: int
+) -> list[Streamed]:
     """Walk for 2,000 frames, so many times."""
-    prompts = [p for p in evaluation_prompts() if p.group == "walk"]
-    chosen = [prompts[k % len(prompts)] for k in range(count)]
+    walking = [p for p in prompts if p.group == "walk"]
+    chosen = [walking[k % len(walking)] for k in range(count)]
     room = LiveRoom(generator, count)
     names = [room.start(texts[p.text], seed) for seed, p in enumerate(chosen)]
     joints = _played(room, names, LONG)[:, -SEEN:]
@@ -129,11 +133,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found: dict[str, Any] = report.to_json()
     markdown = report.markdown()
     if chosen.steers or chosen.walks:
-        prompts = [p.text for p in evaluation_prompts()]
-        texts = dict(zip(prompts, pipeline_of(generator).features(prompts), strict=True))
+        prompts = evaluation_prompts(chosen.prompts)
+        words = [p.text for p in prompts]
+        texts = dict(zip(words, pipeline_of(generator).features(words), strict=True))
         live = {
-            "obeyed within 2 s of a steer": steers(generator, texts, chosen.steers),
-            "still walking at frame 2,000": walks(generator, texts, chosen.walks) if chosen.walks else [],
+            "obeyed within 2 s of a steer": steers(generator, prompts, texts, chosen.steers),
+            "still walking at frame 2,000": walks(generator, prompts, texts, chosen.walks) if chosen.walks else [],
         }
         markdown += "\n| live sessions | sessions | obeyed |\n|---|---|---|\n"
         markdown += "".join(_markdown(title, some) for title, some in live.items() if some)

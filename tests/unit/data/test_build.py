@@ -16,10 +16,11 @@ from workers.training.checks.judge import judge
 from workers.training.checks.rates import RealClip
 from workers.training.data import compose
 from workers.training.data.build import LAYOUT, build, swap_sides, windows
-from workers.training.data.compose import Counts, held_longer
+from workers.training.data.compose import Counts
 from workers.training.data.inspect import summarize
 from workers.training.data.pack import JointsPack, PackClip
 from workers.training.data.prepared import PreparedData
+from workers.training.data.retime import held_longer
 from workers.training.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
 
 MOTIONS = {

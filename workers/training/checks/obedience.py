@@ -3,9 +3,9 @@
     python -m workers.hgm3.obedience models/hgm3-starter --seeds 3 -o report
     python -m workers.mogo.obedience models/mogo-starter --seeds 3 -o report
 
-With `--captions DATA` the captions of that prepared folder's validation clips are asked for instead: what is chosen by
-looking at numbers (steps, guidance, temperature) is chosen there, never on the evaluation prompts. `--blind` asks for a
-second set of evaluation prompts, by an author who knew neither the training captions nor the first set.
+What is chosen by looking at numbers (steps, guidance, temperature) is chosen with `--captions DATA`, the captions of a
+prepared folder's validation clips, or `--prompts development`, never on the evaluation prompts. `--prompts blind` asks
+for a second set of those, by an author who knew neither the training captions nor the first set.
 
 The checker reads joints only and knows nothing of the model; its own rate on real clips belongs beside every number
 here. Motions are judged as users get them: feet cleaned, rotations solved.
@@ -20,7 +20,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from shared.errors import InvalidBundle, InvalidInput
 from shared.text.features import TextFeatures
@@ -28,7 +28,7 @@ from shared.text.pipeline import TextPipeline
 from workers.generating.export import finish
 from workers.generating.port import Generator, Request, S
 from workers.training.checks.judge import judge, straightness
-from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from workers.training.checks.prompts import EvaluationPrompt, PromptSet, evaluation_prompts
 from workers.training.checks.quality import Quality, quality
 from workers.training.checks.rates import Rate, expectations, mean_quality, name_of
 from workers.training.data.prepared import PreparedData
@@ -192,7 +192,9 @@ def parser_of(program: str) -> argparse.ArgumentParser:
     parser.add_argument("--seconds", type=float, help="length of every motion; else the model's own choice")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one setting, guidance=3")
     parser.add_argument("--captions", type=Path, metavar="DATA", help="a folder: its validation captions instead")
-    parser.add_argument("--blind", action="store_true", help="the second set of prompts, by another author")
+    parser.add_argument(
+        "--prompts", choices=get_args(PromptSet), default="evaluation", help="the set that is asked for"
+    )  # fmt: skip
     parser.add_argument("--every", type=int, default=1, help="only each K-th prompt, for a quick look")
     parser.add_argument("--threads", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path, help="folder of report.json and report.md")
@@ -209,7 +211,7 @@ def pipeline_of(generator: Generator[Any]) -> TextPipeline:
 
 def report_of(generator: Generator[Any], chosen: argparse.Namespace) -> Report:
     """Measure a bundle as the command line chose, and print what it failed at."""
-    prompts = validation_prompts(chosen.captions) if chosen.captions else evaluation_prompts(blind=chosen.blind)
+    prompts = validation_prompts(chosen.captions) if chosen.captions else evaluation_prompts(chosen.prompts)
     prompts = prompts[:: chosen.every]
     report = measure(
         generator,

@@ -1,4 +1,8 @@
-"""The evaluation prompts and what each motion must do: `prompts.toml`, and `prompts_blind.toml` by another author."""
+"""Prompts that training never saw and what each motion must do, in three sets by three authors.
+
+`prompts.toml` are the 200 that bars are set on; `prompts_blind.toml` was written by somebody who knew neither the
+training captions nor those, and nothing is ever chosen by it; `prompts_development.toml` by a third one in the same
+way: settings, weights and data are chosen by it."""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import tomllib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from workers.training.checks.judge import Expectation
 
@@ -33,14 +37,14 @@ class EvaluationPrompt:
         return len(self.expected) == 1 and self.expected[0].side != ""
 
 
-@lru_cache(maxsize=2)
-def evaluation_prompts(*, blind: bool = False) -> tuple[EvaluationPrompt, ...]:
-    """The 200 that the bars are set on, in the order of their file.
+PromptSet = Literal["evaluation", "blind", "development"]
+_FILES = {"evaluation": "prompts", "blind": "prompts_blind", "development": "prompts_development"}
 
-    Args:
-        blind: those of an author who knew neither the training captions nor the 200, by which nothing was ever chosen.
-    """
-    name = "prompts_blind.toml" if blind else "prompts.toml"
+
+@lru_cache(maxsize=3)
+def evaluation_prompts(which: PromptSet = "evaluation") -> tuple[EvaluationPrompt, ...]:
+    """One of the sets, in the order of its file."""
+    name = f"{_FILES[which]}.toml"
     table: dict[str, Any] = tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
     return tuple(
         EvaluationPrompt(
