@@ -239,8 +239,10 @@ STARTED_AGAIN = """
     SELECT min(at) FROM ledger_item
     WHERE after = 'leased' AND at > :at AND item = ANY(:items) AND NOT lease = ANY(:leases)
 """
-LOST = """
-    SELECT count(*) FROM ledger_item WHERE after = 'ready' AND at > :at AND item = ANY(:items) AND lease = ANY(:leases)
+SINCE_FAULT = frozenset({"all items given back", "first item again"})
+"""Counted from the fault itself; other waits from when what was broken is back."""
+GIVEN_BACK = """
+    SELECT max(at) FROM ledger_item WHERE after = 'ready' AND at > :at AND item = ANY(:items) AND lease = ANY(:leases)
 """
 NEXT = "SELECT min(at) FROM ledger_item WHERE after = :after AND at > :at"
 
@@ -251,7 +253,9 @@ def recoveries(engine: sa.Engine, fault: Fault) -> dict[str, float]:
     with transaction(engine) as conn:
         if fault.held:
             asked = {"at": fault.at, "items": fault.held, "leases": fault.leases}
-            if conn.execute(sa.text(LOST), asked).scalar_one():
+            given_back = conn.execute(sa.text(GIVEN_BACK), asked).scalar_one()
+            if given_back is not None:
+                found["all items given back"] = (given_back - fault.at).total_seconds()
                 again = conn.execute(sa.text(STARTED_AGAIN), asked).scalar_one()
                 if again is not None:
                     found["first item again"] = (again - fault.at).total_seconds()

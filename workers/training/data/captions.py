@@ -10,15 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import conjugate, number, sentence, with_adjective
+from workers.training.data.english import conjugate, sentence, with_adjective
 from workers.training.data.grammar import grammar
-from workers.training.data.phrases import details, fields, fill, filled
+from workers.training.data.phrases import details, fields, fill, filled, phrase_of, with_adverb
+from workers.training.data.told import told_caption, told_sequence
 
 _HIS = re.compile(r"\b(he|man|guy|boy|gentleman|grandfather|fellow|schoolboy|sportsman)\b")
 _HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b")
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
-NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, MANNER_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35, 0.35
+TOLD_SHARE = 0.5
+NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35
 
 
 def seeded(*parts: object) -> random.Random:
@@ -67,50 +69,23 @@ def _voice_of(subject: str, rng: random.Random) -> _Voice:
     return _Voice(subject, "progressive" if rng.random() < 0.2 else "third", _pronoun(subject))
 
 
-def _phrase(facts: Facts, rng: random.Random, pronoun: str) -> str:
-    """A verb phrase of the act, filled; verbs still in angle brackets. After a pace it ends in `and`: see `_with`."""
-    words = grammar().acts[facts.act]
-    manners = words.manners.get(facts.style, ())
-    values = fields(facts, rng, pronoun)
-    if manners and rng.random() < MANNER_SHARE:
-        return rng.choice(manners) + _repeated(facts, rng)
-    said, phrase = filled(words.phrases, values, rng)
-    text = said + _repeated(facts, rng)
-    return text + " and" if phrase.endswith("{pace}") else text
-
-
-def _repeated(facts: Facts, rng: random.Random) -> str:
-    return _times(facts.repeats, rng) if facts.repeats > 1 else ""
-
-
-def _with(phrase: str, after: str) -> str:
-    """Phrase and adverb: `walks slowly and` takes `sadly`, or loses its `and`."""
-    return f"{phrase} {after}".strip() if after else phrase.removesuffix(" and")
-
-
-def _times(repeats: int, rng: random.Random) -> str:
-    if rng.random() < 0.3:
-        return rng.choice(["", " repeatedly", " again and again" if repeats > 2 else ""])
-    return " twice" if repeats == 2 else f" {number(repeats, words=True)} times"
-
-
 def short_caption(facts: Facts, rng: random.Random) -> str:
     """A few words: the act, and its style as an adverb, an adjective or not at all."""
     style = grammar().styles[facts.style]
     words = grammar().acts[facts.act]
     if verbless := _verbless(facts, rng):
-        return _loosen(_with(verbless, rng.choice(style.after)), rng)
+        return _loosen(with_adverb(verbless, rng.choice(style.after)), rng)
     draw = rng.random()
     adjective = rng.choice(style.adjective) if style.adjective and draw < 0.3 else ""
     if style.who and not adjective and draw < 0.45:
         voice = _voice_of(rng.choice(style.who), rng)
-        return _loosen(_with(voice.clause(_phrase(facts, rng, voice.pronoun)), ""), rng)
+        return _loosen(with_adverb(voice.clause(phrase_of(facts, rng, voice.pronoun)), ""), rng)
     voice = _voice(rng, plain=False, adjective=adjective, who=words.who)
-    text = voice.clause(_phrase(facts, rng, voice.pronoun))
+    text = voice.clause(phrase_of(facts, rng, voice.pronoun))
     after = "" if adjective or draw > 0.88 else rng.choice(style.after)
     if after and rng.random() < 0.12 and voice.subject:
-        return sentence(f"{after}, {_with(text, '')}")
-    return _loosen(_with(text, after), rng)
+        return sentence(f"{after}, {with_adverb(text, '')}")
+    return _loosen(with_adverb(text, after), rng)
 
 
 def _verbless(facts: Facts, rng: random.Random) -> str | None:
@@ -130,7 +105,7 @@ def long_caption(facts: Facts, rng: random.Random) -> str:
     style = g.styles[facts.style]
     voice = _voice(rng, plain=True)
     values = fields(facts, rng, voice.pronoun)
-    act = _with(voice.clause(_phrase(facts, rng, voice.pronoun)), rng.choice(style.after))
+    act = with_adverb(voice.clause(phrase_of(facts, rng, voice.pronoun)), rng.choice(style.after))
     names = details(facts)
     rng.shuffle(names)
     clauses = [text for name in names[:2] if (text := fill(rng.choice(g.details[name].clause), values))]
@@ -138,7 +113,7 @@ def long_caption(facts: Facts, rng: random.Random) -> str:
     sentences = [sentence(", ".join([act, *clauses])), rng.choice(style.sentence), *map(sentence, said)]
     again = _voice(rng, plain=True)
     while len(" ".join(sentences).split()) < LONG_WORDS[0]:
-        more = _with(again.clause(_phrase(facts, rng, again.pronoun)), "")
+        more = with_adverb(again.clause(phrase_of(facts, rng, again.pronoun)), "")
         sentences.append(sentence(f"{rng.choice(_AGAIN)} {more}"))
     words, kept = 0, []
     for text in sentences:
@@ -187,7 +162,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: 
     text = rng.choice([f for f in frames if voice.subject or "{who}" not in f]).replace("{who}", voice.again)
     for name, facts in zip("abc", parts, strict=False):
         after = rng.choice(g.styles[facts.style].after) if not same and rng.random() < 0.6 else ""
-        phrase = _with(_phrase(facts, rng, voice.pronoun), after)
+        phrase = with_adverb(phrase_of(facts, rng, voice.pronoun), after)
         for ending, form in (("", None), ("_ing", "gerund"), ("_base", "base")):
             said = conjugate(phrase, form) if form else phrase
             text = text.replace(f"{{{name}{ending}}}", said)
@@ -225,6 +200,15 @@ def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
     return 2 if spliced and len(parts) == 1 else 3
 
 
+def caption(parts: Sequence[Facts], rng: random.Random) -> str:
+    """One caption: by the grammar, or as other people tell it."""
+    if rng.random() < TOLD_SHARE:
+        text = told_caption(parts[0], rng) if len(parts) == 1 else told_sequence(parts, rng)
+        if text is not None:
+            return _loosen(text, rng) if text.endswith(".") else text
+    return short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)
+
+
 def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ...]:
     """Different captions of a clip, all true of it: short ones, and for half the clips of one act a long one.
 
@@ -243,7 +227,7 @@ def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ..
     for _ in range(20 * count):
         if len(out) >= wanted:
             break
-        out[short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)] = None
+        out[caption(parts, rng)] = None
     if wanted < count:
         out[long_caption(parts[0], rng)] = None
     return tuple(out)

@@ -15,6 +15,7 @@ PAIR = (  # what is said of both hands as two
     "two hands", "two arms", "the two hands", "the left and the right hand", "the left and the right arm",
     "both of the hands", "one hand and the other", "the hands on both sides",
 )  # fmt: skip
+MANNER_SHARE = 0.35
 RIGHT_ANGLE = 16.0  # degrees about 90 within which a turn is called a right angle
 
 
@@ -124,3 +125,30 @@ def filled(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -
         if filled is not None:
             return filled, phrase
     raise AssertionError(f"no phrase without fields among {phrases[:3]}")
+
+
+def phrase_of(facts: Facts, rng: random.Random, pronoun: str) -> str:
+    """A verb phrase of the act, filled; verbs in angle brackets. After a pace it ends in `and` (`with_adverb`)."""
+    words = grammar().acts[facts.act]
+    manners = words.manners.get(facts.style, ())
+    values = fields(facts, rng, pronoun)
+    if manners and rng.random() < MANNER_SHARE:
+        return rng.choice(manners) + _repeated(facts, rng)
+    said, phrase = filled(words.phrases, values, rng)
+    text = said + _repeated(facts, rng)
+    return text + " and" if phrase.endswith("{pace}") else text
+
+
+def _repeated(facts: Facts, rng: random.Random) -> str:
+    return _times(facts.repeats, rng) if facts.repeats > 1 else ""
+
+
+def with_adverb(phrase: str, after: str) -> str:
+    """Phrase and adverb: `walks slowly and` takes `sadly`, or loses its `and`."""
+    return f"{phrase} {after}".strip() if after else phrase.removesuffix(" and")
+
+
+def _times(repeats: int, rng: random.Random) -> str:
+    if rng.random() < 0.3:
+        return rng.choice(["", " repeatedly", " again and again" if repeats > 2 else ""])
+    return " twice" if repeats == 2 else f" {number(repeats, words=True)} times"
