@@ -22,9 +22,12 @@ NOBODY = "a person"
 _LISTS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("acts.toml").read_text("utf-8"))
 _JOINS = [tuple(phrase.split()) for phrase in _LISTS["joins"]]
 _EDGES = [phrase.split() for phrase in _LISTS["edges"]]
-_ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL = (
-    frozenset(_LISTS[name]) for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small")
+_ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKED, _NOUNS = (
+    frozenset(_LISTS[name])
+    for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small", "asking", "asked", "nouns")
 )
+_ENDS, _CONTINUING = (tuple(_LISTS[name]) for name in ("ends", "continuing"))
+_UNDOING = tuple(_LISTS["undoing"])
 _TRAVELS, _TURNS = tuple(_LISTS["travels"]), tuple(_LISTS["turns"])
 _BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
 _STOPS = ",;:."
@@ -73,9 +76,9 @@ def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
 
 def _by_connective(text: _Words) -> Iterator[_Words]:
     """Clauses that connectives part, in the order of time."""
-    comma = next((k for k in range(1, len(text) - 1) if text.stopped(k, ",")), None)
-    if _fronted(text) and comma is not None and text.verbs & set(range(comma + 1)):
-        said, rest = text.cut(1, comma + 1), list(_by_connective(text.cut(comma + 1)))
+    edge = _edge(text) if _fronted(text) else None
+    if edge is not None:
+        said, rest = text.cut(1, edge), list(_by_connective(text.cut(edge)))
         yield from [*rest, said] if text.bare(0) in _LISTS["fronted_last"] else [said, *rest]
         return
     for at in range(1, len(text)):
@@ -91,6 +94,16 @@ def _fronted(text: _Words) -> bool:
     """Whether a clause of its own is said first; "when the music starts" is none."""
     first = text.bare(0)
     return first in _LISTS["fronted"] and (first != "when" or text.bare(1) in {"done", "finished"})
+
+
+def _edge(text: _Words) -> int | None:
+    """Where the clause that is said first ends: behind its comma, or before "she"; None where it says no act."""
+    comma = next((k + 1 for k in range(1, len(text) - 1) if text.stopped(k, ",")), None)
+    who = next((k for k in range(2, len(text) - 1) if text.bare(k) in {"he", "she", "they"}), None)
+    edge = comma if comma is not None else who
+    if edge is None:
+        return None
+    return edge if text.verbs & set(range(edge)) or _NOUNS & set(text.bares[:edge]) else None
 
 
 def _joins(text: _Words, at: int, join: tuple[str, ...]) -> bool:
@@ -144,7 +157,20 @@ def _trimmed(clause: _Words) -> _Words:
                 clause, changed = clause.cut(count), True
             elif clause.bares[-count:] == words and len(clause) > count:
                 clause, changed = clause.cut(0, len(clause) - count), True
+        asked = _asked(clause)
+        if asked:
+            clause, changed = clause.cut(asked), True
     return clause
+
+
+def _asked(clause: _Words) -> int:
+    """Words before what is asked for: of "have the character bow" three; 0 where nobody is asked."""
+    if clause.bare(0) == "please":
+        return 1
+    if clause.bare(0) not in _ASKING or clause.bare(1) not in _ASKED:
+        return 0
+    verb = next((k for k in range(2, min(len(clause), 5)) if clause.is_verb(k)), 0)
+    return verb if verb and not any(clause.stopped(k) for k in range(verb)) else 0
 
 
 def _merged(clauses: list[_Words]) -> list[_Words]:
@@ -155,7 +181,7 @@ def _merged(clauses: list[_Words]) -> list[_Words]:
             found.append(clause)
         elif found[-1].verbs and {found[-1].bare(v) for v in found[-1].verbs} <= _STILL and not _pauses(found[-1]):
             found[-1] = _joined(found[-1], clause)  # "stands with the feet together": how, not what
-        elif _refers(clause) or _turns(found[-1], clause):
+        elif _refers(clause) or _undoes(found[-1], clause) or _turns(found[-1], clause):
             found[-1] = _joined(found[-1], clause)
         elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in _SUBJECTS | _SIDES):
             found.append(clause)
@@ -178,12 +204,24 @@ def _refers(clause: _Words) -> bool:
     )
 
 
+def _undoes(before: _Words, clause: _Words) -> bool:
+    """ "lowers the arm", "and lowers", "straightens": the end of the act before, which was no way on foot."""
+    if any(word.startswith(_TRAVELS) for word in before.bares):
+        return False
+    first = min(clause.verbs, default=-1)
+    if first >= 0 and clause.bare(first).startswith(_UNDOING):
+        return True
+    return clause.bare(0).startswith(_UNDOING) and len(clause) < 4
+
+
 def _turns(before: _Words, clause: _Words) -> bool:
     """ "walks" and "turns left", or "turns left" and "walks on": who turns walks."""
     bares = clause.bares
     travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in before.verbs)
     if not travels or not clause.verbs or {"hand", "hands", "arm", "arms"} & {*bares, *before.bares}:
         return False
+    if " ".join(bares).startswith(_CONTINUING) and {"left", "right"} & set(before.bares):
+        return not any(clause.bare(v).startswith(("run", "jog", "sprint")) for v in clause.verbs)
     sided = bool({"left", "right"} & set(bares))
     if any(clause.bare(v).startswith(_TURNS) for v in clause.verbs) and sided:
         return not {"left", "right"} & set(before.bares)
@@ -209,8 +247,11 @@ def _joined(first: _Words, second: _Words) -> _Words:
 
 
 def _pauses(clause: _Words) -> bool:
-    """ "stops", "stands still": what comes next says it too."""
-    return bool(clause.verbs) and set(clause.bares[min(clause.verbs) :]) <= _PAUSES
+    """ "stops", "stands still", "comes to a halt at the door", "speeds up": what comes next says it too."""
+    if not clause.verbs:
+        return False
+    said = clause.bares[min(clause.verbs) :]
+    return set(said) <= _PAUSES or " ".join(said).startswith(_ENDS)
 
 
 def _sentence(clause: _Words) -> str:

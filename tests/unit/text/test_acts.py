@@ -33,6 +33,14 @@ def graph(marked: str) -> SemanticGraph:
         ("*walking* and *bowing*", ["a person is walking", "a person is bowing"]),
         ("he *lifts* the left arm, and next the right one", ["he lifts the left arm", "he lifts the right arm"]),
         ("a dancer *bows* and next *waves*", ["a dancer bows", "a person waves"]),
+        ("*Have* the character *run* ahead, *slow* to a stop, and *bow*.", ["a person run ahead", "a person bow"]),
+        ("she *walks* on, *comes* to a halt at the door, and *bows*", ["she walks on", "a person bows"]),
+        ("After a short walk, she *gives* a wave.", ["a short walk", "she gives a wave"]),
+        ("After a short run she *drops* back to a walk.", ["a short run", "she drops back to a walk"]),
+        ("he *jogs* a lap, *slows* down, and *waves*", ["he jogs a lap, then slows down", "a person waves"]),
+        ("the guard *turns* left, *walks* a few steps more, and *salutes*",
+         ["the guard turns left, then walks a few steps more", "a person salutes"]),
+        ("He *walks* ahead. All of a sudden they *run* off.", ["He walks ahead", "they run off"]),
     ],
 )  # fmt: skip
 def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -> None:
@@ -43,6 +51,9 @@ def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -
     "prompt",
     [
         "a person *walks* forward",
+        "after *bowing*, the man *straightens* up",
+        "the actor *bows* and *returns* to an upright stance",
+        "*have* the hero *walk* up the street, *turn* left, and *continue* on foot",
         "a person *bows* before the king",
         "a man *takes* the next left on foot",
         "a man *walks* next to a wall",
