@@ -12,7 +12,7 @@ import pytest
 
 from shared.errors import Conflict, InvalidFile, NotFound
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.judge import judge
+from workers.training.checks.judge import Expectation, judge
 from workers.training.checks.rates import RealClip
 from workers.training.data import compose
 from workers.training.data.build import LAYOUT, build, swap_sides, windows
@@ -54,7 +54,7 @@ def synthetic_pack() -> JointsPack:
 def folder(tmp_path_factory) -> Path:
     counts = dict(compose.COUNTS)
     compose.COUNTS.clear()
-    compose.COUNTS["train"] = Counts(pairs=12, triples=2, retimed=16)
+    compose.COUNTS["train"] = Counts(pairs=12, triples=2, retimed=16, long_turns=4, brief_waves=4)
     compose.COUNTS["test"] = Counts(pairs=3, triples=0, retimed=0)
     out = tmp_path_factory.mktemp("prepared")
     try:
@@ -115,8 +115,28 @@ def test_sequences_show_their_acts_in_order(data):
         expected = RealClip(clip.id, clip.acts, clip.sides, lambda c=clip: data.joints(c)).expected()
         assert expected is not None
         verdicts.append(judge(data.joints(clip), 20.0, expected).passed)
-    assert len(made) == 15
+    assert len(made) == 12 + 3 + 4
     assert np.mean(verdicts) > 0.8
+
+
+def test_a_turn_lies_somewhere_in_a_longer_walk(data):
+    made = [clip for clip in data.clips if clip.id.startswith("RT-")]
+    assert len(made) == 4
+    for clip in made:
+        assert (clip.acts, len(clip.spliced)) == (("turn",), 2)
+        assert clip.length >= 120
+        assert judge(data.joints(clip), 20.0, [Expectation("turn", clip.sides[0])]).passed
+        assert 55 <= abs(clip.measured.turn) <= 130
+
+
+def test_waves_are_cut_short_so_that_another_act_fits_beside_them(data):
+    made = [clip for clip in data.clips if clip.id.startswith("SW-")]
+    assert len(made) == 4
+    for clip in made:
+        edges = [0, *clip.seams, clip.length]
+        waved = [b - a for act, a, b in zip(clip.acts, edges, edges[1:], strict=False) if act == "wave"]
+        assert waved
+        assert min(waved) <= 100
 
 
 def test_sequences_say_where_each_act_begins_and_each_act_alone(data):
@@ -141,7 +161,7 @@ def test_a_hand_is_held_longer_without_a_jump_and_unchanged_around():
 
 def test_retimed_clips_reach_lengths_that_were_not_captured(data):
     retimed = [clip for clip in data.clips if clip.spliced and len(clip.acts) == 1]
-    assert len(retimed) == 16
+    assert len(retimed) == 16 + 4
     assert max(clip.length for clip in retimed) > 150
     assert all(20 <= clip.length <= 196 for clip in data.clips)
 
