@@ -11,7 +11,7 @@ import urllib.request
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from uuid import UUID
 
 import httpx2
@@ -244,6 +244,13 @@ SINCE_FAULT = frozenset({"all items given back", "first item again"})
 GIVEN_BACK = """
     SELECT max(at) FROM ledger_item WHERE after = 'ready' AND at > :at AND item = ANY(:items) AND lease = ANY(:leases)
 """
+MEANWHILE = """
+    SELECT CASE WHEN job = ANY(:jobs) THEN 'their jobs' ELSE 'other jobs' END, reason, count(*), count(DISTINCT lease)
+    FROM ledger_item WHERE after = 'leased' AND at BETWEEN :since AND :until GROUP BY 1, 2
+"""
+STEERED = "SELECT at, kind, reason, data FROM job_event WHERE job_id = ANY(:jobs) AND at BETWEEN :since AND :until ORDER BY at"
+JOBS = "SELECT array_agg(DISTINCT job_id) FROM item WHERE id = ANY(:items)"
+PATIENCE = 15.0
 NEXT = "SELECT min(at) FROM ledger_item WHERE after = :after AND at > :at"
 
 
@@ -266,3 +273,16 @@ def recoveries(engine: sa.Engine, fault: Fault) -> dict[str, float]:
                 name = "next motion stored" if wanted == "succeeded" else "next claim"
                 found[name] = (first - fault.back).total_seconds()
     return found
+
+
+def meanwhile(engine: sa.Engine, fault: Fault, seconds: float) -> dict[str, object]:
+    """What ran, and what was done to their jobs, while items of a killed worker waited to start again."""
+    asked: dict[str, object] = {"since": fault.at, "until": fault.at + timedelta(seconds=seconds)}
+    with transaction(engine) as conn:
+        asked["jobs"] = conn.execute(sa.text(JOBS), {"items": fault.held}).scalar_one()
+        ran = [list(map(str, row)) for row in conn.execute(sa.text(MEANWHILE), asked)]
+        done = [
+            f"{row.at:%H:%M:%S} {row.kind} {row.reason} {row.data}"[:120]
+            for row in conn.execute(sa.text(STEERED), asked)
+        ]
+    return {"ran": ran, "events": done[-40:]}

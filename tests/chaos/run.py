@@ -26,7 +26,7 @@ from shared.jobs.states import OPEN
 from shared.runtime.faults import patiently
 from tests.chaos import ledger
 from tests.chaos.driver import Cluster
-from tests.chaos.faults import LIMIT, SINCE_FAULT, Breaker, recoveries
+from tests.chaos.faults import LIMIT, PATIENCE, SINCE_FAULT, Breaker, meanwhile, recoveries
 from tests.chaos.model import ITEM_SECONDS, QUEUE, REFERENCE
 from tests.chaos.places import Place
 from tests.chaos.studios import Operator, Quota, Studio
@@ -304,7 +304,15 @@ class Run:
             for what, seconds in recoveries(self.cluster.engine, fault).items():
                 start = fault.at if what in SINCE_FAULT else fault.back or fault.at
                 alone = other is None or (other - start).total_seconds() >= seconds
-                samples.append({"fault": fault.kind, "until": what, "seconds": round(seconds, 2), "alone": alone})
+                sample: dict[str, Any] = {
+                    "fault": fault.kind,
+                    "until": what,
+                    "seconds": round(seconds, 2),
+                    "alone": alone,
+                }
+                if what in SINCE_FAULT and seconds > PATIENCE:
+                    sample["meanwhile"] = meanwhile(self.cluster.engine, fault, seconds)
+                samples.append(sample)
         return {
             "seed": self.plan.seed,
             "seconds": round(self.seconds),
