@@ -248,7 +248,9 @@ MEANWHILE = """
     SELECT CASE WHEN job = ANY(:jobs) THEN 'their jobs' ELSE 'other jobs' END, reason, count(*), count(DISTINCT lease)
     FROM ledger_item WHERE after = 'leased' AND at BETWEEN :since AND :until GROUP BY 1, 2
 """
-STEERED = "SELECT at, kind, reason, data FROM job_event WHERE job_id = ANY(:jobs) AND at BETWEEN :since AND :until ORDER BY at"
+STEERED = """
+    SELECT at, kind, reason, data FROM job_event WHERE job_id = ANY(:jobs) AND at BETWEEN :since AND :until ORDER BY at
+"""
 JOBS = "SELECT array_agg(DISTINCT job_id) FROM item WHERE id = ANY(:items)"
 PATIENCE = 15.0
 NEXT = "SELECT min(at) FROM ledger_item WHERE after = :after AND at > :at"
