@@ -11,7 +11,7 @@ import structlog
 from limits import RateLimitItemPerSecond
 from limits.errors import StorageError
 from limits.storage import RedisStorage
-from limits.strategies import FixedWindowRateLimiter
+from limits.strategies import SlidingWindowCounterRateLimiter
 from redis.backoff import NoBackoff
 from redis.retry import Retry
 
@@ -46,7 +46,7 @@ class Rates:
             client.set_retry(Retry(NoBackoff(), 1))  # once more, at once, for a connection that went stale
             pool = client.connection_pool
             storage = RedisStorage("redis://", connection_pool=pool, key_prefix=PREFIX, wrap_exceptions=True)
-            self._limiter = FixedWindowRateLimiter(storage)
+            self._limiter = SlidingWindowCounterRateLimiter(storage)
         self._lock = threading.Lock()
         self._again = 0.0  # when Redis may be asked
         self._away = False
@@ -55,7 +55,7 @@ class Rates:
         """Count one request of a class.
 
         Raises:
-            Busy: it is one too many in this window.
+            Busy: it is one too many in the window that ends now.
         """
         rate = self._rate(key, kind)
         if rate is None or self._limiter is None or time.monotonic() < self._again:
