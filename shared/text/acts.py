@@ -22,12 +22,13 @@ NOBODY = "a person"
 _LISTS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("acts.toml").read_text("utf-8"))
 _JOINS = [tuple(phrase.split()) for phrase in _LISTS["joins"]]
 _EDGES = [phrase.split() for phrase in _LISTS["edges"]]
+_FRONTED = [phrase.split() for phrase in _LISTS["fronted"]]
 _ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKED, _NOUNS = (
     frozenset(_LISTS[name])
     for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small", "asking", "asked", "nouns")
 )
 _ENDS, _CONTINUING = (tuple(_LISTS[name]) for name in ("ends", "continuing"))
-_UNDOING = tuple(_LISTS["undoing"])
+_UNDOING, _LIFTING, _SWINGING = (tuple(_LISTS[name]) for name in ("undoing", "lifting", "swinging"))
 _TRAVELS, _TURNS = tuple(_LISTS["travels"]), tuple(_LISTS["turns"])
 _BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
 _STOPS = ",;:."
@@ -76,24 +77,25 @@ def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
 
 def _by_connective(text: _Words) -> Iterator[_Words]:
     """Clauses that connectives part, in the order of time."""
-    edge = _edge(text) if _fronted(text) else None
+    opening = _opening(text)
+    edge = _edge(text) if opening else None
     if edge is not None:
-        said, rest = text.cut(1, edge), list(_by_connective(text.cut(edge)))
-        yield from [*rest, said] if text.bare(0) in _LISTS["fronted_last"] else [said, *rest]
+        said, rest = text.cut(len(opening), edge), list(_by_connective(text.cut(edge)))
+        yield from [*rest, said] if " ".join(opening) in _LISTS["fronted_last"] else [said, *rest]
         return
     for at in range(1, len(text)):
         join = next((j for j in _JOINS if _joins(text, at, j)), None)
         if join is not None:
             before, after = text.cut(0, at), list(_by_connective(text.cut(at + len(join))))
-            yield from [*after, before] if join == ("after",) else [before, *after]
+            yield from [*after, before] if " ".join(join) in _LISTS["backward"] else [before, *after]
             return
     yield text
 
 
-def _fronted(text: _Words) -> bool:
-    """Whether a clause of its own is said first; "when the music starts" is none."""
-    first = text.bare(0)
-    return first in _LISTS["fronted"] and (first != "when" or text.bare(1) in {"done", "finished"})
+def _opening(text: _Words) -> list[str]:
+    """The words that say that a clause of its own comes first; "when the music starts" is none."""
+    found: list[str] = next((words for words in _FRONTED if text.bares[: len(words)] == words), list[str]())
+    return [] if found == ["when"] and text.bare(1) not in {"done", "finished"} else found
 
 
 def _edge(text: _Words) -> int | None:
@@ -103,7 +105,9 @@ def _edge(text: _Words) -> int | None:
     edge = comma if comma is not None else who
     if edge is None:
         return None
-    return edge if text.verbs & set(range(edge)) or _NOUNS & set(text.bares[:edge]) else None
+    said = text.bares[1:edge]
+    acts = text.verbs & set(range(edge)) or _NOUNS & set(said) or any(word.endswith("ing") for word in said)
+    return edge if acts else None
 
 
 def _joins(text: _Words, at: int, join: tuple[str, ...]) -> bool:
@@ -111,8 +115,11 @@ def _joins(text: _Words, at: int, join: tuple[str, ...]) -> bool:
     end = at + len(join)
     if end >= len(text) or any(text.bare(at + k) != word for k, word in enumerate(join)):
         return False
-    if join in (("before",), ("after",)):  # not "bows before the king"
-        return text.bare(end).endswith("ing") or (text.bare(end) in _SUBJECTS and text.is_verb(end + 1))
+    if " ".join(join) in _LISTS["clausal"]:  # not "bows before the king"
+        if text.bare(at - 1) == "and":  # "walks on and, once there, bows": the order of the words
+            return False
+        follows = text.bare(end) in _SUBJECTS and (text.is_verb(end + 1) or text.bare(end + 1) in {"has", "have", "is"})
+        return text.bare(end).endswith("ing") or follows
     if join[0] in _ADVERBS:
         return text.stopped(at - 1)
     return not (len(join) == 2 and join[1] == "next" and text.bare(end) == "to")
@@ -181,7 +188,7 @@ def _merged(clauses: list[_Words]) -> list[_Words]:
             found.append(clause)
         elif found[-1].verbs and {found[-1].bare(v) for v in found[-1].verbs} <= _STILL and not _pauses(found[-1]):
             found[-1] = _joined(found[-1], clause)  # "stands with the feet together": how, not what
-        elif _refers(clause) or _undoes(found[-1], clause) or _turns(found[-1], clause):
+        elif any(goes(found[-1], clause) for goes in (_refers, _undoes, _swings, _turns)):
             found[-1] = _joined(found[-1], clause)
         elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in _SUBJECTS | _SIDES):
             found.append(clause)
@@ -194,7 +201,7 @@ def _merged(clauses: list[_Words]) -> list[_Words]:
     return found
 
 
-def _refers(clause: _Words) -> bool:
+def _refers(_: _Words, clause: _Words) -> bool:
     """ "lowers it again", "comes up": part of what was said before."""
     verbs = {clause.bare(v) for v in clause.verbs}
     small = set(clause.bares) - verbs
@@ -212,6 +219,12 @@ def _undoes(before: _Words, clause: _Words) -> bool:
     if first >= 0 and clause.bare(first).startswith(_UNDOING):
         return True
     return clause.bare(0).startswith(_UNDOING) and len(clause) < 4
+
+
+def _swings(before: _Words, clause: _Words) -> bool:
+    """ "lifts both arms" and "waves": one wave."""
+    lifted = any(before.bare(v).startswith(_LIFTING) for v in before.verbs)
+    return lifted and bool(clause.verbs) and len(clause) <= 2 and clause.bare(min(clause.verbs)).startswith(_SWINGING)
 
 
 def _turns(before: _Words, clause: _Words) -> bool:

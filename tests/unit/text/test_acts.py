@@ -40,6 +40,12 @@ def graph(marked: str) -> SemanticGraph:
         ("he *jogs* a lap, *slows* down, and *waves*", ["he jogs a lap, then slows down", "a person waves"]),
         ("the guard *turns* left, *walks* a few steps more, and *salutes*",
          ["the guard turns left, then walks a few steps more", "a person salutes"]),
+        ("a boy *waves* once he has *finished* *walking*",
+         ["he has finished walking", "a boy waves"]),
+        ("Prior to *bowing*, she *walks*.", ["she walks", "a person is bowing"]),
+        ("she *walks* and, once they *come* to a standstill, *greets* a guest",
+         ["she walks and, once they come to a standstill", "a person greets a guest"]),
+        ("First he *bows*, second he *waves*.", ["he bows", "he waves"]),
         ("He *walks* ahead. All of a sudden they *run* off.", ["He walks ahead", "they run off"]),
     ],
 )  # fmt: skip
@@ -51,6 +57,7 @@ def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -
     "prompt",
     [
         "a person *walks* forward",
+        "someone *lifts* both arms and *waves*",
         "after *bowing*, the man *straightens* up",
         "the actor *bows* and *returns* to an upright stance",
         "*have* the hero *walk* up the street, *turn* left, and *continue* on foot",
