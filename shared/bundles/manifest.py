@@ -52,6 +52,9 @@ class TextSpec(_Frozen):
     node_features: Literal["pooled", "span"] = "pooled"
     max_actions: int = Field(default=8, ge=1)
     max_specifics: int = Field(default=16, ge=1)
+    in_order: bool = False
+    """Ours: a prompt of several acts is read as these acts, one after the other ("before bowing, she walks" as "she
+    walks, and then a person is bowing")."""
 
 
 class BundleManifest(_Frozen):

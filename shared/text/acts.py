@@ -75,6 +75,11 @@ def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
     return (*sentences[: MOST - 1], *filter(None, [" then ".join(sentences[MOST - 1 :])]))
 
 
+def told_in_order(acts: tuple[str, ...]) -> str:
+    """One sentence that says them one after the other."""
+    return ", and then ".join([acts[0], *(act[:1].lower() + act[1:] for act in acts[1:])]) + "."
+
+
 def _by_connective(text: _Words) -> Iterator[_Words]:
     """Clauses that connectives part, in the order of time."""
     opening = _opening(text)

@@ -38,7 +38,7 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
         [spec.rewriter, REWRITER_VERSIONS[spec.rewriter], *([spec.rewriter_model] if spec.rewriter_model else [])],
         [spec.labeller, spec.labeller_sha256],
         [spec.encoder, spec.encoder_sha256, spec.width, spec.node_features],
-        [spec.max_actions, spec.max_specifics],
+        [spec.max_actions, spec.max_specifics, spec.in_order],
     ]
     return hashlib.sha256(json.dumps(parts, ensure_ascii=False).encode()).hexdigest()
 

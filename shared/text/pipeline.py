@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
-from shared.text.acts import acts_of
+from shared.text.acts import acts_of, told_in_order
 from shared.text.encoders import Encoding, TextEncoder, load_encoder
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
@@ -90,7 +90,8 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        return self._graphs([text for text, _ in self._rewritten([check_prompt(prompt) for prompt in prompts])])
+        rewritten = self._rewritten([check_prompt(prompt) for prompt in prompts])
+        return [graph for graph, _ in self._read([text for text, _ in rewritten])]
 
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Get ready to read these prompts one by one."""
@@ -130,18 +131,27 @@ class TextPipeline:
         """
         checked = [check_prompt(prompt) for prompt in prompts]
         rewritten = self._rewritten(checked)
-        graphs = self._graphs([text for text, _ in rewritten])
+        read = self._read([text for text, _ in rewritten])
         return [
-            self._features(prompt, text, graph, reason)
-            for prompt, (text, reason), graph in zip(checked, rewritten, graphs, strict=True)
+            self._features(prompt, graph, acts, reason)
+            for prompt, (_, reason), (graph, acts) in zip(checked, rewritten, read, strict=True)
         ]
 
-    def _features(self, prompt: str, text: str, graph: SemanticGraph, reason: str | None) -> TextFeatures:
-        acts = acts_of(graph)
+    def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
+        """The graph of each text and its acts; with `TextSpec.in_order`, the graph of these acts told in order."""
+        graphs = self._graphs(texts)
+        acts = [acts_of(graph) for graph in graphs]
+        if self.spec.in_order:
+            several = [k for k, found in enumerate(acts) if len(found) > 1]
+            for k, graph in zip(several, self._graphs([told_in_order(acts[k]) for k in several]), strict=True):
+                graphs[k] = graph
+        return list(zip(graphs, acts, strict=True))
+
+    def _features(self, prompt: str, graph: SemanticGraph, acts: tuple[str, ...], reason: str | None) -> TextFeatures:
         if len(acts) == 1:
-            return TextFeatures(prompt, text, graph, self.encode(graph), reason)
+            return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason)
         rows = np.stack(self.pooled(acts)).astype(np.float16)
-        return TextFeatures(prompt, text, graph, self.encode(graph), reason, acts, rows)
+        return TextFeatures(prompt, graph.text, graph, self.encode(graph), reason, acts, rows)
 
     def encode(self, graph: SemanticGraph) -> NDArray[np.float16]:
         """One vector a node, (N, W): the pooled encoding of its own text, or the mean of the sentence's token states

@@ -47,9 +47,9 @@ def assemble(
         "length": parts["length"].state,
     }
     statistics = (states["tokenizer"].pop("mean").numpy(), states["tokenizer"].pop("std").numpy())
+    text = gathered.text.model_copy(update={"in_order": config.in_order})
     return write_generator(
-        bundle, MODEL, config, states, statistics,
-        text=gathered.text, card=card, overwrite=overwrite, **gathered.manifest,
+        bundle, MODEL, config, states, statistics, text=text, card=card, overwrite=overwrite, **gathered.manifest,
     )  # fmt: skip
 
 

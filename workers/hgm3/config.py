@@ -109,6 +109,7 @@ class HGM3Config(ModelConfig):
     masked: TransformerConfig = TransformerConfig()
     predictor: TransformerConfig = TransformerConfig()
     residual: TransformerConfig = TransformerConfig()
+    in_order: bool = False  # ours: prompts of several acts are read in the order of time (`TextSpec.in_order`)
     compact: bool = False
     """Ours: F's output reuses its embeddings, the residual transformer's are the tokenizer's codes. Half the size."""
     residual_drop: float = 0.2  # condition drop of the residual transformer
@@ -138,6 +139,7 @@ STARTER = HGM3Config(
     name="starter",
     tokenizer=TokenizerConfig(width=224, depth=2, code_width=128, dropout=0.0, rotation_weight=0.1),
     condition=ConditionConfig(text_width=384, max_actions=8, max_specifics=16, noise=0.3),
+    in_order=True,
     compact=True,
     masked=TransformerConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.0, attention_dropout=0.0, norm_first=True

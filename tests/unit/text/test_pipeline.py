@@ -56,6 +56,19 @@ def test_span_features_are_the_sentence_s_own_states(pipeline: TextPipeline) -> 
     assert not np.allclose(features.nodes[node.id], pipeline.pooled(["walks"])[0], atol=1e-2)
 
 
+def test_a_prompt_of_several_acts_is_read_in_the_order_of_time_where_the_bundle_says_so(pipeline: TextPipeline) -> None:
+    ordered = TextPipeline(
+        TextSpec(in_order=True), rewriter=pipeline.rewriter, labeller=pipeline.labeller, encoder=pipeline.encoder
+    )
+    late, one = "Before bowing, she walks ahead.", "a person walks forward"
+    plain, read = pipeline.features([late, one]), ordered.features([late, one])
+    assert [f.graph.text for f in read] == ["she walks ahead, and then a person is bowing.", one]
+    assert [f.prompt for f in read] == [late, one]
+    assert read[0].acts == plain[0].acts == ("she walks ahead", "a person is bowing")
+    assert ordered.parse([late])[0] == read[0].graph
+    assert read[1].to_blob() == plain[1].to_blob()
+
+
 def test_the_key_is_known_without_a_model_and_changes_with_everything(pipeline: TextPipeline) -> None:
     spec = resolve(TextSpec())
     assert spec == pipeline.spec
@@ -64,6 +77,7 @@ def test_the_key_is_known_without_a_model_and_changes_with_everything(pipeline: 
     changes = (
         {"rewriter": "rules"},
         {"node_features": "span"},
+        {"in_order": True},
         {"max_actions": 4},
         {"encoder_sha256": "0" * 64},
         {"labeller_sha256": "0" * 64},
