@@ -5,18 +5,15 @@ from __future__ import annotations
 
 import hashlib
 import random
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import conjugate, sentence, with_adjective
+from workers.training.data.english import conjugate, mentioned_again, possessive, sentence, with_adjective
 from workers.training.data.grammar import grammar
 from workers.training.data.phrases import details, fields, fill, filled, phrase_of, with_adverb
 from workers.training.data.told import told_caption, told_sequence
 
-_HIS = re.compile(r"\b(he|man|guy|boy|gentleman|grandfather|fellow|schoolboy|sportsman)\b")
-_HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b")
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
 TOLD_SHARE = 0.5
@@ -46,12 +43,8 @@ class _Voice:
     @property
     def again(self) -> str:
         """The subject, mentioned once more, in front of a verb."""
-        who = {"his": "he", "her": "she"}.get(self.pronoun, "the person")
+        who = mentioned_again(self.pronoun)
         return f"{who} is" if self.form == "progressive" else who
-
-
-def _pronoun(subject: str) -> str:
-    return "his" if _HIS.search(subject) else "her" if _HER.search(subject) else "their"
 
 
 def _voice(rng: random.Random, *, plain: bool, adjective: str = "", who: Sequence[str] = ()) -> _Voice:
@@ -62,11 +55,11 @@ def _voice(rng: random.Random, *, plain: bool, adjective: str = "", who: Sequenc
     subject = rng.choice(who if who and rng.random() < WHO_SHARE else grammar().subjects)
     if adjective and (subject in _UNADJECTIVED or " " not in subject):
         subject = "a person"
-    return _Voice(with_adjective(subject, adjective), "progressive" if draw > 0.82 else "third", _pronoun(subject))
+    return _Voice(with_adjective(subject, adjective), "progressive" if draw > 0.82 else "third", possessive(subject))
 
 
 def _voice_of(subject: str, rng: random.Random) -> _Voice:
-    return _Voice(subject, "progressive" if rng.random() < 0.2 else "third", _pronoun(subject))
+    return _Voice(subject, "progressive" if rng.random() < 0.2 else "third", possessive(subject))
 
 
 def short_caption(facts: Facts, rng: random.Random) -> str:

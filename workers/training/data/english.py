@@ -37,6 +37,8 @@ _DOUBLE = {
 _IRREGULAR = {"be": "is", "have": "has"}
 _WORDS = ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
 _VERB = re.compile(r"<([a-z]+)>")
+_HIS = re.compile(r"\b(he|man|guy|boy|gentleman|grandfather|fellow|schoolboy|sportsman)\b")
+_HER = re.compile(r"\b(she|woman|lady|girl|grandmother|schoolgirl|sportswoman)\b")
 
 
 def third(verb: str) -> str:
@@ -69,6 +71,16 @@ def number(value: float, *, words: bool) -> str:
     """A whole number, in words up to twelve when asked for."""
     whole = round(value)
     return _WORDS[whole] if words and 0 <= whole < len(_WORDS) else str(whole)
+
+
+def possessive(subject: str) -> str:
+    """`his`, `her` or `their`."""
+    return "his" if _HIS.search(subject) else "her" if _HER.search(subject) else "their"
+
+
+def mentioned_again(owner: str) -> str:
+    """Who has a `possessive`, mentioned once more: `he`, `she` or `the person`."""
+    return {"his": "he", "her": "she"}.get(owner, "the person")
 
 
 def with_adjective(subject: str, adjective: str) -> str:

@@ -120,11 +120,18 @@ def details(facts: Facts) -> list[str]:
 
 def filled(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -> tuple[str, str]:
     """One of the phrases whose fields were all measured, filled, and as it stands in the grammar."""
+    found = filled_if_any(phrases, values, rng)
+    assert found is not None, f"no phrase without fields among {phrases[:3]}"
+    return found
+
+
+def filled_if_any(phrases: Sequence[str], values: dict[str, str], rng: random.Random) -> tuple[str, str] | None:
+    """The same of phrases that may all want a field that was not measured."""
     for phrase in rng.sample(phrases, len(phrases)):
-        filled = fill(phrase, values)
-        if filled is not None:
-            return filled, phrase
-    raise AssertionError(f"no phrase without fields among {phrases[:3]}")
+        text = fill(phrase, values)
+        if text is not None:
+            return text, phrase
+    return None
 
 
 def phrase_of(facts: Facts, rng: random.Random, pronoun: str) -> str:

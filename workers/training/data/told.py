@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import conjugate
+from workers.training.data.english import conjugate, mentioned_again, possessive
 from workers.training.data.grammar import grammar
-from workers.training.data.phrases import fields, fill, phrase_of, with_adverb
+from workers.training.data.phrases import fields, fill, filled_if_any, phrase_of, with_adverb
 
 STYLED_SHARE = 0.5
 OWN_SHARE = 0.5  # of the sequences that have words of their own
@@ -107,7 +107,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
     frames = told().three if len(parts) == 3 else told().two + (told().stop if stops else ())
     frame = rng.choice(frames)
     who = rng.choice(grammar().subjects)
-    values = {"who": who, "Who": who[:1].upper() + who[1:], "again": _again(who)}
+    values = {"who": who, "Who": who[:1].upper() + who[1:], "again": mentioned_again(possessive(who))}
     for name, form in _ACT.findall(frame):
         said = _said(parts["abc".index(name)], form, rng)
         if said is None:
@@ -127,13 +127,6 @@ def _said(facts: Facts, form: str, rng: random.Random) -> str | None:
     return _some(nouns, fields(facts, rng, "the"), rng)
 
 
-def _again(who: str) -> str:
-    words = who.split()
-    if {"he", "man", "guy", "boy", "gentleman", "fellow"} & set(words):
-        return "he"
-    return "she" if {"she", "woman", "lady", "girl"} & set(words) else "the person"
-
-
 def _styled(text: str, after: str) -> str:
     if not after:
         return text
@@ -142,8 +135,5 @@ def _styled(text: str, after: str) -> str:
 
 def _some(rows: Sequence[str], values: dict[str, str], rng: random.Random) -> str | None:
     """One of the rows whose fields are all known, filled."""
-    for row in rng.sample(rows, len(rows)):
-        text = fill(row, values)
-        if text is not None:
-            return text
-    return None
+    found = filled_if_any(rows, values, rng)
+    return None if found is None else found[0]
