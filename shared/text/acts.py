@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from shared.text.graph import SemanticGraph
@@ -45,7 +46,7 @@ class _Words:
         return len(self.words)
 
     def bare(self, index: int) -> str:
-        return self.words[index].strip(".,;:!?\"'()").lower() if 0 <= index < len(self.words) else ""
+        return self.bares[index] if 0 <= index < len(self.words) else ""
 
     def stopped(self, index: int, stops: str = _STOPS) -> bool:
         """Whether a stop stands behind the word; before the first one there is one."""
@@ -58,9 +59,10 @@ class _Words:
     def is_verb(self, index: int) -> bool:
         return index in self.verbs
 
-    @property
+    @cached_property
     def bares(self) -> list[str]:
-        return [self.bare(k) for k in range(len(self))]
+        """Each word in small letters without what stands at its ends: asked for at every word and connective."""
+        return [word.strip(".,;:!?\"'()").lower() for word in self.words]
 
 
 def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
