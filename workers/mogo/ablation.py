@@ -55,7 +55,7 @@ class LevelToken(RQHCTransformer):
         self, prompts: Tensor, tokens: Tensor, *, skipped: Tensor | None = None, seam: Tensor | None = None
     ) -> Tensor:
         """As in `RQHCTransformer`."""
-        first, frames = self.inputs(prompts, tokens, seam)
+        first, frames = self.inputs(prompts, tokens, skipped, seam)
         token = self.level_token[None, :, None].expand(len(tokens), -1, -1, -1)
         x = torch.cat([first, token, frames], 2).flatten(0, 1)
         later = None if seam is None else seam + 1

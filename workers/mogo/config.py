@@ -68,6 +68,8 @@ class ConditionConfig:
     drop: float = 0.1  # share of samples trained without prompt, for guidance
     every_frame: bool = False  # ours: the prompt in force is told to every frame, beside standing at position 0
     noise: float = 0.0  # ours: std of what training adds to standardised text features
+    clock: bool = False  # ours: each frame is told how long ago its act began
+    clockless: float = 0.3  # share of the acts that training tells no time of: a stream outlasts what was captured
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ class MOGOConfig(ModelConfig):
     prompt does."""
     ahead_weight: float = 1.0  # of that loss, to 1 of the loss of eq. 11
     steers: int = 0  # motions whose prompt changes at any moment, made for training (ours, see `steers`)
+    rollouts: int = 0  # as many more that leave what the model itself makes, where training starts from a finished one
     tokenizer: TokenizerConfig = TokenizerConfig()
     condition: ConditionConfig = ConditionConfig()
     transformer: TransformerConfig = TransformerConfig()
@@ -124,9 +127,10 @@ STARTER = MOGOConfig(
     first_level=5.0,  # it decides what is done; the others how exactly
     ahead=(5, 12, 24),
     steers=4000,
+    rollouts=3000,
     # 220,000 training frames cannot fill 6 x 8192 codes
     tokenizer=TokenizerConfig(width=192, codes=512, rotation_weight=0.1),
-    condition=ConditionConfig(text_width=384, noise=0.3, every_frame=True),
+    condition=ConditionConfig(text_width=384, noise=0.3, every_frame=True, clock=True),
     transformer=TransformerConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
@@ -142,8 +146,9 @@ TINY = MOGOConfig(
     max_frames=24,
     ahead=(3,),
     steers=6,
+    rollouts=6,
     tokenizer=TokenizerConfig(width=24, depth=2, levels=3, codes=32, code_width=16),
-    condition=ConditionConfig(text_width=384, every_frame=True),
+    condition=ConditionConfig(text_width=384, every_frame=True, clock=True),
     transformer=TransformerConfig(layers=2, heads=2, width=32, feedforward=64, dropout=0.1, level_gain=True),
     depth=DepthConfig(layers=1, heads=2, width=16, feedforward=32, share=0.5),
     inference=InferenceConfig(window=16),

@@ -1,6 +1,7 @@
 """MOGO's RQHC-Transformer (Sec. 2.2, Alg. 2), read top to bottom.
 
     prompt + level ── Prompt (PnQ, eq. 7)                 ── position 0 of each level
+    time           ── Clock (ours)                        ── what frames are told beside it
     tokens         ── RQHCTransformer.columns (eq. 8)     ── positions 1 … n: sums of the levels up to one's own
     both           ── Trunk (eq. 9-10), shared by levels  ── states
     states, codes  ── DepthHead (ours)                    ── states that know the levels drawn below
@@ -24,6 +25,7 @@ from torch import Tensor, nn
 from shared.nn.convolution import frame_mask
 from shared.nn.transformer import dropout, initialize, sinusoidal_positions
 from workers.mogo.attention import LookBack, Reach, RelativeAttention, Slots
+from workers.mogo.clock import Clock
 from workers.mogo.config import MOGOConfig, TransformerConfig
 from workers.mogo.depth import DepthHead
 
@@ -183,6 +185,7 @@ class RQHCTransformer(nn.Module):
         self.codes = config.tokenizer.codes
         self.prompt = Prompt(config)
         self.pace = Pace(config)
+        self.clock = Clock(width, config.max_frames, config.condition.clockless) if config.condition.clock else None
         self.embedding = nn.Embedding(self.codes, width)  # one for all levels (Alg. 2)
         # residuals get smaller from level to level
         gains = 2.0 ** (-0.5 * torch.arange(levels))[:, None].repeat(1, width)
@@ -199,6 +202,8 @@ class RQHCTransformer(nn.Module):
             nn.init.zeros_(self.depth.leave.weight)  # starts as independent levels
         if self.prompt.tell is not None:
             nn.init.zeros_(self.prompt.tell.weight)
+        if self.clock is not None:
+            nn.init.zeros_(self.clock.project.weight)
 
     @property
     def end(self) -> int:
@@ -229,13 +234,15 @@ class RQHCTransformer(nn.Module):
             seam: (B,) frames made when the second prompt replaced the first, at least 1; needed where P = 2.
         """
         size, number = tokens.shape[1], prompts.shape[1]
-        first, frames = self.inputs(prompts, tokens, seam)
+        first, frames = self.inputs(prompts, tokens, skipped, seam)
         x = torch.cat([first, frames], 2).flatten(0, 1)  # (B · L, P + n, w)
         states = self.trunk(x, self.reach(size, number, skipped, seam))
         states = torch.cat([states[:, :1], states[:, number:]], 1)  # a second prompt predicts nothing
         return states.view(len(tokens), self.lanes, size + 1, -1).transpose(1, 2)
 
-    def inputs(self, prompts: Tensor, tokens: Tensor, seam: Tensor | None) -> tuple[Tensor, Tensor]:
+    def inputs(
+        self, prompts: Tensor, tokens: Tensor, skipped: Tensor | None, seam: Tensor | None
+    ) -> tuple[Tensor, Tensor]:
         """Position 0 of each prompt (B, L, P, w) and the frames (B, L, n, w); arguments as in `states`."""
         training = self.training
         dropped = torch.rand(len(tokens), device=tokens.device) < self.config.condition.drop if training else None
@@ -243,6 +250,9 @@ class RQHCTransformer(nn.Module):
         read = [self.prompt(p, dropped) for p in prompts.unbind(1)]
         first = torch.stack([opening for opening, _ in read], 2)
         told = in_force([told for _, told in read], tokens.shape[1], seam)
+        if self.clock is not None:
+            time = self.clock.of_acts(len(tokens), tokens.shape[1], skipped, seam)
+            told = told + (time if dropped is None else time.masked_fill(dropped[:, None, None], 0))
         return first, self.columns(inputs).to(first.dtype) + told[:, None]
 
     def natural_frames(self, acts: Tensor) -> list[int]:

@@ -36,6 +36,8 @@ class PackedModel:
         self.device = self.network.head.weight.device
         self.blocks = self.network.trunk.layers
         self.terms = [block.attention.terms(self.network.trunk.sinusoids).contiguous() for block in self.blocks]
+        clock = self.network.clock
+        self.times = None if clock is None else clock(torch.arange(len(clock.sinusoids), device=self.device))
         pack_linears(self.network, dtype, group=group)
         self.steps = [compiled(TrunkStep(block)) for block in self.blocks]
         self.depth = None if self.network.depth is None else compiled(DepthStep(self.network.depth))

@@ -1,5 +1,6 @@
-"""Motion whose prompt changes at any moment, for training (ours): a captured clip is left wherever it is, and another
-one is entered at its beginning, with an inertialized transition (`workers.training.data.splice`).
+"""Motion whose prompt changes at any moment, for training (ours): a captured clip, or what the model makes itself
+(`workers.mogo.rollouts`), is left wherever it is, and another clip is entered at its beginning, with an inertialized
+transition (`workers.training.data.splice`).
 
 Splices of the prepared folder leave an act when it is done, as sequences do. Who steers does not wait for that.
 """
@@ -18,6 +19,7 @@ from torch import Tensor
 from shared.errors import InvalidInput
 from shared.motion.features import HeadingLayout
 from workers.mogo.config import MOGOConfig
+from workers.mogo.rollouts import Rollouts
 from workers.mogo.tokenizer import Tokenizer
 from workers.training.data.prepared import PreparedData
 from workers.training.data.splice import join_clips, seam_costs, seam_features
@@ -45,6 +47,30 @@ class Steers:
     ends: Tensor  # (S,) bool: the other is there to its end
 
 
+@dataclass(frozen=True)
+class _Left:
+    """A motion that is left where it ends."""
+
+    clip: int
+    joints: NDArray[np.float64]  # (n, J, 3)
+    tokens: Tensor | None = None  # (n, V) where the model drew it; captured ones are encoded with what comes after them
+
+
+@dataclass(frozen=True)
+class _Joined:
+    """It, and what is entered from there."""
+
+    features: NDArray[np.float32]
+    left: _Left
+    entered: int
+    ends: bool
+
+    def tokens(self, encoded: Tensor) -> Tensor:
+        """Those of all of it as encoded, but what was drawn stays as it was drawn."""
+        drawn = self.left.tokens
+        return encoded if drawn is None else torch.cat([drawn, encoded[len(drawn) :]])
+
+
 def load_steers(
     run: Path,
     config: MOGOConfig,
@@ -52,6 +78,7 @@ def load_steers(
     data: MotionData,
     clips: Sequence[int],
     weights: Sequence[float],
+    rollouts: Rollouts | None = None,
 ) -> Steers:
     """The steered motions of a run: made once for a tokenizer, its data and these clips, then read from the folder.
 
@@ -62,53 +89,79 @@ def load_steers(
         data: what the clips are of.
         clips: (C,) those that may be joined: single acts.
         weights: (C,) how often each is drawn.
+        rollouts: `config.rollouts` more leave what these draw; None = all leave captured motion.
     """
-    key = f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}"
-    chosen, often = np.asarray(clips), np.asarray(weights)
+    drawn = "" if rollouts is None else f":{config.rollouts}:{rollouts.fingerprint}"
+    key = f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}{drawn}"
+    made = _Making(config, data.prepared, np.asarray(clips), np.asarray(weights))
     values = made_once(
-        run / FILE, key, data.features.device, lambda: vars(_make(config, tokenizer, data, chosen, often))
+        run / FILE, key, data.features.device, lambda: vars(_encoded(tokenizer, data, list(made.joined(rollouts))))
     )  # fmt: skip
     return Steers(**{**values, "ends": values["ends"].bool()})
 
 
 @torch.no_grad()
-def _make(
-    config: MOGOConfig, tokenizer: Tokenizer, data: MotionData, clips: NDArray[np.int64], weights: NDArray[np.float64]
-) -> Steers:
-    made = list(_joined(data.prepared, config, clips, weights))
+def _encoded(tokenizer: Tokenizer, data: MotionData, made: Sequence[_Joined]) -> Steers:
     device = data.features.device
     tokens: list[Tensor] = []
     for at in range(0, len(made), BATCH):
-        features = [torch.from_numpy(features) for features, *_ in made[at : at + BATCH]]
-        counts = torch.tensor([len(each) for each in features], device=device)
-        padded = torch.nn.utils.rnn.pad_sequence(features, batch_first=True).to(device)
-        codes = tokenizer.encode(padded, counts)
-        tokens += [codes[row, :count] for row, count in enumerate(counts.tolist())]
+        some = made[at : at + BATCH]
+        counts = torch.tensor([len(each.features) for each in some], device=device)
+        features = [torch.from_numpy(each.features) for each in some]
+        codes = tokenizer.encode(torch.nn.utils.rnn.pad_sequence(features, batch_first=True).to(device), counts)
+        tokens += [
+            each.tokens(codes[row, :count]) for row, (each, count) in enumerate(zip(some, counts.tolist(), strict=True))
+        ]
     lengths = torch.tensor([len(each) for each in tokens], device=device)
-    rest = torch.tensor([[seam, left, entered, ends] for _, seam, left, entered, ends in made], device=device)
-    seams, left, entered, ends = rest.unbind(1)
+    rest = [[len(each.left.joints), each.left.clip, each.entered, each.ends] for each in made]
+    seams, left, entered, ends = torch.tensor(rest, device=device).unbind(1)
     return Steers(torch.cat(tokens), lengths.cumsum(0) - lengths, lengths, seams, left, entered, ends.bool())
 
 
-def _joined(
-    prepared: PreparedData, config: MOGOConfig, clips: NDArray[np.int64], weights: NDArray[np.float64]
-) -> Iterator[tuple[NDArray[np.float32], int, int, int, bool]]:
-    """Features, seam, clip left, clip entered, and whether that one is whole; `config.steers` of them."""
-    rng = np.random.default_rng(0)
-    layout = prepared.layout
-    if not isinstance(layout, HeadingLayout):
-        raise InvalidInput(f"motions of layout {layout.name!r} cannot be joined", where="layout")
-    for _ in range(config.steers):
-        for _ in range(TRIES):
-            left, entered = (int(c) for c in rng.choice(clips, 2, p=weights / weights.sum()))
-            first, second = (prepared.joints(prepared.clips[c]).astype(np.float64) for c in (left, entered))
-            most = min(len(first), MOST_LEFT, config.max_frames - LEAST_ENTERED)
-            first = first[: int(rng.integers(LEAST_LEFT, most + 1))]
-            costs = seam_costs(seam_features(first[-3:], config.fps)[-1:], seam_features(second[:3], config.fps)[:1])
-            if float(costs[0, 0]) > WORST_SEAM:
+class _Making:
+    """Draws motions to leave and clips to enter, and joins them."""
+
+    def __init__(
+        self, config: MOGOConfig, prepared: PreparedData, clips: NDArray[np.int64], weights: NDArray[np.float64]
+    ) -> None:
+        layout = prepared.layout
+        if not isinstance(layout, HeadingLayout):
+            raise InvalidInput(f"motions of layout {layout.name!r} cannot be joined", where="layout")
+        self._config, self._prepared, self._layout = config, prepared, layout
+        self._clips, self._shares = clips, weights / weights.sum()
+        self._rng = np.random.default_rng(0)
+
+    def joined(self, rollouts: Rollouts | None) -> Iterator[_Joined]:
+        """Every motion that is left, with what is entered from there; without those that no clip goes on from."""
+        yield from filter(None, map(self._enter, self._captured()))
+        if rollouts is not None:
+            yield from filter(None, map(self._enter, self._drawn(rollouts)))
+
+    def _captured(self) -> Iterator[_Left]:
+        for clip in self._draw(self._config.steers):
+            joints = self._joints(clip)
+            most = min(len(joints), MOST_LEFT, self._config.max_frames - LEAST_ENTERED)
+            yield _Left(clip, joints[: int(self._rng.integers(LEAST_LEFT, most + 1))])
+
+    def _drawn(self, rollouts: Rollouts) -> Iterator[_Left]:
+        for made in rollouts.draw(self._draw(self._config.rollouts), self._config.max_frames - LEAST_ENTERED):
+            yield _Left(made.clip, self._layout.decode(made.features).astype(np.float64), made.tokens)
+
+    def _enter(self, left: _Left) -> _Joined | None:
+        fps, first = self._config.fps, left.joints
+        for clip in self._draw(TRIES):
+            second = self._joints(clip)
+            costs = seam_costs(seam_features(first[-3:], fps)[-1:], seam_features(second[:3], fps)[:1])
+            if clip == left.clip or float(costs[0, 0]) > WORST_SEAM:
                 continue
-            room = config.max_frames + 2 - len(first)  # poses: one more than frames, one is shared
-            joints = join_clips(first, second[:room], config.fps)
-            features = layout.encode(layout.canonicalize(joints)).astype(np.float32)
-            yield features, len(first), left, entered, len(second) <= room
-            break
+            room = self._config.max_frames + 2 - len(first)  # poses: one more than frames, one is shared
+            joints = join_clips(first, second[:room], fps)
+            features = self._layout.encode(self._layout.canonicalize(joints)).astype(np.float32)
+            return _Joined(features, left, clip, len(second) <= room)
+        return None
+
+    def _draw(self, count: int) -> list[int]:
+        return self._rng.choice(self._clips, count, p=self._shares).tolist()
+
+    def _joints(self, clip: int) -> NDArray[np.float64]:
+        return self._prepared.joints(self._prepared.clips[clip]).astype(np.float64)

@@ -10,6 +10,7 @@ from workers.mogo.assembly import RECIPE
 from workers.mogo.config import MOGOConfig
 from workers.mogo.losses import scale_penalty
 from workers.mogo.model import RQHCTransformer
+from workers.mogo.rollouts import Rollouts
 from workers.mogo.samples import MIN_FRAMES
 from workers.mogo.stage_transformer import TransformerStage
 from workers.mogo.steers import Steers, load_steers
@@ -71,7 +72,7 @@ def transformer_stage(
     captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
-    steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES))
+    steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES), captions)
     return TransformerStage(options.config, clips, tokens, captions, steers, network), data.sha256
 
 
@@ -80,11 +81,17 @@ def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
     return MotionData.load(options.prepared, choose_device(options.device))
 
 
-def _steers(options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs) -> Steers | None:
-    """Steered motions between training clips of one act each."""
+def _steers(
+    options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs, captions: SentenceData
+) -> Steers | None:
+    """Steered motions between training clips of one act each; some leave what the finished model draws, if any has."""
     if not options.config.steers:
         return None
     single = np.array([not data.prepared.clips[int(clip)].seams for clip in pairs.train])
-    return load_steers(
-        options.run, options.config, tokenizer, data, pairs.train[single].tolist(), pairs.weights[single].tolist()
-    )  # fmt: skip
+    clips, weights = pairs.train[single].tolist(), pairs.weights[single].tolist()
+    rollouts = None
+    if options.warm and options.config.rollouts:
+        model = RQHCTransformer(options.config).to(data.features.device)
+        model.load_state_dict(RECIPE.part("transformer", options.config, options.run).state)
+        rollouts = Rollouts(model, tokenizer, captions)
+    return load_steers(options.run, options.config, tokenizer, data, clips, weights, rollouts)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
-from torch import Tensor
+from torch import Tensor, nn
 
 from shared.nn import distributed
 from shared.nn.motion_tokenizer import MotionTokenizer
@@ -153,7 +153,7 @@ def made_once(
     return made
 
 
-def fingerprint(tokenizer: MotionTokenizer) -> str:
-    """Tells one tokenizer's weights from another's."""
-    total = sum(float(value.double().abs().sum()) for value in tokenizer.state_dict().values())
+def fingerprint(network: nn.Module) -> str:
+    """Tells one network's weights from another's."""
+    total = sum(float(value.double().abs().sum()) for value in network.state_dict().values())
     return f"{total:.6f}"

@@ -9,6 +9,7 @@ import torch
 
 from shared.errors import InvalidInput
 from shared.nn.sampling import guide
+from shared.streams.acts import Begun
 from tests.support.processors import PACKED_TYPES
 from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
@@ -169,7 +170,7 @@ def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
     whole = model(prompts(1), tokens, skipped=torch.tensor([skipped]))[0]
     read = WINDOW - 4
     streams = opened(model, 1)
-    streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped)
+    streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped, began=Begun(0, 0))
     for frame in range(read, WINDOW):
         found = logits_of(model, streams.states(), tokens[0, frame])
         torch.testing.assert_close(found, whole[:, frame], atol=1e-5, rtol=0)
@@ -218,8 +219,8 @@ def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
     model = transformer(FLAT)
     config = InferenceConfig(guidance=2.0, temperature=0, upper_temperature=0, window=WINDOW)
     streams = opened(model, 1, config)
-    session = streams.start(said(1), 1)
-    read = (model.prompt(said(1)[None]), model.prompt(said(1)[None], torch.tensor([True])))
+    session = streams.start(said(2), 1)
+    read = (model.prompt(said(2)[None]), model.prompt(said(2)[None], torch.tensor([True])))
     plain = [opening[:, :, None] for opening, _ in read]
     with_prompt, without = (model.score(model.trunk(p.flatten(0, 1), model.reach(0))[:, 0]) for p in plain)
     guided = guide(with_prompt, without, 2.0)

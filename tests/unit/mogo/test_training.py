@@ -11,12 +11,14 @@ import torch
 
 from shared.errors import InvalidInput, NotFound
 from tests.support.prepared import farthest_move
+from workers.mogo import steers
 from workers.mogo.assembly import assemble, take_apart
 from workers.mogo.config import TINY, MOGOConfig
-from workers.mogo.model import NOT_ASKED, next_targets
+from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from workers.mogo.rollouts import Rollouts
 from workers.mogo.samples import MIN_FRAMES, Stretch
 from workers.mogo.stage_transformer import TransformerStage
-from workers.mogo.steers import load_steers
+from workers.mogo.steers import LEAST_ENTERED, load_steers
 from workers.mogo.tokenizer import Tokenizer
 from workers.mogo.train import train_stage
 from workers.training.budget import Budget
@@ -42,8 +44,8 @@ def stage(prepared: PreparedData, tmp_path_factory: pytest.TempPathFactory) -> T
     pairs = Pairs(prepared.clips, tokens, captions, MIN_FRAMES)
     run = tmp_path_factory.mktemp("steers")
     single = [int(c) for c in pairs.train if not prepared.clips[int(c)].seams]
-    steers = load_steers(run, TINY, tokenizer, data, single, [1.0] * len(single))
-    return TransformerStage(TINY, prepared.clips, tokens, captions, steers)
+    steered = load_steers(run, TINY, tokenizer, data, single, [1.0] * len(single))
+    return TransformerStage(TINY, prepared.clips, tokens, captions, steered)
 
 
 def options(prepared: PreparedData, run: Path, steps: int) -> TrainOptions[MOGOConfig]:
@@ -154,6 +156,27 @@ def test_what_is_drawn_becomes_tokens_prompts_and_seams(stage: TransformerStage)
     targets = next_targets(sample.tokens, sample.lengths, 32, ends=sample.ends, skipped=sample.skipped)
     assert (targets[:, 0] == 32).any(1).tolist() == [s.ends for s in some]
     assert ((targets[:, 0, 0] == NOT_ASKED) == (sample.skipped > 0)).all()
+
+
+def test_some_steered_motions_leave_what_the_model_itself_makes(
+    prepared: PreparedData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steers, "WORST_SEAM", np.inf)  # of random weights no clip can be entered
+    torch.manual_seed(0)
+    data, tokenizer, model = MotionData.load(prepared.path, CPU), Tokenizer(TINY).eval(), RQHCTransformer(TINY)
+    tokenizer.quantizer.codebooks.normal_()
+    captions = SentenceData.of_sentences(CaptionTexts.load(prepared), prepared.caption_counts, 384, CPU)
+    clips = [i for i, c in enumerate(prepared.clips) if c.split == "train" and not c.seams]
+    config = replace(TINY, steers=2)
+    rollouts = Rollouts(model, tokenizer, captions)
+    made = load_steers(tmp_path, config, tokenizer, data, clips, [1.0] * len(clips), rollouts)
+    drawn = range(2, len(made.starts))
+    assert len(drawn) == TINY.rollouts
+    again = Rollouts(model, tokenizer, captions).draw(made.left[2:].tolist(), TINY.max_frames - LEAST_ENTERED)
+    for row, rollout in zip(drawn, again, strict=True):
+        start, seam = int(made.starts[row]), int(made.seams[row])
+        assert torch.equal(made.tokens[start : start + seam], rollout.tokens)
+        assert seam < int(made.lengths[row]) <= TINY.max_frames
 
 
 def test_steered_motions_leave_one_clip_for_another_and_are_made_once(prepared: PreparedData, tmp_path: Path) -> None:

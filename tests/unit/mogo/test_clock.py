@@ -1,0 +1,84 @@
+"""How long ago an act began, in training and while it streams."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from shared.streams.acts import Begun
+from workers.mogo.clock import UNTOLD, Clock
+from workers.mogo.config import TINY
+from workers.mogo.packed_model import PackedModel
+from workers.mogo.streaming import OUTLASTED, Streams
+
+from .networks import columns, prompts, transformer
+
+
+def clock(untold: float = 0.0) -> Clock:
+    """One that tells frames apart."""
+    torch.manual_seed(0)
+    return Clock(8, 20, untold)
+
+
+def test_nothing_is_added_where_nobody_knows_and_all_that_is_far_is_alike() -> None:
+    told = clock()(torch.tensor([UNTOLD, 0, 3, 20, 500]))
+    assert not told[0].any()
+    assert told[1].any()
+    assert not torch.equal(told[1], told[2])
+    assert torch.equal(told[3], told[4])
+
+
+def test_time_begins_anew_at_a_seam_and_counts_what_was_cut_off() -> None:
+    made = clock()
+    found = made.of_acts(2, 5, torch.tensor([0, 4]), torch.tensor([3, 6]))
+    assert torch.equal(found[0], made(torch.tensor([1, 2, 0, 1, 2])))
+    assert torch.equal(found[1], made(torch.tensor([5, 6, 7, 8, 9])))
+    assert torch.equal(made.of_acts(1, 3, None, None)[0], made(torch.tensor([1, 2, 3])))
+
+
+def test_training_keeps_the_time_of_some_acts_to_itself_each_whole() -> None:
+    made = clock(untold=0.5).train()
+    found = made.of_acts(400, 6, None, torch.full((400,), 4)).any(-1)  # (400, 6): whether anything was told
+    first, second = found[:, 0], found[:, 4]
+    assert torch.equal(found, torch.stack([first] * 3 + [second] * 3, 1))
+    for act in (first, second):
+        assert 0.35 < float(act.float().mean()) < 0.65
+    assert 0.35 < float((first == second).float().mean()) < 0.65  # each act by itself
+    assert made.eval().of_acts(400, 6, None, None).any(-1).all()
+
+
+@pytest.mark.parametrize(("frame", "told"), [(5, True), (6, False)])
+def test_an_act_that_outlasts_its_usual_frames_is_no_longer_told_its_time(frame: int, told: bool) -> None:
+    usual = 4
+    assert int(OUTLASTED * usual) == 6
+    packed = PackedModel(transformer())
+    assert packed.times is not None
+
+    def state() -> torch.Tensor:
+        streams = Streams(packed, 1)
+        past = columns(10)[0]
+        streams.start(prompts(1)[0], 1, past=past, began=Begun(0, 0), lasts=[usual])
+        return streams.states()
+
+    before = state()
+    packed.times[frame] += 1
+    assert torch.equal(state(), before) != told
+
+
+def test_guidance_is_told_no_time_where_it_is_told_no_prompt() -> None:
+    packed = PackedModel(transformer())
+    assert packed.times is not None
+
+    def branches() -> tuple[torch.Tensor, torch.Tensor]:
+        streams = Streams(packed, 1, replace(TINY.inference, guidance=2.0))
+        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=Begun(0, 0))
+        told, untold = streams.states().chunk(2, 1)
+        return told, untold
+
+    before = branches()
+    packed.times += 1
+    after = branches()
+    assert not torch.equal(before[0], after[0])
+    assert torch.equal(before[1], after[1])
