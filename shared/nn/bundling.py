@@ -15,8 +15,15 @@ from shared.bundles import Bundle, BundleWriter, TextSpec
 from shared.errors import InvalidBundle
 from shared.motion.features import layout
 
-NOT_STORED = ("quantizer.sums", "mean", "std")
+NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
 """Of a tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""
+ASKED_IN_TRAINING = "ahead."
+"""Of MOGO's transformer: what training asks some frames ahead."""
+
+
+def stored(name: str) -> bool:
+    """Whether a bundle keeps a tensor of a network: all that inference needs."""
+    return name not in NOT_STORED and not name.startswith(ASKED_IN_TRAINING)
 
 
 class GeneratorConfig(Protocol):
@@ -58,7 +65,7 @@ def write_generator(
     """
     with BundleWriter(path, overwrite=overwrite) as writer:
         for name, state in parts.items():
-            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if k not in NOT_STORED})
+            writer.add_part(name, {k: v.cpu().numpy() for k, v in state.items() if stored(k)})
         writer.add_statistics(*statistics)
         if card is not None:
             writer.add_card(card)
@@ -90,7 +97,7 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     state = {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
     where = f"{bundle.path}: {part}"
     wanted = set(network.state_dict())
-    missing, unknown = sorted(wanted - set(state) - set(NOT_STORED)), sorted(set(state) - wanted)
+    missing, unknown = sorted(filter(stored, wanted - set(state))), sorted(set(state) - wanted)
     if missing or unknown:
         raise InvalidBundle(
             f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unknown[:3]}", where=where

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
@@ -25,6 +25,7 @@ from shared.text.threads import one_thread
 MAX_SEGMENT_WORDS = 60
 MAX_PIECES = 8  # of one word: a typed-over word must not crowd out the rest; 60 * 8 + 2 < 512
 THRESHOLD = 0.5
+UPDATES = "minilm"  # the part of a bundle that holds updates of MiniLM; older ones have none
 CACHED_WORDS = 8192  # all captions of KIT-ML have 2,042
 _NOT_A_LETTER = re.compile(r"\W")
 _SENTENCE_END = re.compile(r"\w{2}[.!?…]+[\"')\]]*$")
@@ -61,10 +62,12 @@ class LightLabeller:
         try:
             config = light_config(parameters)
             network = LightNetwork(config)
-            network.load_state_dict({name: torch.tensor(value) for name, value in bundle.tensors("labeller").items()})
+            network.load_state_dict(_tensors(bundle, "labeller"))
+            updates = _tensors(bundle, UPDATES) if UPDATES in bundle.manifest.parts else None
+            states = WordStates(folder, config.layers, updates)
         except (TypeError, RuntimeError, KeyError) as error:
             raise InvalidBundle(f"its weights do not fit: {error}", where=str(bundle.path)) from error
-        return cls(network, WordStates(folder, config.layers), bundle.weights_sha256)
+        return cls(network, states, bundle.weights_sha256)
 
     @one_thread()
     def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
@@ -116,28 +119,33 @@ class Decoder:
 
 
 class WordStates:
-    """Hidden states of int8 MiniLM for the words of a sentence."""
+    """Hidden states of int8 MiniLM, with `updates` as it takes them, for the words of a sentence."""
 
-    def __init__(self, folder: Path, layers: Sequence[int]) -> None:
-        self._minilm = MiniLM(folder, int8=True)
+    def __init__(self, folder: Path, layers: Sequence[int], updates: Mapping[str, torch.Tensor] | None = None) -> None:
+        self._minilm = MiniLM(folder, int8=True, updates=updates)
         self._layers = list(layers)
         self._first, self._last = self._minilm.tokenizer.encode("").ids  # [CLS], [SEP]
         self._pieces = lru_cache(CACHED_WORDS)(self._find_pieces)
 
     def __call__(self, words: Sequence[str]) -> torch.Tensor:
         """(T, L, 384): the mean over a word's pieces, without its punctuation where it has anything else."""
+        ids, weights = self.tokens(words)
+        hidden = self._minilm.states(ids)
+        states = torch.stack([hidden[layer] for layer in self._layers], dim=1)  # (tokens, L, 384)
+        means = torch.as_tensor(weights) @ states.flatten(1)
+        return means.view(len(words), *states.shape[1:])
+
+    def tokens(self, words: Sequence[str]) -> tuple[list[int], NDArray[np.float32]]:
+        """The N token ids of a sentence, and (T, N) with which weights their states make up the words'."""
         ids = [self._first]
-        weights = np.zeros((len(words), 2 + MAX_PIECES * len(words)), np.float32)  # (T, tokens at most), of the means
+        weights = np.zeros((len(words), 2 + MAX_PIECES * len(words)), np.float32)  # (T, tokens at most)
         for row, word in zip(weights, words, strict=True):
             pieces, kept = self._pieces(word)
             for index in kept:
                 row[len(ids) + index] = 1 / len(kept)
             ids += pieces
         ids.append(self._last)
-        hidden = self._minilm.states(ids)
-        states = torch.stack([hidden[layer] for layer in self._layers], dim=1)  # (tokens, L, 384)
-        means = torch.as_tensor(weights[:, : len(ids)]) @ states.flatten(1)
-        return means.view(len(words), *states.shape[1:])
+        return ids, weights[:, : len(ids)]
 
     def _find_pieces(self, word: str) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Token ids of a word, and which of them its state is the mean of."""
@@ -188,6 +196,10 @@ def light_config(parameters: dict[str, object]) -> LightConfig:
     if foreign := set(parameters) - known:
         raise TypeError(f"unknown parameters {', '.join(sorted(foreign))}")
     return LightConfig(**{k: tuple(v) if isinstance(v, list) else v for k, v in parameters.items()})  # pyright: ignore
+
+
+def _tensors(bundle: Bundle, part: str) -> dict[str, torch.Tensor]:
+    return {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
 
 
 def _moved(frame: Frame, offset: int) -> Frame:

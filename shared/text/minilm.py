@@ -28,7 +28,7 @@ from shared.nn.compiled import compiled
 from shared.nn.packed import PackedLinear, can_pack
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 WIDTH = 384
 LAYERS = 6
@@ -43,14 +43,17 @@ class MiniLM:
     Args:
         folder: holds `model.safetensors` and `tokenizer.json`.
         int8: dynamic int8 matrix products, weights per output channel.
+        updates: added to matrices first: `<matrix>.up` (out, rank) times `<matrix>.down` (rank, in). In int8 inputs
+            are divided by `<matrix>.smooth` (in,), where it is there, and the matrix multiplied: without that a
+            few large features leave little of seven bits to the others (Xiao et al. 2022, arXiv 2211.10438).
 
     Raises:
         InvalidFile: the folder holds something else.
     """
 
-    def __init__(self, folder: Path, *, int8: bool = False) -> None:
+    def __init__(self, folder: Path, *, int8: bool = False, updates: Mapping[str, Tensor] | None = None) -> None:
         self.tokenizer = load_tokenizer(folder / "tokenizer.json")
-        weights = _load(folder / "model.safetensors")
+        weights = _updated(_load(folder / "model.safetensors"), updates or {})
         self._words = weights["embeddings.word_embeddings.weight"]
         self._positions = (
             weights["embeddings.position_embeddings.weight"] + weights["embeddings.token_type_embeddings.weight"][0]
@@ -117,7 +120,8 @@ class _Layer(nn.Module):
         def linear(*names: str) -> nn.Module:
             weight = torch.cat([weights[f"{prefix}{name}.weight"] for name in names])
             bias = torch.cat([weights[f"{prefix}{name}.bias"] for name in names])
-            return _Int8Linear(weight, bias) if int8 else _linear(weight, bias)
+            smooth = weights.get(f"{prefix}{names[0]}.smooth")  # query, key and value have one input
+            return _Int8Linear(weight, bias, smooth) if int8 else _linear(weight, bias)
 
         def norm(name: str) -> nn.LayerNorm:
             norm = nn.LayerNorm(WIDTH, EPS).requires_grad_(False)
@@ -167,8 +171,10 @@ def _linear(weight: Tensor, bias: Tensor) -> nn.Module:
 class _Int8Linear(nn.Module):
     """Weights in int8 with a scale for each output; inputs in int8 with one scale for all, found in each call."""
 
-    def __init__(self, weight: Tensor, bias: Tensor) -> None:
+    def __init__(self, weight: Tensor, bias: Tensor, smooth: Tensor | None) -> None:
         super().__init__()
+        self.shrink = None if smooth is None else 1 / smooth
+        weight = weight if smooth is None else weight * smooth
         scale = (weight.abs().amax(dim=1) / 127).clamp(min=1e-8).double()
         zero = torch.zeros(len(weight), dtype=torch.long)
         with warnings.catch_warnings():  # "deprecated": torch is pinned, and its successor needs another package
@@ -178,6 +184,8 @@ class _Int8Linear(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """(N, in) to (N, out)."""
+        if self.shrink is not None:
+            x = x * self.shrink
         # True: one bit less on x, no overflow without VNNI
         return torch.ops.quantized.linear_dynamic(x, self.packed, True)
 
@@ -195,6 +203,17 @@ def load_tokenizer(file: Path) -> Tokenizer:
     tokenizer.no_padding()
     tokenizer.no_truncation()
     return tokenizer
+
+
+def _updated(weights: dict[str, Tensor], updates: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The weights with low-rank updates added to some of their matrices; raises KeyError where those do not fit."""
+    matrices = [name.removesuffix(".up") for name in updates if name.endswith(".up")]
+    changed = {
+        f"{name}.weight": weights[f"{name}.weight"] + updates[f"{name}.up"] @ updates[f"{name}.down"]
+        for name in matrices
+    }
+    smooth = {name: vector for name, vector in updates.items() if name.endswith(".smooth")}
+    return weights | changed | smooth
 
 
 def _load(file: Path) -> dict[str, Tensor]:

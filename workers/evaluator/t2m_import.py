@@ -30,7 +30,7 @@ from torch import nn
 from shared.bundles import Bundle, BundleWriter, DataSource
 from shared.errors import InvalidFile, MareyError
 from shared.motion.features import layout
-from shared.nn.bundling import NOT_STORED
+from shared.nn.bundling import stored
 from workers.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
 from workers.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
 from workers.evaluator.t2m_words import END, START, UNKNOWN
@@ -66,7 +66,7 @@ def import_t2m(checkpoints: Path, glove: Path, output: Path, config: T2MConfig |
     words, vectors = _read_words(glove, config)
     with BundleWriter(output) as writer:
         for name, network in (("motion", motion), ("text", text)):
-            state = {k: v.numpy() for k, v in network.state_dict().items() if k not in NOT_STORED}
+            state = {k: v.numpy() for k, v in network.state_dict().items() if stored(k)}
             writer.add_part(name, state, dtype=np.float32)  # as published: numbers are compared with published ones
         writer.add_statistics(mean, std)
         writer.add_part(WORDS_PART, {"vectors": vectors}, dtype=np.float32)

@@ -204,6 +204,8 @@ class RQHCTransformer(nn.Module):
             nn.init.zeros_(self.prompt.tell.weight)
         if self.clock is not None:
             nn.init.zeros_(self.clock.project.weight)
+        for weight in (w for w in self.ahead.parameters() if w.ndim == 2):
+            nn.init.eye_(weight)  # what comes later is what comes next, until training knows better
 
     @property
     def end(self) -> int:

@@ -47,25 +47,25 @@ class Rollouts:
 
     @torch.inference_mode()
     def draw(self, clips: Sequence[int], most: int) -> Iterator[Rollout]:
-        """A session for each clip, of `most` frames at most: one of its captions is the prompt."""
-        chosen = self._captions.choose(np.asarray(clips), self._rng)
-        for start in range(0, len(clips), SESSIONS):
-            some = self._captions.sentences(chosen[start : start + SESSIONS])
-            frames: NDArray[np.int64] = self._rng.integers(min(LEAST, most), min(MOST, most) + 1, len(some))
-            for row, columns in enumerate(self._play(some, start, frames)):
-                features = self._tokenizer.decode(columns[None])[0].cpu().numpy()
-                yield Rollout(int(clips[start + row]), columns, features)
+        """A session for each clip, whose prompt is one of its captions, of `most` frames at most; in the order in which
+        they are done."""
+        network = self._packed.network
+        sentences = self._captions.sentences(self._captions.choose(np.asarray(clips), self._rng))
+        lasts = network.pace(network.prompt.standardised(sentences)).tolist()
+        frames = self._rng.integers(min(LEAST, most), min(MOST, most) + 1, len(clips)).tolist()
+        streams, waiting = Streams(self._packed, min(SESSIONS, len(clips))), list(range(len(clips)))[::-1]
+        playing: dict[int, tuple[int, list[Tensor]]] = {}  # session to its clip and what it showed
+        while waiting or playing:
+            while waiting and len(playing) < streams.capacity:
+                row = waiting.pop()
+                playing[streams.start(sentences[row], row, lasts=[lasts[row]])] = row, []
+            for session, column in streams.step().items():
+                row, columns = playing[session]
+                columns.append(column)
+                if len(columns) == frames[row]:
+                    streams.stop(session)
+                    del playing[session]
+                    yield self._rollout(clips[row], torch.stack(columns))
 
-    def _play(self, sentences: Tensor, seed: int, frames: NDArray[np.int64]) -> list[Tensor]:
-        """Columns (n, V) of each session, `frames` long."""
-        streams = Streams(self._packed, len(sentences))
-        lasts = self._packed.network.pace(self._packed.network.prompt.standardised(sentences)).tolist()
-        names = [
-            streams.start(sentence, seed + row, lasts=[last])
-            for row, (sentence, last) in enumerate(zip(sentences, lasts, strict=True))
-        ]
-        columns: dict[int, list[Tensor]] = {name: [] for name in names}
-        for _ in range(int(frames.max())):
-            for name, column in streams.step().items():
-                columns[name].append(column)
-        return [torch.stack(columns[name][:count]) for name, count in zip(names, frames.tolist(), strict=True)]
+    def _rollout(self, clip: int, tokens: Tensor) -> Rollout:
+        return Rollout(clip, tokens, self._tokenizer.decode(tokens[None])[0].cpu().numpy())

@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from shared.errors import InvalidFile
 from shared.text.roles import Argument, Frame
@@ -39,13 +40,33 @@ _STOP = re.compile(r"[.!?]+$")
 def read_gold(file: Path) -> list[Example]:
     """AllenNLP's labels of KIT captions, without argument-less auxiliaries ("is" beside "walking").
 
+    Args:
+        file: a list of captions (`srl-kit-dev.json`), or the captions of each clip as GraphMotion's repository has
+            them (`datasets/kit-ml/new_test_data.json`).
+
     Raises:
         InvalidFile: not such a file.
     """
     try:
-        return [_gold(entry) for entry in json.loads(file.read_bytes())]
+        found = json.loads(file.read_bytes())
+        if isinstance(found, dict):
+            found = [_listed(entry) for clip in found.values() for entry in clip]
+        return [_gold(entry) for entry in found]
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         raise InvalidFile(f"is not a file of role labels: {error!r}", where=str(file)) from error
+
+
+def _listed(entry: dict[str, Any]) -> dict[str, Any]:
+    """A caption of GraphMotion's as one of the list: predicates and arguments by number, words by their index."""
+    spans = {name: {int(key): value["spans"] for key, value in entry[name].items()} for name in ("V", "entities")}
+    return {
+        "words": entry["caption"].split(),
+        "predicates": [{"word": spans["V"][number][0]} for number in sorted(spans["V"])],
+        "arguments": [
+            {"predicate": predicate, "role": role, "words": spans["entities"][entity]}
+            for predicate, entity, role in entry["relations"]
+        ],
+    }
 
 
 def _gold(entry: dict[str, list[dict[str, object]]]) -> Example:

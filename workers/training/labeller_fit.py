@@ -1,47 +1,51 @@
-"""Fitting the `light` role labeller's head: batches by length, conditional random field, averaged weights."""
+"""Fitting the `light` role labeller: MiniLM's updates and the head together, a random field, averaged weights."""
 
 from __future__ import annotations
 
-import itertools
 import math
-import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import torch
 import torch.nn.functional as F
+from torch import Tensor
 
 from shared.text.bio import transition_scores
 from shared.text.light import WordStates, surface_features
 from shared.text.light_network import LightConfig, LightNetwork
-from workers.training.labeller_data import Augmenter
-from workers.training.labeller_grammar import Example, sentence
+from workers.training.labeller_adapter import AdaptedMiniLM, TokenBatch, token_batch
+from workers.training.labeller_grammar import Example
+from workers.training.labeller_weights import Weights
+
+SMOOTHING_SENTENCES = 150
 
 
 @dataclass(frozen=True)
 class FitConfig:
-    """How the head is trained."""
+    """How the head and MiniLM's updates are trained; by default, on captions."""
 
-    steps: int = 1000
+    steps: int = 450
     batch: int = 24  # sentences
-    learning_rate: float = 2e-3
-    weight_decay: float = 0.05
-    variants: int = 6  # augmented copies of each gold sentence
-    grammar: int = 1000  # silver sentences
-    gold_weight: float = 2.0
-    grammar_weight: float = 0.7
+    learning_rate: float = 1e-3  # of the head
+    adapter_rate: float = 5e-4
+    rank: int = 16
+    weight_decay: float = 0.05  # of the head
     predicate_weight: float = 2.0
-    average: float = 0.995
+    average: float = 0.99
+
+
+PROPBANK_FIT = FitConfig(steps=2500, batch=32, learning_rate=1.5e-3, adapter_rate=1e-3)
 
 
 @dataclass(frozen=True)
 class Encoded:
     """One sentence, ready for the network."""
 
-    states: torch.Tensor  # (T, L, 384) float16
-    surface: torch.Tensor  # (T, 3)
+    tokens: tuple[list[int], Tensor]  # as `WordStates.tokens` gives them
+    surface: Tensor  # (T, 3)
     predicates: tuple[int, ...]
-    tags: torch.Tensor  # (frames, T)
+    tags: Tensor  # (frames, T)
 
     def __len__(self) -> int:
         return len(self.surface)
@@ -51,75 +55,92 @@ class Encoded:
 class SentenceBatch:
     """B sentences with F frames among them, padded to T words."""
 
-    states: torch.Tensor  # (B, T, L, 384)
-    surface: torch.Tensor  # (B, T, 3)
-    mask: torch.Tensor  # (B, T)
-    is_predicate: torch.Tensor  # (B, T) float
-    sentence: torch.Tensor  # (F,) row of the frame's sentence
-    predicate: torch.Tensor  # (F,)
-    tags: torch.Tensor  # (F, T), 0 on pads
+    tokens: TokenBatch
+    surface: Tensor  # (B, T, 3)
+    mask: Tensor  # (B, T)
+    is_predicate: Tensor  # (B, T) float
+    sentence: Tensor  # (F,) row of the frame's sentence
+    predicate: Tensor  # (F,)
+    tags: Tensor  # (F, T), 0 on pads
 
 
-def tag_set(examples: Sequence[Example]) -> tuple[str, ...]:
+def roles_of(examples: Sequence[Example]) -> set[str]:
+    """The roles that occur."""
+    return {a.role for example in examples for frame in example.frames for a in frame.arguments}
+
+
+def tag_set(roles: set[str]) -> tuple[str, ...]:
     """`O`, then B and I of every role, in order of name."""
-    roles = sorted({a.role for example in examples for frame in example.frames for a in frame.arguments})
-    return ("O", *(f"{kind}-{role}" for role in roles for kind in "BI"))
+    return ("O", *(f"{kind}-{role}" for role in sorted(roles) for kind in "BI"))
 
 
-def encode(example: Example, states: WordStates, tags: Sequence[str]) -> Encoded:
-    """Run MiniLM on a sentence and number its tags."""
+def encode(example: Example, words: WordStates, tags: Sequence[str]) -> Encoded:
+    """Find a sentence's tokens and number its tags."""
     index = {tag: number for number, tag in enumerate(tags)}
     targets = torch.zeros(len(example.frames), len(example.words), dtype=torch.long)
     for row, frame in enumerate(example.frames):
         for a in frame.arguments:
             targets[row, a.start] = index[f"B-{a.role}"]
             targets[row, a.start + 1 : a.stop] = index[f"I-{a.role}"]
-    return Encoded(
-        states(example.words).half(),
-        surface_features(example.words),
-        tuple(frame.predicate for frame in example.frames),
-        targets,
-    )
+    ids, pooling = words.tokens(example.words)
+    predicates = tuple(frame.predicate for frame in example.frames)
+    return Encoded((ids, torch.as_tensor(pooling)), surface_features(example.words), predicates, targets)
 
 
 def fit(
-    gold: Sequence[Example],
-    states: WordStates,
+    batches: Iterator[list[Encoded]],
+    minilm: Path,
     network_config: LightConfig,
     config: FitConfig,
     seed: int,
+    start: Weights | None = None,
     progress: Callable[[int, float], None] | None = None,
-) -> LightNetwork:
-    """Train a head on `gold`, its variants and the grammar; the weights are an average over the run.
+) -> Weights:
+    """Train on `batches`; the weights are an average over the last part of the run.
 
     Args:
+        batches: at least `config.steps`, and those that int8 is prepared with.
+        minilm: the folder of MiniLM.
+        start: what to begin with; None = MiniLM as it is, and a random head.
         progress: called with the step and its loss.
     """
     torch.manual_seed(seed)
-    rng = random.Random(seed)  # noqa: S311
     network = LightNetwork(network_config).train()
-    average = [weight.detach().clone() for weight in network.parameters()]
+    if start:
+        network.load_state_dict(start.head)
+    adapted = AdaptedMiniLM(minilm, config.rank, start.updates if start else None)
+    weights = [*network.parameters(), *adapted.parameters()]
+    average = [weight.detach().clone() for weight in weights]
+    groups = [
+        {"params": list(network.parameters()), "weight_decay": config.weight_decay},
+        {"params": list(adapted.parameters()), "weight_decay": 0.0},
+    ]
+    optimizer = torch.optim.AdamW(groups, lr=config.learning_rate)
     allowed = torch.tensor(transition_scores(network_config.tags), dtype=torch.float32)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
-    batches = _batches(gold, states, network_config, config, rng)
-    for step, batch in enumerate(itertools.islice(batches, config.steps)):
-        done = step / config.steps
-        for parameters in optimizer.param_groups:
-            parameters["lr"] = config.learning_rate * _schedule(done)
-        loss = _loss(network, batch, allowed, config.predicate_weight)
+    for step in range(config.steps):
+        rates = (config.learning_rate, config.adapter_rate)
+        for parameters, rate in zip(optimizer.param_groups, rates, strict=True):
+            parameters["lr"] = rate * _schedule(step / config.steps)
+        batch = collate(next(batches))
+        states = adapted(batch.tokens, network_config.layers)
+        loss = _loss(network, states, batch, allowed, config.predicate_weight)
         optimizer.zero_grad()
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        torch.nn.utils.clip_grad_norm_(weights, 1.0)
         optimizer.step()
         decay = min(config.average, (2 + step) / (11 + step))
-        for mean, weight in zip(average, network.parameters(), strict=True):
+        for mean, weight in zip(average, weights, strict=True):
             mean.lerp_(weight.detach(), 1 - decay)
         if progress:
             progress(step, float(loss.detach()))
     with torch.no_grad():
-        for weight, mean in zip(network.parameters(), average, strict=True):
+        for weight, mean in zip(weights, average, strict=True):
             weight.copy_(mean)
-    return network.eval()
+    seen: list[Encoded] = []
+    while len(seen) < SMOOTHING_SENTENCES:
+        seen += next(batches)
+    updates = adapted.updates([token_batch([item.tokens]) for item in seen])
+    return Weights(network_config, network.eval().state_dict(), updates)
 
 
 def _schedule(done: float) -> float:
@@ -127,32 +148,9 @@ def _schedule(done: float) -> float:
     return min(1.0, done / 0.05 + 1e-3) * (0.5 + 0.5 * math.cos(math.pi * done))
 
 
-def _batches(
-    gold: Sequence[Example],
-    states: WordStates,
-    network: LightConfig,
-    config: FitConfig,
-    rng: random.Random,
-) -> Iterator[SentenceBatch]:
-    augmenter = Augmenter(gold, rng)
-    pool = [(example, config.gold_weight) for example in gold]
-    pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in gold]
-    pool += [(augmenter.noise(sentence(rng)), config.grammar_weight) for _ in range(config.grammar)]
-    encoded = [encode(example, states, network.tags) for example, _ in pool]
-    weights = [weight for _, weight in pool]
-    while True:
-        drawn = rng.choices(encoded, weights, k=16 * config.batch)
-        lengths = sorted((len(item) + rng.uniform(-1.5, 1.5), n) for n, item in enumerate(drawn))
-        order = [drawn[n] for _, n in lengths]  # sentences of like length together: little padding
-        chunks = [order[i : i + config.batch] for i in range(0, len(order), config.batch)]
-        rng.shuffle(chunks)
-        yield from map(collate, chunks)
-
-
 def collate(items: Sequence[Encoded]) -> SentenceBatch:
     """Pad sentences to the longest."""
     rows, length = len(items), max(len(item) for item in items)
-    states = torch.zeros(rows, length, *items[0].states.shape[1:])
     surface = torch.zeros(rows, length, items[0].surface.shape[1], dtype=torch.long)
     mask = torch.zeros(rows, length, dtype=torch.bool)
     is_predicate = torch.zeros(rows, length)
@@ -161,17 +159,21 @@ def collate(items: Sequence[Encoded]) -> SentenceBatch:
     at = 0
     for row, item in enumerate(items):
         words = len(item)
-        states[row, :words], surface[row, :words], mask[row, :words] = item.states.float(), item.surface, True
+        surface[row, :words], mask[row, :words] = item.surface, True
         is_predicate[row, list(item.predicates)] = 1.0
         tags[at : at + len(item.tags), :words] = item.tags
         at += len(item.tags)
     sentences = torch.tensor([row for row, _ in frames], dtype=torch.long)
     predicates = torch.tensor([predicate for _, predicate in frames], dtype=torch.long)
-    return SentenceBatch(states, surface, mask, is_predicate, sentences, predicates, tags)
+    tokens = token_batch([item.tokens for item in items])
+    return SentenceBatch(tokens, surface, mask, is_predicate, sentences, predicates, tags)
 
 
-def _loss(network: LightNetwork, batch: SentenceBatch, allowed: torch.Tensor, predicate_weight: float) -> torch.Tensor:
-    hidden = network.read(batch.states, batch.surface, batch.mask)
+def _loss(
+    network: LightNetwork, states: Tensor, batch: SentenceBatch, allowed: Tensor, predicate_weight: float
+) -> Tensor:
+    """Of predicates, and of the tags of frames whose predicate is given."""
+    hidden = network.read(states, batch.surface, batch.mask)
     logits = network.predicate_logits(hidden)[batch.mask]
     loss = predicate_weight * F.binary_cross_entropy_with_logits(logits, batch.is_predicate[batch.mask])
     if not len(batch.predicate):
@@ -181,9 +183,7 @@ def _loss(network: LightNetwork, batch: SentenceBatch, allowed: torch.Tensor, pr
     return loss + crf_loss(emissions, batch.tags, mask, network.transitions, allowed).sum() / mask.sum()
 
 
-def crf_loss(
-    emissions: torch.Tensor, tags: torch.Tensor, mask: torch.Tensor, transitions: torch.Tensor, allowed: torch.Tensor
-) -> torch.Tensor:
+def crf_loss(emissions: Tensor, tags: Tensor, mask: Tensor, transitions: Tensor, allowed: Tensor) -> Tensor:
     """Negative log-likelihood (F,) of tag sequences under a linear-chain CRF whose forbidden steps have no mass.
 
     Args:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace as replace_fields
 from pathlib import Path
 
 import pytest
@@ -13,14 +14,16 @@ from hypothesis import strategies as st
 from shared.bundles import Bundle
 from shared.errors import InvalidFile
 from shared.text.encoders import find_weights
-from shared.text.light import LightLabeller, WordStates
+from shared.text.light import LightLabeller
 from shared.text.light_network import LightConfig
 from shared.text.roles import Argument, Frame
-from workers.training.labeller import Recipe, cross_validate, pack
+from workers.training.labeller import Recipe, cross_validate
 from workers.training.labeller_card import card
 from workers.training.labeller_data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
-from workers.training.labeller_fit import FitConfig, fit, tag_set
+from workers.training.labeller_fit import FitConfig, roles_of, tag_set
 from workers.training.labeller_grammar import Example, sentence
+from workers.training.labeller_pack import pack
+from workers.training.labeller_pools import CaptionPool, caption_batches
 from workers.training.labeller_score import Scores
 
 WALK = Example(
@@ -118,6 +121,23 @@ def test_gold_loses_auxiliaries_without_arguments_only(tmp_path: Path) -> None:
         read_gold(file)
 
 
+def test_gold_is_read_as_the_repository_has_it_too(tmp_path: Path) -> None:
+    entry = {
+        "caption": "he is walking",
+        "tokens": ["he/PRON", "is/AUX", "walk/VERB"],
+        "V": {"0": {"role": "V", "spans": [1]}, "1": {"role": "V", "spans": [2]}},
+        "entities": {"0": {"role": "ARG0", "spans": [0]}},
+        "relations": [[1, 0, "ARG0"]],
+    }
+    file = tmp_path / "new_test_data.json"
+    file.write_text(json.dumps({"02346": [entry], "00355": []}))
+    assert read_gold(file) == [Example(("he", "is", "walking"), (Frame(2, (Argument("ARG0", 0, 1),)),))]
+    del entry["relations"]
+    file.write_text(json.dumps({"02346": [entry]}))
+    with pytest.raises(InvalidFile):
+        read_gold(file)
+
+
 def test_training_leaves_out_the_parser_s_known_mistakes() -> None:
     lost = Example(("A", "person", "waves."), ())
     left = Example(("turns", "left"), (Frame(0, ()), Frame(1, ())))
@@ -135,59 +155,61 @@ def test_scores_count_exact_span_and_role() -> None:
     assert scores.by_role["ARGM-TMP"].f1 == 0
 
 
-@pytest.fixture(scope="module")
-def tiny() -> LightConfig:
-    return LightConfig(tags=tag_set([WALK, WAVE]), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
+NOTHING = CaptionPool(variants=0, grammar=0, propbank=0)
 
 
 @pytest.fixture(scope="module")
-def states(tiny: LightConfig) -> WordStates:
-    return WordStates(find_weights("minilm"), tiny.layers)
+def recipe() -> Recipe:
+    network = LightConfig(tag_set(roles_of([WALK, WAVE])), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
+    config = FitConfig(steps=60, batch=8, learning_rate=4e-3, rank=2)
+    return Recipe(find_weights("minilm"), network, config, NOTHING, 0)
 
 
-def test_a_small_head_learns_two_sentences_and_survives_its_bundle(
-    tiny: LightConfig, states: WordStates, tmp_path: Path
-) -> None:
-    config = FitConfig(steps=120, batch=8, variants=0, grammar=0)
-    losses: list[float] = []
-    head = fit([WALK, WAVE], states, tiny, config, seed=0, progress=lambda _, loss: losses.append(loss))
-    assert losses[-1] < 0.3 * losses[0]
-    labeller = LightLabeller(head, states, "")
+def test_a_small_head_learns_two_sentences_and_survives_its_bundle(recipe: Recipe, tmp_path: Path) -> None:
+    weights = recipe.make([WALK, WAVE])
+    labeller = weights.labeller(recipe.minilm)
     assert labeller.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
 
     gold = tmp_path / "gold.json"
     gold.write_text("[]")
-    recipe = Recipe(states, tiny, config, 0)
-    bundle = pack(tmp_path / "srl-tiny", head, find_weights("minilm"), gold, recipe, None)
+    bundle = pack(tmp_path / "srl-tiny", weights, [gold], recipe, None)
     again = LightLabeller.load(Bundle.open(bundle.path))
     assert again.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
     assert again.sha256 == bundle.weights_sha256
+    assert bundle.manifest.licence == "Apache-2.0"
 
 
-def test_training_is_repeatable(tiny: LightConfig, states: WordStates) -> None:
-    config = FitConfig(steps=6, batch=4, variants=1, grammar=4)
+def test_training_is_repeatable(recipe: Recipe) -> None:
     gold = [WALK, WAVE]
-    roles = tag_set([*gold, *(sentence(random.Random(i)) for i in range(300))])
-    network = LightConfig(**{**tiny.__dict__, "tags": roles})
-    one, two = (fit(gold, states, network, config, seed=5) for _ in range(2))
-    assert all((a == b).all() for a, b in zip(one.parameters(), two.parameters(), strict=True))
+    roles = tag_set(roles_of([*gold, *(sentence(random.Random(i)) for i in range(300))]))
+    short = replace_fields(
+        recipe,
+        network=replace_fields(recipe.network, tags=roles),
+        config=FitConfig(steps=3, batch=4, rank=2),
+        pool=CaptionPool(variants=1, grammar=4),
+    )
+    one, two = short.make(gold), short.make(gold)
+    for mine, theirs in ((one.head, two.head), (one.updates, two.updates)):
+        assert all((mine[name] == theirs[name]).all() for name in mine)
 
 
-def test_cross_validation_never_scores_a_caption_it_trained_on(
-    tiny: LightConfig, states: WordStates, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cross_validation_never_scores_a_caption_it_trained_on(recipe: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
     gold = distinct([Example((*WAVE.words[:4], f"hand{i}"), WAVE.frames) for i in range(6)])
     trained: list[set[tuple[str, ...]]] = []
 
     def spy(examples: list[Example], *rest: object) -> object:
         trained.append({example.words for example in examples})
-        return fit(examples, *rest)  # type: ignore[arg-type]
+        return caption_batches(examples, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("workers.training.labeller.fit", spy)
-    recipe = Recipe(states, tiny, FitConfig(steps=1, batch=2, variants=0, grammar=0), 0)
-    result = cross_validate(gold, recipe, 2)
+    monkeypatch.setattr("workers.training.labeller.caption_batches", spy)
+    lost = Example(("Someone", "waves."), ())  # the parser found no verb
+    short = replace_fields(recipe, config=FitConfig(steps=1, batch=8, rank=2))
+    result = cross_validate([*gold[:3], gold[0]], [*gold[2:], lost], short, 2)
     everything = {example.words for example in gold}
-    assert result.scores.predicates.wanted == 6
+    wanted = {name: getattr(result, name).predicates.wanted for name in ("occurring", "distinct", "parsed", "every")}
+    assert wanted == {"occurring": 4, "distinct": 3, "parsed": 3, "every": 6}
+    assert result.every.predicates.said >= result.every_parsed.predicates.said
+    trained = [{words for words in each if words != lost.words} for each in trained]
     assert trained[0] | trained[1] == everything
     assert not trained[0] & trained[1]
     assert "2-fold" in card(result)

@@ -153,11 +153,13 @@ def test_a_head_of_another_minilm_is_refused() -> None:
 def test_the_bundle_is_small_and_says_where_it_comes_from() -> None:
     bundle = find_bundle("srl-light")
     assert bundle.manifest.kind == "labeller"
-    assert sum(entry.bytes for entry in bundle.manifest.files.values()) < 3_000_000
+    assert sum(entry.bytes for entry in bundle.manifest.files.values()) < 4_000_000
     assert "GraphMotion" in bundle.manifest.data[0].credit
     card = (bundle.path / "README.md").read_text()
     assert "argument F1" in card
-    assert bundle.manifest.metrics["cv_argument_f1"] > 0.7
+    # the targets: where the parser found a verb at all (docs/decisions/0010-roles-from-propbank.md)
+    assert bundle.manifest.metrics["cv_parsed_predicate_f1"] >= 0.96
+    assert bundle.manifest.metrics["cv_parsed_argument_f1"] >= 0.82
 
 
 def test_pads_do_not_change_the_scores() -> None:
