@@ -28,8 +28,8 @@ NEVER = 2**62
 """More frames than any session makes."""
 TOKEN_STREAM, END_STREAM = 4, 5
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""
-EARLIEST = 0.75
-"""Share of its usual frames after which an act may end."""
+EARLIEST, STOPS = 0.75, 1.7
+"""Shares of its usual frames after which an act may end, and at which its clock stops: even long ones are over then."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class StreamState:
     skipped: Tensor  # (S,) int64 frames that were made before the cache begins
     ends_from: Tensor  # (S,) int64: frames after which the session may draw END; NEVER: it runs until it is stopped
     began: Tensor  # (S,) int64 frames made when the act that plays began
-    usual: Tensor  # (S,) int64 frames that it usually takes; NEVER where nobody says
+    stops: Tensor  # (S,) int64 frames of it after which its clock stops; NEVER where nobody says how long it takes
     ended: Tensor  # (S,) bool: it drew END, and from then on columns of -1
     last: Tensor  # (S, V) int64, the newest column; -1 before the first
     opening: Tensor  # (S, L, w) states of position 0, from which frame 1 is drawn
@@ -60,7 +60,7 @@ class StreamState:
             skipped=whole[2],
             ends_from=whole[3] + NEVER,
             began=whole[4],
-            usual=whole[5] + NEVER,
+            stops=whole[5] + NEVER,
             ended=whole[3].bool(),
             last=torch.full((sessions, model.levels), -1, device=device),
             opening=torch.zeros(sessions, lanes, t.width, device=device),
@@ -87,7 +87,7 @@ class _Plan:
     ends_from: int  # of the last one
     number: int = -1  # of the act that plays; none does yet
     earliest: int = 0  # frames of the session after which the act that plays may end
-    usual: int = NEVER  # frames that the act that plays usually takes
+    stops: int = NEVER  # frames of the act that plays after which its clock stops
 
     @classmethod
     def of(cls, sentence: Tensor, ends_from: int, lasts: Sequence[int] | None) -> _Plan:
@@ -100,7 +100,7 @@ class _Plan:
         acts, lasts = self.acts[skipped:], self.lasts[skipped:]
         self.until = began + lasts[0]
         self.earliest = began + (0 if lasts[0] == NEVER else int(EARLIEST * lasts[0]))
-        self.usual = lasts[0]
+        self.stops = NEVER if lasts[0] == NEVER else int(STOPS * lasts[0])
         self.acts, self.lasts = acts[1:], lasts[1:]
         self.number += 1 + skipped
         return acts[0]
@@ -244,7 +244,7 @@ class Streams:
         x = self.model.columns(state.last[:active, None])[:, :, 0].repeat(1, self.branches, 1)  # (s, L, w)
         x = x + state.told[:active]
         if self.packed.times is not None:
-            rows = (part[:active] for part in (state.made, state.began, state.usual))
+            rows = (part[:active] for part in (state.made, state.began, state.stops))
             x[:, : self.model.lanes] += self._time(*rows)[:, None]  # guidance's other branch is told nothing
         for layer, step in enumerate(self.packed.steps):
             x = step(x, state.memory[layer, :, :active], self.packed.terms[layer], slots)
@@ -287,7 +287,7 @@ class Streams:
         """Tell a row the next act of its plan, or the one that plays already."""
         began = began or Begun(int(self.state.made[row]), 0)
         act = plan.take(began.frame, began.act)
-        self.state.began[row], self.state.usual[row] = began.frame, plan.usual
+        self.state.began[row], self.state.stops[row] = began.frame, plan.stops
         self._read(row, act, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
         shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.acts) else 0
         ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
@@ -303,7 +303,7 @@ class Streams:
         position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1
         frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + told[:, None, None]
         if self.packed.times is not None:
-            frames[0] += self._time(1 + position, self.state.began[row], self.state.usual[row])
+            frames[0] += self._time(1 + position, self.state.began[row], self.state.stops[row])
         x = torch.cat([prompt[:, :, None], frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
         self.state.told[row] = told.repeat_interleave(self.model.lanes, 0)
         reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
@@ -319,12 +319,12 @@ class Streams:
             x = block(x, attend)
         self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, 0])
 
-    def _time(self, made: Tensor, began: Tensor, usual: Tensor) -> Tensor:
-        """What frames of one act are told, (n, w). An act that goes on although its usual frames are over, as the last
-        one of a stream does, stays at their end: who told a raised hand that more time passed would see it wave."""
+    def _time(self, made: Tensor, began: Tensor, stops: Tensor) -> Tensor:
+        """What frames of one act are told, (n, w). The last act of a stream goes on although it is over, and its clock
+        stops: whoever was told that more time passed would raise a hand again and again, which is a wave."""
         times = self.packed.times
         assert times is not None
-        since = torch.minimum(made - began, usual).clamp(0, len(times) - 1)
+        since = torch.minimum(made - began, stops).clamp(0, len(times) - 1)
         return times[since].masked_fill((made < began)[..., None], 0)
 
     def _slots(self, active: int) -> Slots:

@@ -11,7 +11,7 @@ from shared.streams.acts import Begun
 from workers.mogo.clock import UNTOLD, Clock
 from workers.mogo.config import TINY
 from workers.mogo.packed_model import PackedModel
-from workers.mogo.streaming import Streams
+from workers.mogo.streaming import STOPS, Streams
 
 from .networks import columns, prompts, transformer
 
@@ -49,14 +49,16 @@ def test_training_keeps_the_time_of_some_acts_to_itself_each_whole() -> None:
     assert made.eval().of_acts(400, 6, None, None).any(-1).all()
 
 
-@pytest.mark.parametrize(("frame", "told"), [(4, True), (5, False)])
-def test_an_act_that_goes_on_stays_at_the_end_of_its_usual_frames(frame: int, told: bool) -> None:
+@pytest.mark.parametrize(("frame", "told"), [(6, True), (7, False)])
+def test_the_clock_of_an_act_that_goes_on_although_it_is_over_stops(frame: int, told: bool) -> None:
+    usual = 4
+    assert int(STOPS * usual) == 6
     packed = PackedModel(transformer())
     assert packed.times is not None
 
     def state() -> torch.Tensor:
         streams = Streams(packed, 1)
-        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=Begun(0, 0), lasts=[4])
+        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=Begun(0, 0), lasts=[usual])
         return streams.states()
 
     before = state()
