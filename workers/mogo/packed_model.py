@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 
 import torch
+import torch.nn.functional as F
 
 from shared.nn.compiled import compiled
 from shared.nn.packed import is_small, pack_linears
@@ -37,7 +38,9 @@ class PackedModel:
         self.blocks = self.network.trunk.layers
         self.terms = [block.attention.terms(self.network.trunk.sinusoids).contiguous() for block in self.blocks]
         clock = self.network.clock
-        self.times = None if clock is None else clock(torch.arange(len(clock.sinusoids), device=self.device))
+        told = torch.arange(self.network.config.max_frames + 1, device=self.device)
+        # the last row, `UNTOLD`: nothing
+        self.times = None if clock is None else F.pad(clock(told), (0, 0, 0, 1))
         pack_linears(self.network, dtype, group=group)
         self.steps = [compiled(TrunkStep(block)) for block in self.blocks]
         self.depth = None if self.network.depth is None else compiled(DepthStep(self.network.depth))

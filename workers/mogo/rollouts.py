@@ -51,14 +51,14 @@ class Rollouts:
         they are done."""
         network = self._packed.network
         sentences = self._captions.sentences(self._captions.choose(np.asarray(clips), self._rng))
-        lasts = network.pace(network.prompt.standardised(sentences)).tolist()
         frames = self._rng.integers(min(LEAST, most), min(MOST, most) + 1, len(clips)).tolist()
         streams, waiting = Streams(self._packed, min(SESSIONS, len(clips))), list(range(len(clips)))[::-1]
         playing: dict[int, tuple[int, list[Tensor]]] = {}  # session to its clip and what it showed
         while waiting or playing:
             while waiting and len(playing) < streams.capacity:
                 row = waiting.pop()
-                playing[streams.start(sentences[row], row, lasts=[lasts[row]])] = row, []
+                lasts = network.natural_frames(sentences[row : row + 1])
+                playing[streams.start(sentences[row], row, lasts=lasts)] = row, []
             for session, column in streams.step().items():
                 row, columns = playing[session]
                 columns.append(column)

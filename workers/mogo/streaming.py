@@ -20,6 +20,7 @@ from shared.errors import InvalidInput
 from shared.nn.sampling import guide, sample_top_k, uniform
 from shared.streams.acts import Begun
 from workers.mogo.attention import HIDDEN, RelativeAttention, Slots
+from workers.mogo.clock import UNTOLD
 from workers.mogo.config import InferenceConfig
 from workers.mogo.depth import DepthFrame
 from workers.mogo.packed_model import PackedModel
@@ -324,8 +325,7 @@ class Streams:
         stops: whoever was told that more time passed would raise a hand again and again, which is a wave."""
         times = self.packed.times
         assert times is not None
-        since = torch.minimum(made - began, stops).clamp(0, len(times) - 1)
-        return times[since].masked_fill((made < began)[..., None], 0)
+        return times[torch.minimum(made - began, stops).clamp(UNTOLD, self.farthest)]
 
     def _slots(self, active: int) -> Slots:
         """Where the active rows stand. Slot p holds frame p, frame p + W, …; slot 0 the prompt."""

@@ -3,7 +3,7 @@
     python -m workers.training.labeller --gold srl-kit-dev.json new_test_data.json \\
         --propbank propbank-release --words UD_English-EWT -o models/srl-light
 
-MiniLM's updates and the head learn PropBank first (a quarter of an hour on one CPU core), then the captions (three
+MiniLM's updates and the head learn PropBank first (25 minutes on one CPU core), then the captions (three
 minutes a fold). Folds are grouped by caption without case and punctuation; augmentation draws its phrases from
 the training folds alone, and PropBank has no captions.
 """
