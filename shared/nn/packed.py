@@ -1,4 +1,5 @@
 """Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on rows beside it.
+Elsewhere `lower_linears` only halves what is read.
 
 `torch.nn.functional.linear` takes other kernels, which add in another order, for fewer than some 18 rows. oneDNN's
 packed product in float32 does so for a single row alone: measured with torch 2.13 on AVX-512 for 16 shapes, 2 to 192
@@ -10,6 +11,8 @@ while they are few. So what is drawn frame by frame goes through `GroupedLinear`
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import torch
 import torch.nn.functional as F
@@ -103,6 +106,22 @@ class GroupedLinear(nn.Module):
         return products.view(sessions + missing, rows, -1)[:sessions]
 
 
+class LoweredLinear(nn.Module):
+    """The inference twin of a linear layer whose weights have fewer bits than what goes in and comes out: for devices
+    that multiply such matrices fast."""
+
+    def __init__(self, linear: nn.Linear, dtype: torch.dtype) -> None:
+        """Cast a layer's weights to `dtype`."""
+        super().__init__()
+        self.weight = linear.weight.detach().to(dtype)
+        bias = _bias(linear)
+        self.bias = None if bias is None else bias.to(dtype)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """(…, in) -> (…, out), no gradient."""
+        return F.linear(x.to(self.weight.dtype), self.weight, self.bias).to(x.dtype)
+
+
 def is_small(module: nn.Module) -> bool:
     """Whether all matrices are: then products of a session each, on one thread, lose next to nothing."""
     return all(part.weight.numel() <= SMALL for part in module.modules() if isinstance(part, nn.Linear))
@@ -128,13 +147,20 @@ def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, group
         dtype: of the weights.
         group: None = `PackedLinear`, else `GroupedLinear` of so many sessions.
     """
-    if not can_pack(module):
-        return
+    if can_pack(module):
+        _replace(module, lambda each: GroupedLinear(each, dtype, group=group) if group else PackedLinear(each, dtype))
+
+
+def lower_linears(module: nn.Module, dtype: torch.dtype) -> None:
+    """Replace every linear layer in `module` by one with weights of `dtype`, on any device."""
+    _replace(module, lambda each: LoweredLinear(each, dtype))
+
+
+def _replace(module: nn.Module, twin: Callable[[nn.Linear], nn.Module]) -> None:
     for parent in list(module.modules()):
         for name, child in list(parent.named_children()):
             if isinstance(child, nn.Linear):
-                packed = PackedLinear(child, dtype) if group is None else GroupedLinear(child, dtype, group=group)
-                setattr(parent, name, packed)
+                setattr(parent, name, twin(child))
 
 
 def _bias(linear: nn.Linear) -> Tensor | None:

@@ -98,6 +98,7 @@ class LookBack(nn.Module):
         super().__init__()
         self.heads = attention.heads
         self.qkv, self.out = attention.qkv, attention.out
+        self.rowwise = attention.u.device.type == "cpu"
         self.u = attention.u.detach().view(1, attention.heads, 1, -1)
         self.v = attention.v.detach().view(1, attention.heads, 1, -1)
 
@@ -106,20 +107,28 @@ class LookBack(nn.Module):
 
         Args:
             x: (S, L, w).
-            memory: (2, S, H, L, slots, w / H) keys and values; the new position's are put into it.
+            memory: (2, S, H, L, slots, w / H) keys and values, in the type of the products over them; the new
+                position's are put into it.
             terms: from `RelativeAttention.terms`.
             slots: where the sessions stand.
         """
         sessions, lanes = x.size(0), x.size(1)
         qkv = self.qkv(x).view(sessions, lanes, 3, self.heads, -1).permute(0, 2, 3, 1, 4)  # (S, 3, H, L, w / H)
         query = qkv[:, 0]
-        memory[:, slots.rows, :, :, slots.newest] = qkv[:, 1:]
-        # session by session: with more rows some processors' products add in another order
-        about = (query + self.v).unbind()
-        positions = torch.stack([torch.bmm(each, terms) for each in about])  # (S, H, L, D + 1)
+        memory[:, slots.rows, :, :, slots.newest] = qkv[:, 1:].to(memory.dtype)
+        positions = self._positions(query + self.v, terms)  # (S, H, L, D + 1)
         bias = positions.gather(3, slots.distance.expand(-1, self.heads, lanes, -1)) + slots.hidden
         key, value = memory[0].flatten(0, 2), memory[1].flatten(0, 2)  # (S · H · L, slots, w / H)
-        content = (query + self.u).reshape(key.size(0), 1, -1)
-        scores = torch.baddbmm(bias.view(key.size(0), 1, -1), content, key.transpose(1, 2), alpha=key.size(2) ** -0.5)
-        mixed = torch.bmm(scores.softmax(-1), value).view(sessions, self.heads, lanes, -1)
+        content = (query + self.u).reshape(key.size(0), 1, -1).to(key.dtype)
+        bias = bias.view(key.size(0), 1, -1).to(key.dtype)
+        scores = torch.baddbmm(bias, content, key.transpose(1, 2), alpha=key.size(2) ** -0.5)
+        weights = scores.float().softmax(-1).to(value.dtype)
+        mixed = torch.bmm(weights, value).view(sessions, self.heads, lanes, -1).to(x.dtype)
         return self.out(mixed.transpose(1, 2).reshape(sessions, lanes, -1))
+
+    def _positions(self, query: Tensor, terms: Tensor) -> Tensor:
+        """(q + v)·φ_d of all distances (S, H, L, D + 1), from q + v (S, H, L, w / H)."""
+        if self.rowwise:  # session by session: with more rows some processors' products add in another order
+            return torch.stack([torch.bmm(each, terms) for each in query.unbind()])
+        together = torch.bmm(query.transpose(0, 1).flatten(1, 2), terms)  # one product for each head
+        return together.view(self.heads, query.size(0), query.size(2), -1).transpose(0, 1)

@@ -19,7 +19,8 @@ from workers.mogo.bundle import load_networks
 from workers.mogo.config import InferenceConfig, MOGOConfig
 from workers.mogo.model import RQHCTransformer
 from workers.mogo.packed_model import PackedModel, sessions_of_product
-from workers.mogo.streaming import NEVER, Streams
+from workers.mogo.state import NEVER
+from workers.mogo.streaming import Streams
 from workers.mogo.tokenizer import Tokenizer
 
 MAX_SESSIONS = 32
@@ -205,11 +206,12 @@ class _Drawing:
             self.playing[self._start(self.requests[row], self.lasts[row])] = row
         if not self.playing:
             return False
-        for session, column in self.streams.step().items():
+        drawn = self.streams.step()
+        ends = (torch.stack(list(drawn.values()))[:, 0] < 0).tolist()  # the device is asked once for all of them
+        for (session, column), ended in zip(drawn.items(), ends, strict=True):
             row = self.playing[session]
             columns = self.columns[row]
             assert columns is not None
-            ended = bool(column[0] < 0)
             if not ended:
                 columns.append(column)
             if ended or len(columns) == self.frames[row]:

@@ -72,6 +72,7 @@ class LiveRoom:
         self.skeleton = generator.layout.skeleton
         self.capacity = capacity
         self._streams = Streams(generator.packed(capacity), capacity, inference)
+        self._streams.prepare()
         self._motion = LiveMotion(generator.layout, self.skeleton)
         self._rows: list[int] = []  # the session in each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)

@@ -1,5 +1,5 @@
-"""The inference twin of a model: matrices packed, steps compiled, position terms computed once; any number of
-`Streams` share it."""
+"""The inference twin of a model: matrices packed or in fewer bits, steps compiled, position terms computed once; any
+number of `Streams` share it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import copy
 import torch
 import torch.nn.functional as F
 
-from shared.nn.compiled import compiled
-from shared.nn.packed import is_small, pack_linears
+from shared.nn.compiled import Module, compiled
+from shared.nn.packed import is_small, lower_linears, pack_linears
 from workers.mogo.depth import DepthStep
 from workers.mogo.model import RQHCTransformer, TrunkStep
 
@@ -30,7 +30,8 @@ class PackedModel:
 
         Args:
             model: stays as it is.
-            dtype: of the packed matrices on a CPU; bfloat16 halves what a frame reads.
+            dtype: of the matrices; bfloat16 halves what a frame reads. On a GPU also of the keys and values that
+                sessions keep.
             group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
         """
         self.network = copy.deepcopy(model).eval().requires_grad_(False)
@@ -41,6 +42,17 @@ class PackedModel:
         told = torch.arange(self.network.config.max_frames + 1, device=self.device)
         # the last row, `UNTOLD`: nothing
         self.times = None if clock is None else F.pad(clock(told), (0, 0, 0, 1))
-        pack_linears(self.network, dtype, group=group)
-        self.steps = [compiled(TrunkStep(block)) for block in self.blocks]
-        self.depth = None if self.network.depth is None else compiled(DepthStep(self.network.depth))
+        on_cpu = self.device.type == "cpu"
+        self.kept = torch.float32 if on_cpu else dtype  # type of keys and values
+        if on_cpu:
+            pack_linears(self.network, dtype, group=group)
+        else:
+            lower_linears(self.network, dtype)
+        # elsewhere calls are recorded and replayed, and a compiler that looks on would record itself
+        made = compiled if on_cpu else _as_it_is
+        self.steps = [made(TrunkStep(block)) for block in self.blocks]
+        self.depth = None if self.network.depth is None else made(DepthStep(self.network.depth))
+
+
+def _as_it_is(module: Module) -> Module:
+    return module

@@ -139,9 +139,9 @@ def made_once(
 ) -> Mapping[str, Tensor]:
     """Whole numbers, int64, among them `tokens`: read from a file that has this key, else made, and kept there."""
     if file.is_file():
-        values = load_file(file, device=str(device))
-        if values.pop("key").cpu().numpy().tobytes() == key.encode():
-            return {name: value.long() for name, value in values.items()}
+        values = load_file(file)
+        if values.pop("key").numpy().tobytes() == key.encode():
+            return {name: value.to(device).long() for name, value in values.items()}
     made = {name: value.long() for name, value in make().items()}
     if distributed.rank() == 0:
         values = {name: value.int() for name, value in made.items()}

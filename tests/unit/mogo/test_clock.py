@@ -11,7 +11,8 @@ from shared.streams.acts import Begun
 from workers.mogo.clock import UNTOLD, Clock
 from workers.mogo.config import TINY
 from workers.mogo.packed_model import PackedModel
-from workers.mogo.streaming import STOPS, Streams
+from workers.mogo.plan import STOPS
+from workers.mogo.streaming import Streams
 
 from .networks import columns, prompts, transformer
 

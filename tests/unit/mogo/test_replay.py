@@ -1,0 +1,94 @@
+"""Steps of a fixed number of rows, recorded or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from tests.support.prepared import text_features
+from workers.mogo.bundle import random_bundle
+from workers.mogo.config import TINY
+from workers.mogo.generate import Generator
+from workers.mogo.live import LiveRoom
+from workers.mogo.packed_model import PackedModel
+from workers.mogo.replay import Replayed, row_counts
+from workers.mogo.streaming import Streams
+
+from .networks import columns, opened, prompts, transformer
+
+CUDA = torch.device("cuda", 0)
+on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device here")
+
+
+def played(streams: Streams, device: str | torch.device = "cpu") -> torch.Tensor:
+    """Columns of sessions that join, are steered, leave, and make room for others."""
+    asked = prompts(6)[:, 0].to(device)
+    first = streams.start(asked[0], 1)
+    shown = [streams.step()[first] for _ in range(5)]
+    second, third = (
+        streams.start(asked[1], 2, past=columns(7)[0].to(device)),
+        streams.start(asked[2:4], 3, lasts=[6, 9]),
+    )
+    shown += [column for _ in range(12) for column in streams.step().values()]
+    streams.steer(second, asked[4])
+    streams.stop(first)
+    shown += [column for _ in range(4) for column in streams.step().values()]
+    streams.stop(third)
+    streams.start(asked[5], 4)
+    shown += [column for _ in range(20) for column in streams.step().values()]
+    return torch.stack(shown).cpu()
+
+
+@pytest.mark.parametrize("guidance", [1.0, 2.5])
+def test_rows_that_nobody_sits_in_change_nothing_where_they_are_computed_along(guidance: float) -> None:
+    model, config = transformer(), replace(TINY.inference, guidance=guidance)
+    alone, along = (opened(model, 4, config) for _ in range(2))
+    step = along._draw
+    along._draw = lambda rows: step(4)[:rows].clone()
+    assert torch.equal(played(along), played(alone))
+
+
+def test_steps_are_recorded_for_powers_of_two_of_rows_and_for_all_of_them() -> None:
+    assert [row_counts(capacity) for capacity in (1, 2, 3, 8, 12)] == [
+        [1], [1, 2], [1, 2, 3], [1, 2, 4, 8], [1, 2, 4, 8, 12],
+    ]  # fmt: skip
+
+
+@pytest.mark.gpu
+@on_a_gpu
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_a_recorded_step_draws_what_the_step_itself_draws(dtype: torch.dtype) -> None:
+    packed = PackedModel(transformer().to(CUDA), dtype=dtype)
+    recorded, direct = Streams(packed, 4), Streams(packed, 4)
+    assert isinstance(recorded._draw, Replayed)
+    recorded.prepare()
+    step = direct._next
+    direct._draw = lambda rows: step(next(count for count in row_counts(4) if count >= rows))[:rows].clone()
+    assert torch.equal(played(recorded, CUDA), played(direct, CUDA))
+
+
+@pytest.mark.gpu
+@on_a_gpu
+def test_states_on_a_gpu_are_those_of_the_processor() -> None:
+    model, tokens, asked = transformer(), columns(20)[0], prompts(1)[0, 0]
+    here, there = Streams(PackedModel(model), 1), Streams(PackedModel(model.to(CUDA)), 1)
+    here.start(asked, 1)
+    there.start(asked.to(CUDA), 1)
+    for column in tokens:
+        torch.testing.assert_close(there.states().cpu(), here.states(), atol=1e-4, rtol=1e-4)
+        here.accept(column[None])
+        there.accept(column[None].to(CUDA))
+
+
+@pytest.mark.gpu
+@on_a_gpu
+def test_a_room_on_a_gpu_shows_frames(tmp_path: Path) -> None:
+    generator = Generator.load(random_bundle(tmp_path / "random", "tiny"), device="cuda")
+    room = LiveRoom(generator, 3)
+    names = [room.start(text_features(seed), seed) for seed in range(3)]
+    frames = [room.step() for _ in range(30)]
+    assert all(np.isfinite(shown[name].frame.root).all() for shown in frames for name in names)
