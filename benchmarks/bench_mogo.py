@@ -53,7 +53,7 @@ def _paper(generator: Generator) -> None:
         ("window 196, guidance", 3.0, 196),
     ):
         streams = _streams(generator, guidance, window)
-        streams.start(_sentence(generator), 1)
+        streams.start(sentence(generator), 1)
         _run(streams.step, window)
         runs[name] = lambda streams=streams: _run(streams.step, FRAMES)
     timings = measure(runs, repeats=6, warm_up=0, seconds=120)
@@ -70,11 +70,11 @@ def _without_cache(generator: Generator) -> None:
     past = torch.randint(codes, (max(LENGTHS), generator.config.tokenizer.levels))
 
     def again(frames: int) -> None:
-        streams.stop(streams.start(_sentence(generator), 1, past=past[:frames]))
+        streams.stop(streams.start(sentence(generator), 1, past=past[:frames]))
 
     for frames in LENGTHS:
         cached = _streams(generator, 1.0, max(LENGTHS))
-        cached.start(_sentence(generator), 1, past=past[:frames])
+        cached.start(sentence(generator), 1, past=past[:frames])
         runs = {"cached": cached.step, "read again": lambda frames=frames: again(frames)}
         timings = measure(runs, repeats=7, seconds=30)
         ratio = timings[1].median / timings[0].median
@@ -89,7 +89,7 @@ def _starter(generator: Generator) -> None:
     for sessions in (1, 2, 4, 8, 16, 32):
         room = LiveRoom(generator, sessions)
         for seed in range(sessions):
-            room.start(_text(generator), seed)
+            room.start(text(generator), seed)
         _run(room.step, generator.config.inference.window)
         steps = sorted(_seconds(room.step) for _ in range(FRAMES))
         rate = 1 / statistics.median(steps)
@@ -102,10 +102,10 @@ def _starter(generator: Generator) -> None:
 
 
 def _first_frame(generator: Generator) -> None:
-    room, text = LiveRoom(generator, 1), _text(generator)
+    room, asked = LiveRoom(generator, 1), text(generator)
 
     def first() -> None:
-        session = room.start(text, 1)
+        session = room.start(asked, 1)
         room.step()
         room.stop(session)
 
@@ -115,7 +115,7 @@ def _first_frame(generator: Generator) -> None:
 def _memory(generator: Generator) -> None:
     """What is resident now: the peak of the process, which `paper` has set, would hide what a stream gathers."""
     room = LiveRoom(generator, 1)
-    room.start(_text(generator), 1)
+    room.start(text(generator), 1)
     _run(room.step, 500)
     before = _resident_mib()
     _run(room.step, ENDLESS)
@@ -127,7 +127,8 @@ def _streams(generator: Generator, guidance: float, window: int) -> Streams:
     return Streams(generator.packed(1), 1, inference)
 
 
-def _sentence(generator: Generator) -> torch.Tensor:
+def sentence(generator: Generator) -> torch.Tensor:
+    """Features (W,) of a prompt that says nothing."""
     return torch.zeros(generator.config.condition.text_width)
 
 
@@ -137,7 +138,8 @@ def _seconds(step: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def _text(generator: Generator) -> TextFeatures:
+def text(generator: Generator) -> TextFeatures:
+    """Features of a made-up prompt."""
     graph = SemanticGraph("-", ("-",), (Node(0, "motion", "-", ()),), ())
     vector = np.random.default_rng(0).normal(size=(1, generator.config.condition.text_width))
     return TextFeatures("-", "-", graph, vector.astype(np.float16))
