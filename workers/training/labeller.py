@@ -20,7 +20,7 @@ from pathlib import Path
 
 import torch
 
-from shared.errors import MareyError
+from shared.errors import InvalidInput, MareyError
 from shared.text.encoders import find_weights
 from shared.text.light import WordStates
 from shared.text.light_network import LightConfig
@@ -149,10 +149,17 @@ def learn_propbank(
 
 
 def prepare(options: argparse.Namespace, gold: Sequence[Example], minilm: Path) -> Recipe:
-    """The recipe, with the first training where PropBank is given."""
+    """The recipe, with the first training where PropBank is given.
+
+    Raises:
+        InvalidInput: its annotations without the words they belong to, or words alone.
+    """
+    if bool(options.propbank) != bool(options.words):
+        missing = "--words" if options.propbank else "--propbank"
+        raise InvalidInput("is missing: annotations and words of PropBank come together", where=missing)
     config, pool = FitConfig(steps=options.steps), CaptionPool()
     roles = roles_of(gold)
-    if not (options.propbank and options.words):
+    if not options.propbank:
         return Recipe(minilm, LightConfig(tag_set(roles)), config, pool, options.seed)
     kept, held_out = split(read_propbank(options.propbank, options.words))
     roles |= frequent_roles([*kept, *held_out])

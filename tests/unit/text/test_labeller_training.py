@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shared.bundles import Bundle
-from shared.errors import InvalidFile
+from shared.errors import InvalidFile, InvalidInput
 from shared.text.encoders import find_weights
 from shared.text.light import LightLabeller
 from shared.text.light_network import LightConfig
 from shared.text.roles import Argument, Frame
-from workers.training.labeller import Recipe, cross_validate
+from workers.training.labeller import Recipe, cross_validate, main
 from workers.training.labeller_card import card
 from workers.training.labeller_data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
 from workers.training.labeller_fit import FitConfig, roles_of, tag_set
@@ -163,6 +163,17 @@ def recipe() -> Recipe:
     network = LightConfig(tag_set(roles_of([WALK, WAVE])), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
     config = FitConfig(steps=60, batch=8, learning_rate=4e-3, rank=2)
     return Recipe(find_weights("minilm"), network, config, NOTHING, 0)
+
+
+@pytest.mark.parametrize(("given", "missing"), [("--propbank", "--words"), ("--words", "--propbank")])
+def test_half_of_propbank_is_refused(
+    given: str, missing: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gold = tmp_path / "gold.json"
+    gold.write_text("[]")
+    assert main(["--gold", str(gold), given, str(tmp_path), "-o", str(tmp_path / "bundle")]) == InvalidInput.exit_code
+    assert f"{missing}: is missing" in capsys.readouterr().err
+    assert not (tmp_path / "bundle").exists()
 
 
 def test_a_small_head_learns_two_sentences_and_survives_its_bundle(recipe: Recipe, tmp_path: Path) -> None:
