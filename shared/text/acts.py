@@ -28,9 +28,15 @@ _ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKE
     frozenset(_LISTS[name])
     for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small", "asking", "asked", "nouns")
 )
+_RESTORING, _UPWARD, _DOWNWARD, _ONWARD = (
+    frozenset(_LISTS[name]) for name in ("restoring", "upward", "downward", "onward")
+)
 _ENDS, _CONTINUING = (tuple(_LISTS[name]) for name in ("ends", "continuing"))
 _UNDOING, _LIFTING, _SWINGING = (tuple(_LISTS[name]) for name in ("undoing", "lifting", "swinging"))
-_TRAVELS, _TURNS = tuple(_LISTS["travels"]), tuple(_LISTS["turns"])
+_TRAVELS, _TURNS, _KEEPING, _BOWING, _LASTING = (
+    tuple(_LISTS[name]) for name in ("travels", "turns", "keeping", "bowing", "lasting")
+)
+_LIMBS = frozenset({"hand", "hands", "arm", "arms"})
 _BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
 _STOPS = ",;:."
 
@@ -193,9 +199,9 @@ def _merged(clauses: list[_Words]) -> list[_Words]:
     for clause in clauses:
         if not found:
             found.append(clause)
-        elif found[-1].verbs and {found[-1].bare(v) for v in found[-1].verbs} <= _STILL and not _pauses(found[-1]):
+        elif _done(found[-1]) and {found[-1].bare(v) for v in _done(found[-1])} <= _STILL and not _pauses(found[-1]):
             found[-1] = _joined(found[-1], clause)  # "stands with the feet together": how, not what
-        elif any(goes(found[-1], clause) for goes in (_refers, _undoes, _swings, _turns)):
+        elif any(goes(found[-1], clause) for goes in (_refers, _lasts, _undoes, _restores, _swings, _turns, _goes_on)):
             found[-1] = _joined(found[-1], clause)
         elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in _SUBJECTS | _SIDES):
             found.append(clause)
@@ -218,9 +224,16 @@ def _refers(_: _Words, clause: _Words) -> bool:
     )
 
 
+def _lasts(_: _Words, clause: _Words) -> bool:
+    """ "holds two seconds", "keeps it there for a moment": how long what was said before takes."""
+    first = min(clause.verbs, default=-1)
+    short = first >= 0 and len(clause) - first <= 6 and not (_LIMBS | {"left", "right"}) & set(clause.bares)
+    return short and clause.bare(first).startswith(_LASTING) and not any(w.endswith("ing") for w in clause.bares)
+
+
 def _undoes(before: _Words, clause: _Words) -> bool:
     """ "lowers the arm", "and lowers", "straightens": the end of the act before, which was no way on foot."""
-    if any(word.startswith(_TRAVELS) for word in before.bares):
+    if any(before.bare(v).startswith(_TRAVELS) for v in _done(before)) or {"walk", "run", "jog"} & set(before.bares):
         return False
     first = min(clause.verbs, default=-1)
     if first >= 0 and clause.bare(first).startswith(_UNDOING):
@@ -228,24 +241,61 @@ def _undoes(before: _Words, clause: _Words) -> bool:
     return clause.bare(0).startswith(_UNDOING) and len(clause) < 4
 
 
+def _restores(before: _Words, clause: _Words) -> bool:
+    """ "comes back up" of who bowed, "lets both arms fall to the sides" of who raised them."""
+    first = min(clause.verbs, default=0)
+    who = 0 if _LIMBS & set(clause.bares[:first]) else first
+    said = {word for word in clause.bares[who:] if not word.endswith("ly")}
+    if not said <= _RESTORING:
+        return False
+    if any(word.startswith(_BOWING) for word in before.bares):
+        return bool(said & _UPWARD)
+    lifted = any(word.startswith(_LIFTING + _SWINGING) or word == "up" for word in before.bares)
+    return lifted and bool(said & _DOWNWARD)
+
+
 def _swings(before: _Words, clause: _Words) -> bool:
-    """ "lifts both arms" and "waves": one wave."""
+    """ "lifts both arms" and "waves to them": one wave."""
     lifted = any(before.bare(v).startswith(_LIFTING) for v in before.verbs)
-    return lifted and bool(clause.verbs) and len(clause) <= 2 and clause.bare(min(clause.verbs)).startswith(_SWINGING)
+    if not lifted or not clause.verbs or len(clause) > 4 or _SIDES & set(clause.bares):
+        return False
+    return clause.bare(min(clause.verbs)).startswith(_SWINGING)
 
 
 def _turns(before: _Words, clause: _Words) -> bool:
     """ "walks" and "turns left", or "turns left" and "walks on": who turns walks."""
     bares = clause.bares
-    travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in before.verbs)
-    if not travels or not clause.verbs or {"hand", "hands", "arm", "arms"} & {*bares, *before.bares}:
+    travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in _done(before))
+    if not travels or not clause.verbs or _LIMBS & {*bares, *before.bares}:
         return False
-    if " ".join(bares).startswith(_CONTINUING) and {"left", "right"} & set(before.bares):
+    if " ".join(bares[clause.bare(0) in _SUBJECTS :]).startswith(_CONTINUING) and {"left", "right"} & set(before.bares):
         return not any(clause.bare(v).startswith(("run", "jog", "sprint")) for v in clause.verbs)
     sided = bool({"left", "right"} & set(bares))
-    if any(clause.bare(v).startswith(_TURNS) for v in clause.verbs) and sided:
+    turned = any(clause.bare(v).startswith(_TURNS) for v in clause.verbs) or any(
+        w.startswith(_TURNS[:6]) for w in bares
+    )
+    if turned and sided:
         return not {"left", "right"} & set(before.bares)
     return bares[-1] == "on" and len(bares) == 2 and bares[0].startswith(_TRAVELS)
+
+
+def _goes_on(before: _Words, clause: _Words) -> bool:
+    """ "breaks into a run" and "keeps running"; "turns left" and "walks off": the same way."""
+    first = min(clause.verbs, default=-1)
+    if first < 0 or {"left", "right"} & set(clause.bares):
+        return False
+    verb, behind = clause.bare(first), clause.bare(first + 1)
+    if verb.startswith(_KEEPING) and (
+        behind in {"going", "moving", "on"} or behind[:3] in {w[:3] for w in before.bares}
+    ):
+        return any(word.startswith(_TRAVELS) or word == "foot" for word in before.bares)
+    turned = {"left", "right"} & set(before.bares) and any(before.bare(v).startswith(_TURNS) for v in before.verbs)
+    return bool(turned) and verb.startswith("walk") and behind in _ONWARD
+
+
+def _done(clause: _Words) -> frozenset[int]:
+    """Where it says what is done: its verbs, or the first word where that is a verb in all but name ("walking on")."""
+    return clause.verbs or frozenset({0} if clause.bare(0).endswith("ing") else ())
 
 
 def _other_side(clause: _Words, side: _Words) -> _Words | None:

@@ -9,8 +9,8 @@ from shared.bundles import TextSpec, find_bundle
 from shared.errors import InvalidBundle
 from shared.settings import Settings, settings
 
-PIPELINE_VERSION = 3
-"""Raise it when the graph or the node features of the same prompt change for any reason but weights."""
+PIPELINE_VERSION = 4
+"""Raise it when the graph, the acts or the features of the same prompt change for any reason but weights."""
 REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
 NO_LABELLER = "none"
