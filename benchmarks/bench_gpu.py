@@ -75,16 +75,25 @@ def _sessions(generator: Generator) -> None:
     for sessions in SESSIONS:
         torch.cuda.empty_cache()
         torch.cuda.reset_peak_memory_stats()
-        room = LiveRoom(generator, sessions)
-        for seed in range(sessions):
-            room.start(text(generator), seed)
-        _run(room.step, 20)
-        steps = sorted(_seconds(room.step) for _ in range(FRAMES))
+        try:
+            steps = _steps(generator, sessions)
+        except torch.OutOfMemoryError:
+            print(f"| {sessions} | do not fit | | |")
+            break
         slowest, peak = steps[int(0.99 * FRAMES)], torch.cuda.max_memory_allocated() / 2**30
         print(f"| {sessions} | {FRAMES / sum(steps):.0f} | {slowest * 1e3:.1f} ms | {peak:.1f} GiB |", flush=True)
         if slowest > REAL_TIME:
             break
     print()
+
+
+def _steps(generator: Generator, sessions: int) -> list[float]:
+    """Seconds of each step, the shortest first."""
+    room = LiveRoom(generator, sessions)
+    for seed in range(sessions):
+        room.start(text(generator), seed)
+    _run(room.step, 20)
+    return sorted(_seconds(room.step) for _ in range(FRAMES))
 
 
 def _hgm3(generator: HGM3Generator) -> None:

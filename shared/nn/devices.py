@@ -31,6 +31,7 @@ def choose_device(name: str) -> torch.device:
 def fast_bf16(device: torch.device) -> bool:
     """Whether bfloat16 matrices pay: CUDA, and CPUs with the instruction."""
     if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
+        with torch.cuda.device(device):
+            return torch.cuda.is_bf16_supported(including_emulation=False)
     check: Callable[[], bool] | None = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
     return os.environ.get("MAREY_BF16", "1") != "0" and check is not None and check()

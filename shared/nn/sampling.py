@@ -23,13 +23,14 @@ def uniform(seeds: Tensor, stream: int, step: int, positions: Tensor) -> Tensor:
         seeds: (B,) int64, one an item.
         stream: what the numbers are for (base tokens, residual tokens, …).
         step: decoding step.
-        positions: (n,) int64.
+        positions: (n,) int64, or (B, n), its own for each seed.
 
     Returns:
         (B, n). Never 0 or 1.
     """
     key = _hash(_hash(seeds + _wrap(stream * _GOLDEN)) + _wrap(step * _GOLDEN))  # (B,)
-    bits = _hash(key[:, None] + (positions[None] + 1) * _GOLDEN)  # (B, n)
+    own = positions if positions.dim() == 2 else positions[None]
+    bits = _hash(key[:, None] + (own + 1) * _GOLDEN)  # (B, n)
     top = _shift(bits, 41)  # 23 bits: with the half below exactly representable in float32
     return (top.float() + 0.5) * 2.0**-23
 

@@ -39,17 +39,19 @@ def expose(part: str, chosen: Settings) -> None:
 
 
 def measure_gpu() -> None:
-    """Note how full the device is; nothing where torch was not imported, or uses none."""
+    """Note how full the devices are that are used; nothing where torch was not imported, or uses none."""
     torch = sys.modules.get("torch")
     if torch is None or not torch.cuda.is_available() or not torch.cuda.is_initialized():
         return
-    device = torch.cuda.current_device()
-    free, total = torch.cuda.mem_get_info(device)
-    kinds = {
-        "allocated": torch.cuda.memory_allocated(device),
-        "reserved": torch.cuda.memory_reserved(device),
-        "free": free,
-        "total": total,
-    }
-    for kind, size in kinds.items():
-        metrics.GPU_MEMORY.labels(f"cuda:{device}", kind).set(size)
+    for device in range(torch.cuda.device_count()):
+        reserved = torch.cuda.memory_reserved(device)
+        if reserved:  # to ask a device for its memory takes some of it
+            free, total = torch.cuda.mem_get_info(device)
+            kinds = {
+                "allocated": torch.cuda.memory_allocated(device),
+                "reserved": reserved,
+                "free": free,
+                "total": total,
+            }
+            for kind, size in kinds.items():
+                metrics.GPU_MEMORY.labels(f"cuda:{device}", kind).set(size)

@@ -19,7 +19,7 @@ from tests.support.card import CARD, card, waits
 from tests.support.prepared import text_features, write_prepared
 from workers.evaluator.config import TINY as TINY_EVALUATOR
 from workers.evaluator.train import train_stage as train_evaluator
-from workers.generating.port import Request
+from workers.generating.port import NoControl, Request
 from workers.hgm3.bundle import random_bundle as random_hgm3
 from workers.hgm3.config import TINY as TINY_HGM3
 from workers.hgm3.generate import Generator as HGM3Generator
@@ -56,6 +56,7 @@ def mogo(folder: Path) -> None:
     for config in (TINY, replace(TINY, depth=DepthConfig())):
         _step_never_waits(config)
     _same(Generator, random_mogo(folder / "random-mogo", "tiny").path)
+    _batches_share_a_room(Generator.load(str(folder / "random-mogo"), device=CARD))
     room = LiveRoom(Generator.load(str(folder / "random-mogo"), device=CARD), 4)
     first, second = room.start(text_features(0), 0), room.start(text_features(1), 1)
     room.steer(first, text_features(2, actions=1))
@@ -101,6 +102,23 @@ def _step_never_waits(config: MOGOConfig) -> None:
     waits.clear()
     streams.step()
     assert waits == []
+
+
+class _Interrupted(NoControl):
+    """Ends a batch after its first frames."""
+
+    def progress(self, done: int, total: int) -> None:
+        raise InterruptedError
+
+
+def _batches_share_a_room(generator: Generator) -> None:
+    first, second = (generator.generate(REQUESTS[:2]) for _ in range(2))
+    assert [a.tokens.tolist() for a in first if a] == [b.tokens.tolist() for b in second if b]
+    room = generator.streams(1, generator.config.inference)
+    with pytest.raises(InterruptedError):
+        generator.generate(REQUESTS, control=_Interrupted())
+    assert generator.streams(2, generator.config.inference) is room
+    assert room.sessions == []
 
 
 def _same(generator: Any, bundle: Path) -> None:

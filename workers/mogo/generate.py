@@ -79,6 +79,7 @@ class Generator:
         self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
         self.batch = MAX_SESSIONS
         self._packed: dict[int, PackedModel] = {}
+        self._streams: tuple[InferenceConfig, Streams] | None = None
 
     @classmethod
     def load(
@@ -103,7 +104,7 @@ class Generator:
     def packed(self, sessions: int = MAX_SESSIONS) -> PackedModel:
         """What draws up to so many motions side by side; products of the same shape for any number of them, so the same
         tokens. Made once for each shape."""
-        group = sessions_of_product(self.transformer, sessions)
+        group = sessions_of_product(self.transformer, sessions) if self.device.type == "cpu" else 1
         if group not in self._packed:
             self._packed[group] = PackedModel(self.transformer, dtype=self.dtype, group=group)
         return self._packed[group]
@@ -132,6 +133,16 @@ class Generator:
         acts = torch.from_numpy(text.act_vectors.astype(np.float32)).to(self.device)
         return acts, self.transformer.natural_frames(acts)
 
+    def streams(self, count: int, inference: InferenceConfig) -> Streams:
+        """Room for a batch of so many motions, empty. On a GPU that of the last batch, where it was drawn likewise: to
+        record a step takes as long as to draw a motion."""
+        if self.device.type == "cpu":
+            return Streams(self.packed(), max(1, min(MAX_SESSIONS, count)), inference)
+        if self._streams is None or self._streams[0] != inference:
+            self._streams = None  # its memory first
+            self._streams = inference, Streams(self.packed(), MAX_SESSIONS, inference)
+        return self._streams[1]
+
     @torch.inference_mode()
     def generate(
         self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
@@ -149,8 +160,11 @@ class Generator:
             self.limits.check(request)
         recorded = {row: self.columns(r.recording.tokens) for row, r in enumerate(requests) if r.recording is not None}
         drawing = _Drawing(self, requests, inference, recorded)
-        while drawing.step(control.dropped()):
-            control.progress(drawing.done, drawing.total)
+        try:
+            while drawing.step(control.dropped()):
+                control.progress(drawing.done, drawing.total)
+        finally:
+            drawing.close()
         control.progress(drawing.total, drawing.total)
         return [None if columns is None else self._decode(torch.stack(columns)) for columns in drawing.columns]
 
@@ -191,7 +205,7 @@ class _Drawing:
         self.total = sum(len(recorded[row]) if row in recorded else self.frames[row] for row in range(len(requests)))
         self.waiting = [row for row in range(len(requests)) if row not in recorded][::-1]
         self.playing: dict[int, int] = {}  # session to request
-        self.streams = Streams(generator.packed(), max(1, min(MAX_SESSIONS, len(requests))), inference)
+        self.streams = generator.streams(len(requests), inference)
 
     @property
     def done(self) -> int:
@@ -217,6 +231,11 @@ class _Drawing:
             if ended or len(columns) == self.frames[row]:
                 self._stop(session)
         return True
+
+    def close(self) -> None:
+        """Leave the room, whatever became of the requests."""
+        for session in list(self.playing):
+            self._stop(session)
 
     def _leave_out(self, dropped: set[int]) -> None:
         self.waiting = [row for row in self.waiting if row not in dropped]

@@ -100,25 +100,22 @@ class NextFrame:
         """
         made = self.state.made[: len(logits)]
         chance = logits.float().softmax(-1)[:, self._model.end]
-        drawn = uniform(self.state.seeds[: len(logits)], END_STREAM, 0, made).diagonal()
+        drawn = uniform(self.state.seeds[: len(logits)], END_STREAM, 0, made[:, None])[:, 0]
         return (drawn < chance) & (made >= self.state.ends_from[: len(logits)])
 
     def _noise(self, rows: int) -> Tensor:
         """A number (s, V) for each session's seed, frame and level."""
         levels = torch.arange(self._model.levels, device=self.state.made.device)
         positions = self.state.made[:rows, None] * len(levels) + levels  # (s, V)
-        # every seed at everybody's positions, in one call; each session's own stand on the diagonal
-        crossed = uniform(self.state.seeds[:rows], TOKEN_STREAM, 0, positions.flatten())
-        return crossed.view(rows, rows, -1).diagonal().T
+        return uniform(self.state.seeds[:rows], TOKEN_STREAM, 0, positions)
 
     def _pick(self, logits: Tensor, noise: Tensor, level: int = 0) -> Tensor:
         """Codes (s, n) of levels that are drawn alike, `level` the lowest, from logits (s, branches, n, K + 1) and
         random numbers (s, n)."""
         config = self.config
         guided = logits[:, 0] if self.branches == 1 else guide(logits[:, 0], logits[:, 1], config.guidance)
-        guided[..., self._model.end] = -torch.inf  # drawn apart
         return sample_top_k(
-            guided,
+            guided[..., : self._model.end],  # END is drawn apart
             noise,
             temperature=config.upper_temperature if level else config.temperature,
             share=config.upper_top_k if level else config.top_k,

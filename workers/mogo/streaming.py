@@ -204,12 +204,14 @@ class Streams:
         """Tell a row the next act of its plan, or the one that plays already."""
         began = began or Begun(self._made[self.sessions[row]], 0)
         act = plan.take(began.frame, began.act)
-        self.state.began[row], self.state.stops[row] = began.frame, plan.stops
+        mine = self.state.row(row)
+        mine["began"].fill_(began.frame)
+        mine["stops"].fill_(plan.stops)
         self._read(row, act, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
         shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.acts) else 0
         ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
-        self.state.ends_from[row] = ends_from
-        self.state.ended[row] = False
+        mine["ends_from"].fill_(ends_from)
+        mine["ended"].fill_(False)
 
     @torch.no_grad()
     def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:

@@ -15,7 +15,7 @@ from workers.mogo.config import TINY
 from workers.mogo.generate import Generator
 from workers.mogo.live import LiveRoom
 from workers.mogo.packed_model import PackedModel
-from workers.mogo.replay import Replayed, row_counts
+from workers.mogo.replay import Replayed
 from workers.mogo.streaming import Streams
 
 from .networks import columns, opened, prompts, transformer
@@ -52,12 +52,6 @@ def test_rows_that_nobody_sits_in_change_nothing_where_they_are_computed_along(g
     assert torch.equal(played(along), played(alone))
 
 
-def test_steps_are_recorded_for_powers_of_two_of_rows_and_for_all_of_them() -> None:
-    assert [row_counts(capacity) for capacity in (1, 2, 3, 8, 12)] == [
-        [1], [1, 2], [1, 2, 3], [1, 2, 4, 8], [1, 2, 4, 8, 12],
-    ]  # fmt: skip
-
-
 @pytest.mark.gpu
 @on_a_gpu
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
@@ -67,8 +61,22 @@ def test_a_recorded_step_draws_what_the_step_itself_draws(dtype: torch.dtype) ->
     assert isinstance(recorded._draw, Replayed)
     recorded.prepare()
     step = direct._next
-    direct._draw = lambda rows: step(next(count for count in row_counts(4) if count >= rows))[:rows].clone()
+    direct._draw = lambda rows: step(4)[:rows].clone()
     assert torch.equal(played(recorded, CUDA), played(direct, CUDA))
+
+
+@pytest.mark.gpu
+@on_a_gpu
+def test_recorded_steps_outlive_those_that_were_recorded_before_them() -> None:
+    packed = PackedModel(transformer().to(CUDA))
+    first, second = Streams(packed, 4), Streams(packed, 4)
+    first.prepare()
+    wanted = played(second, CUDA)
+    del first
+    torch.cuda.empty_cache()
+    for session in list(second.sessions):
+        second.stop(session)
+    assert torch.equal(played(second, CUDA), wanted)
 
 
 @pytest.mark.gpu
