@@ -38,6 +38,7 @@ SETTINGS = {
     "guidance": (0.0, 100.0),
     "temperature": (0.0, 100.0),
     "top_k": (0.001, 1.0),
+    "upper_guidance": (0.0, 100.0),
     "upper_temperature": (0.0, 100.0),
     "upper_top_k": (0.001, 1.0),
     "residual_guidance": (0.0, 100.0),

@@ -80,7 +80,8 @@ class InferenceConfig:
     top_k: float = 0.1  # share of the codes that level 0 may draw
     upper_temperature: float = 0.6  # of all other levels: against jitter
     upper_top_k: float = 0.1
-    guidance: float = 1.0  # 1 = off; anything else doubles the cost
+    guidance: float = 1.0  # of level 0; 1 = off, anything else doubles the cost of the trunk
+    upper_guidance: float = 1.0  # of all other levels: level 0 decides what is done, the others how exactly
     window: int = 196  # frames that attention reaches back, at most `max_frames`
 
 
@@ -135,7 +136,7 @@ STARTER = MOGOConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384, share=0.25),
-    inference=InferenceConfig(temperature=0.8, guidance=3.5),  # by validation captions
+    inference=InferenceConfig(temperature=0.8, guidance=3.5),
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),

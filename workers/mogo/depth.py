@@ -54,6 +54,11 @@ class DepthFrame:
         heads, width = head.layers[0].attention.heads, self._entered.shape[-1]
         self._memory = states.new_empty(len(head.layers), sessions, branches, 2, heads, levels, width // heads)
 
+    def keep_first_branch(self) -> None:
+        """Go on without the others."""
+        self._states, self._entered = self._states[:, :1], self._entered[:, :1]
+        self._memory = self._memory[:, :, :1]
+
     def next(self, below: Tensor | None) -> Tensor:
         """The state (S, b, w) of the next level, given the embedding (S, w) of the code just drawn (None: level 0)."""
         level = self._level

@@ -36,6 +36,7 @@ class Settings:
     upper_temperature: float | None = None
     upper_top_k: float | None = None
     guidance: float | None = None
+    upper_guidance: float | None = None
 
     def inference(self, default: InferenceConfig) -> InferenceConfig:
         """The bundle's drawing with this batch's changes.

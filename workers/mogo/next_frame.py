@@ -71,6 +71,8 @@ class NextFrame:
             frame, drawn = DepthFrame(model.depth, self.packed.depth, states), list[Tensor]()
             ending = self.state.ended[:rows]
             for level in range(levels):
+                if level == 1 and self.config.upper_guidance == 1:
+                    frame.keep_first_branch()
                 below = model.embedding(drawn[-1][:, 0].clamp(max=model.codes - 1)) if drawn else None
                 logits = model.head(frame.next(below))[:, :, None]
                 ending = ending if level else self._ends(logits[:, 0, 0])
@@ -113,7 +115,8 @@ class NextFrame:
         """Codes (s, n) of levels that are drawn alike, `level` the lowest, from logits (s, branches, n, K + 1) and
         random numbers (s, n)."""
         config = self.config
-        guided = logits[:, 0] if self.branches == 1 else guide(logits[:, 0], logits[:, 1], config.guidance)
+        scale = config.upper_guidance if level else config.guidance
+        guided = logits[:, 0] if scale == 1 else guide(logits[:, 0], logits[:, 1], scale)
         return sample_top_k(
             guided[..., : self._model.end],  # END is drawn apart
             noise,

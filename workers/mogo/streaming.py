@@ -51,7 +51,7 @@ class Streams:
             raise InvalidInput(
                 f"a window of {self.window} frames", hint=f"This model can look back 1 to {self.farthest} frames."
             )
-        self.branches = 1 if self.config.guidance == 1 else 2
+        self.branches = 1 if self.config.guidance == self.config.upper_guidance == 1 else 2
         self.state = StreamState.empty(packed, capacity, self.branches, self.window)
         self.capacity = capacity
         self.sessions: list[int] = []  # the session in each row: the active rows come first

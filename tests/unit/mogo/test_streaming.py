@@ -217,16 +217,28 @@ def test_endless_motion_needs_no_more_memory() -> None:
 
 def test_guidance_mixes_the_logits_with_and_without_the_prompt() -> None:
     model = transformer(FLAT)
-    config = InferenceConfig(guidance=2.0, temperature=0, upper_temperature=0, window=WINDOW)
+    config = InferenceConfig(guidance=2.0, upper_guidance=3.0, temperature=0, upper_temperature=0, window=WINDOW)
     streams = opened(model, 1, config)
     session = streams.start(said(2), 1)
     read = (model.prompt(said(2)[None]), model.prompt(said(2)[None], torch.tensor([True])))
     plain = [opening[:, :, None] for opening, _ in read]
     with_prompt, without = (model.score(model.trunk(p.flatten(0, 1), model.reach(0))[:, 0]) for p in plain)
-    guided = guide(with_prompt, without, 2.0)
+    guided = torch.cat([guide(with_prompt, without, 2.0)[:1], guide(with_prompt, without, 3.0)[1:]])
     guided[0, -1] = -torch.inf
     assert torch.equal(streams.step()[session], guided.argmax(-1))
     assert not torch.equal(guided.argmax(-1), with_prompt.argmax(-1))
+
+
+def test_upper_levels_without_guidance_go_on_without_the_other_branch() -> None:
+    model = transformer()
+    config = replace(TINY.inference, guidance=8.0, temperature=0.0, upper_temperature=0.0)
+    alone, along, both = (
+        opened(model, 1, replace(config, upper_guidance=scale)) for scale in (1.0, 1.0 + 1e-6, config.guidance)
+    )  # fmt: skip
+    names = [streams.start(said(2), 1) for streams in (alone, along, both)]
+    found = [run(streams, 8)[name] for streams, name in zip((alone, along, both), names, strict=True)]
+    assert torch.equal(found[0], found[1])
+    assert not torch.equal(found[0], found[2])
 
 
 def test_a_stream_never_ends_and_a_clip_ends_when_END_is_drawn() -> None:
