@@ -136,7 +136,7 @@ STARTER = MOGOConfig(
         layers=4, heads=4, width=256, feedforward=512, dropout=0.15, level_gain=True, joint=True
     ),
     depth=DepthConfig(layers=2, heads=4, width=192, feedforward=384, share=0.25),
-    inference=InferenceConfig(temperature=0.8, guidance=3.5),
+    inference=InferenceConfig(temperature=0.8, guidance=3.5, upper_guidance=2.0),  # by prompts of development
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=48, learning_rate=6e-4, decay="cosine", ema=0.995),
     train_transformer=StageConfig(batch=24, learning_rate=8e-4, decay="cosine", ema=0.997, weight_decay=1e-2),

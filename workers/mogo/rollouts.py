@@ -23,6 +23,8 @@ from workers.training.motions import fingerprint
 from workers.training.sentences import SentenceData
 
 SESSIONS = 32
+LEAST, MOST = 12, 130
+"""Frames after which a session is left: acts are over after 40 to 110, and a stream plays on."""
 
 
 @dataclass(frozen=True)
@@ -44,13 +46,13 @@ class Rollouts:
         self._rng = np.random.default_rng(seed)
 
     @torch.inference_mode()
-    def draw(self, clips: Sequence[int], least: int, most: int) -> Iterator[Rollout]:
-        """A session for each clip, whose prompt is one of its captions, of `least` to `most` frames; in the order in
-        which they are done."""
+    def draw(self, clips: Sequence[int], most: int) -> Iterator[Rollout]:
+        """A session for each clip, whose prompt is one of its captions, of `most` frames at most; in the order in which
+        they are done."""
         network = self._packed.network
-        sentences = self._captions.sentences(self._captions.choose(np.asarray(clips, np.int64), self._rng))
-        frames = self._rng.integers(least, most + 1, len(clips)).tolist()
-        streams, waiting = Streams(self._packed, max(1, min(SESSIONS, len(clips)))), list(range(len(clips)))[::-1]
+        sentences = self._captions.sentences(self._captions.choose(np.asarray(clips), self._rng))
+        frames = self._rng.integers(min(LEAST, most), min(MOST, most) + 1, len(clips)).tolist()
+        streams, waiting = Streams(self._packed, min(SESSIONS, len(clips))), list(range(len(clips)))[::-1]
         playing: dict[int, tuple[int, list[Tensor]]] = {}  # session to its clip and what it showed
         while waiting or playing:
             while waiting and len(playing) < streams.capacity:

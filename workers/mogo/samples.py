@@ -29,7 +29,7 @@ CROPPED = 0.4
 """Share of the samples that are cropped."""
 STEERED = 0.5
 """Share of the samples of joined clips that have two acts."""
-ANYTIME = 0.4
+ANYTIME = 0.35
 """Share of all samples whose prompt changes at any moment, where there are such motions."""
 
 

@@ -2,10 +2,7 @@
 (`workers.mogo.rollouts`), is left wherever it is, and another clip is entered at its beginning, with an inertialized
 transition (`workers.training.data.splice`).
 
-Splices of the prepared folder leave an act when it is done, as sequences do. Who steers does not wait for that. And who
-stands still for a while although the prompt asks for an act has to begin all the same: captured clips begin at once, so
-a model that knows nothing else takes a late beginning for an act that is over. Late motions stand as the model itself
-stands, and then enter the clip that was asked for from the first.
+Splices of the prepared folder leave an act when it is done, as sequences do. Who steers does not wait for that.
 """
 
 from __future__ import annotations
@@ -31,10 +28,6 @@ from workers.training.motions import MotionData, fingerprint, made_once
 FILE = "steers.safetensors"
 LEAST_LEFT, MOST_LEFT, LEAST_ENTERED = 8, 110, 12
 """Frames of the clip that is left, and of the one that is entered."""
-LEAST_DRAWN, MOST_DRAWN = 12, 130
-"""Frames of what the model draws and leaves: acts are over after 40 to 110, and a stream plays on."""
-LATEST, STILL = 30, 0.15
-"""Frames by which an act begins late at most, and metres that no joint goes meanwhile."""
 WORST_SEAM = 1.0
 """Squared metres (`seam_costs`): nobody's limbs fly through the room in half a second."""
 TRIES = 20
@@ -43,12 +36,12 @@ BATCH = 64
 
 @dataclass(frozen=True)
 class Steers:
-    """S steered or late motions, their tokens end to end."""
+    """S steered motions, their tokens end to end."""
 
     tokens: Tensor  # (N, V) int64
     starts: Tensor  # (S,) first token of each
     lengths: Tensor  # (S,) frames
-    seams: Tensor  # (S,) frames of the clip that is left; 0: a late motion, whose prompt and clock stay
+    seams: Tensor  # (S,) frames of the clip that is left
     left: Tensor  # (S,) that clip
     entered: Tensor  # (S,) the other
     ends: Tensor  # (S,) bool: the other is there to its end
@@ -61,7 +54,6 @@ class _Left:
     clip: int
     joints: NDArray[np.float64]  # (n, J, 3)
     tokens: Tensor | None = None  # (n, V) where the model drew it; captured ones are encoded with what comes after them
-    late: bool = False  # the clip that is entered was asked for from the first
 
 
 @dataclass(frozen=True)
@@ -72,11 +64,6 @@ class _Joined:
     left: _Left
     entered: int
     ends: bool
-
-    @property
-    def seam(self) -> int:
-        """Frames behind which the prompt changes; 0 = it stays."""
-        return 0 if self.left.late else len(self.left.joints)
 
     def tokens(self, encoded: Tensor) -> Tensor:
         """Those of all of it as encoded, but what was drawn stays as it was drawn."""
@@ -102,10 +89,9 @@ def load_steers(
         data: what the clips are of.
         clips: (C,) those that may be joined: single acts.
         weights: (C,) how often each is drawn.
-        rollouts: `config.rollouts` more leave what these draw, and as many begin late as of these end standing; None =
-            all leave captured motion.
+        rollouts: `config.rollouts` more leave what these draw; None = all leave captured motion.
     """
-    drawn = "" if rollouts is None else f":{config.rollouts}:late:{rollouts.fingerprint}"
+    drawn = "" if rollouts is None else f":{config.rollouts}:{rollouts.fingerprint}"
     key = f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}{drawn}"
     made = _Making(config, data.prepared, np.asarray(clips), np.asarray(weights))
     values = made_once(
@@ -127,7 +113,7 @@ def _encoded(tokenizer: Tokenizer, data: MotionData, made: Sequence[_Joined]) ->
             each.tokens(codes[row, :count]) for row, (each, count) in enumerate(zip(some, counts.tolist(), strict=True))
         ]
     lengths = torch.tensor([len(each) for each in tokens], device=device)
-    rest = [[each.seam, each.left.clip, each.entered, each.ends] for each in made]
+    rest = [[len(each.left.joints), each.left.clip, each.entered, each.ends] for each in made]
     seams, left, entered, ends = torch.tensor(rest, device=device).unbind(1)
     return Steers(torch.cat(tokens), lengths.cumsum(0) - lengths, lengths, seams, left, entered, ends.bool())
 
@@ -149,9 +135,7 @@ class _Making:
         """Every motion that is left, with what is entered from there; without those that no clip goes on from."""
         yield from filter(None, map(self._enter, self._captured()))
         if rollouts is not None:
-            drawn = list(self._drawn(rollouts))
-            yield from filter(None, map(self._enter, drawn))
-            yield from filter(None, map(self._enter_late, drawn))
+            yield from filter(None, map(self._enter, self._drawn(rollouts)))
 
     def _captured(self) -> Iterator[_Left]:
         for clip in self._draw(self._config.steers):
@@ -160,38 +144,21 @@ class _Making:
             yield _Left(clip, joints[: int(self._rng.integers(LEAST_LEFT, most + 1))])
 
     def _drawn(self, rollouts: Rollouts) -> Iterator[_Left]:
-        most = min(MOST_DRAWN, self._config.max_frames - LEAST_ENTERED)
-        for made in rollouts.draw(self._draw(self._config.rollouts), min(LEAST_DRAWN, most), most):
+        for made in rollouts.draw(self._draw(self._config.rollouts), self._config.max_frames - LEAST_ENTERED):
             yield _Left(made.clip, self._layout.decode(made.features).astype(np.float64), made.tokens)
 
     def _enter(self, left: _Left) -> _Joined | None:
-        """Another clip, behind `left`."""
-        others = (clip for clip in self._draw(TRIES) if clip != left.clip)
-        return next((self._join(left, clip) for clip in others if self._cost(left, clip) <= WORST_SEAM), None)
-
-    def _enter_late(self, drawn: _Left) -> _Joined | None:
-        """Any clip, some time after its prompt, that long as `drawn` stands at its end; None where that is short."""
-        gone = np.linalg.norm(drawn.joints - drawn.joints[-1], axis=-1).max(1)  # (n,) metres
-        standing = len(gone) if (gone <= STILL).all() else int(np.argmax(gone[::-1] > STILL))
-        if standing < LEAST_LEFT or drawn.tokens is None:
-            return None
-        by = int(self._rng.integers(LEAST_LEFT, min(standing, LATEST) + 1))
-        (clip,) = self._draw(1)
-        left = _Left(clip, drawn.joints[-by:], drawn.tokens[-by:], late=True)
-        return self._join(left, clip) if self._cost(left, clip) <= WORST_SEAM else None
-
-    def _cost(self, left: _Left, clip: int) -> float:
-        """Of going on with another clip, squared metres."""
-        fps = self._config.fps
-        after = seam_features(left.joints[-3:], fps)[-1:]
-        return float(seam_costs(after, seam_features(self._joints(clip)[:3], fps)[:1])[0, 0])
-
-    def _join(self, left: _Left, clip: int) -> _Joined:
-        entered = self._joints(clip)
-        room = self._config.max_frames + 2 - len(left.joints)  # poses: one more than frames, one is shared
-        joints = join_clips(left.joints, entered[:room], self._config.fps)
-        features = self._layout.encode(self._layout.canonicalize(joints)).astype(np.float32)
-        return _Joined(features, left, clip, len(entered) <= room)
+        fps, first = self._config.fps, left.joints
+        for clip in self._draw(TRIES):
+            second = self._joints(clip)
+            costs = seam_costs(seam_features(first[-3:], fps)[-1:], seam_features(second[:3], fps)[:1])
+            if clip == left.clip or float(costs[0, 0]) > WORST_SEAM:
+                continue
+            room = self._config.max_frames + 2 - len(first)  # poses: one more than frames, one is shared
+            joints = join_clips(first, second[:room], fps)
+            features = self._layout.encode(self._layout.canonicalize(joints)).astype(np.float32)
+            return _Joined(features, left, clip, len(second) <= room)
+        return None
 
     def _draw(self, count: int) -> list[int]:
         return self._rng.choice(self._clips, count, p=self._shares).tolist()
