@@ -1,5 +1,4 @@
 """Linear layers packed for inference on a CPU: faster on few rows, and a row's bits do not depend on rows beside it.
-Elsewhere `lower_linears` only halves what is read.
 
 `torch.nn.functional.linear` takes other kernels, which add in another order, for fewer than some 18 rows. oneDNN's
 packed product in float32 does so for a single row alone: measured with torch 2.13 on AVX-512 for 16 shapes, 2 to 192
@@ -7,7 +6,8 @@ rows give equal bits; 6 rows by 1024 x 3072 take 0.6 ms in place of 0.9. Many ro
 than with torch's own product, which packs the weights anew each time, and give the very same bits.
 
 Every call of it costs 50 µs, though, and in bfloat16, which halves what is read, bits do depend on the number of rows
-while they are few. So what is drawn frame by frame goes through `GroupedLinear`: products of one shape.
+while they are few. So what is drawn frame by frame goes through `GroupedLinear`: products of one shape. Other devices
+need none of this: there `lower_linears` halves what is read.
 """
 
 from __future__ import annotations
