@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from uuid import UUID
 
 import numpy as np
 import pytest
 import redis
 import sqlalchemy as sa
+import torch
 
 from shared.jobs import StreamState, get_job, list_items, stream_acts, stream_prompts, transaction
 from shared.jobs.states import STREAM_TRANSITIONS, ItemState
@@ -279,8 +280,8 @@ def test_a_queue_that_forgets_everything_costs_no_stream(studio: Studio, start: 
 class Fragile(LiveRoom):
     """Breaks, with all that is in it, at frame 5 of the stream with seed 13."""
 
-    def step(self) -> dict[int, LiveFrame]:
-        made = super().step()
+    def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
+        made = super()._shown(drawn)
         for session, live in made.items():
             row = self._streams.sessions.index(self._sessions[session].stream)
             if self._streams.state.seeds[row] == 13 and live.frame.number == 5:

@@ -7,6 +7,7 @@ must keep elsewhere, to go on after its worker died, are its tokens, its prompts
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -199,27 +200,33 @@ class LiveRoom:
         self._sessions[session].stream = self._streams.resume(kept.stream)
         self._join(session, kept.decoded, kept.body)
 
+    @torch.inference_mode()
     def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
         """The next frames of one session alone, at once; the others stand still meanwhile.
 
         Raises:
             InvalidInput: no such session, or it is paused.
         """
-        self._playing(session)
-        others = [name for name in self._rows if name != session]
-        for name in others:
-            self.pause(name)
-        made = [self.step()[session] for _ in range(frames)]
-        for name in others:
-            self.resume(name)
+        stream = self._playing(session).stream
+        row = self._rows.index(session)
+        decoded, body = self._decoded.select(torch.tensor([row])), self._body.take([row])
+        self._leave(session)
+        others = self._rows, self._decoded, self._body
+        self._rows, self._decoded, self._body = [session], decoded, body
+        made = [self._shown(self._streams.step(stream))[session] for _ in range(frames)]
+        decoded, body = self._decoded, self._body
+        self._rows, self._decoded, self._body = others
+        self._join(session, decoded, body)
         return made
 
     @torch.inference_mode()
     def step(self) -> dict[int, LiveFrame]:
         """The next frame of every session that is not paused."""
         drawn = self._streams.step()
-        if not drawn:
-            return {}
+        return self._shown(drawn) if drawn else {}
+
+    def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
+        """Frames of the columns that were drawn for the sessions in the rows."""
         columns = torch.stack([drawn[self._sessions[session].stream] for session in self._rows])  # (S, V)
         features, self._decoded = self.generator.tokenizer.decode_next(columns[:, None], self._decoded)
         shown, self._body = self._motion.step(features[:, 0].cpu().numpy(), self._body)

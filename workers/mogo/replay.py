@@ -9,15 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import structlog
 import torch
 from torch import Tensor
+
+log = structlog.get_logger()
 
 WARM_CALLS = 3
 """Before a step is recorded: libraries choose and load their kernels in the first calls."""
 
 
 class Replayed:
-    """A step, recorded when it is first asked for."""
+    """A step, recorded when it is first asked for. Where CUDA refuses that, the log says so and the step is run as it
+    is: the same frames, several times slower."""
 
     def __init__(self, step: Callable[[int], Tensor], rows: int, device: torch.device) -> None:
         """Wrap a step.
@@ -30,23 +34,37 @@ class Replayed:
         """
         self._step, self._rows, self._device = step, rows, device
         self._recorded: tuple[torch.cuda.CUDAGraph, Tensor] | None = None
+        self._refused = False
 
     def __call__(self, rows: int) -> Tensor:
         """What the step gives for the first `rows` rows."""
         self.prepare()
-        assert self._recorded is not None
+        if self._recorded is None:
+            return self._step(self._rows)[:rows]
         graph, result = self._recorded
         graph.replay()
         return result[:rows].clone()  # the next replay overwrites it
 
     def prepare(self) -> None:
-        """Record the step now: it takes a good part of a second, which no session should wait for."""
-        if self._recorded is None:
+        """Record the step now: it takes a good part of a second, which no session should wait for.
+
+        Raises:
+            torch.OutOfMemoryError: the device has no room for it.
+        """
+        if self._recorded is not None or self._refused:
+            return
+        try:
             self._recorded = self._record()
+        except torch.OutOfMemoryError:
+            raise
+        except RuntimeError as error:
+            self._refused = True
+            log.error("a step could not be recorded: frames will be slow", device=str(self._device), error=str(error))
 
     @torch.no_grad()
     def _record(self) -> tuple[torch.cuda.CUDAGraph, Tensor]:
-        with torch.cuda.device(self._device):
+        with torch.cuda.device(self._device), torch.cuda.stream(torch.cuda.current_stream(self._device)):
+            # the outer stream is the current one again, also where recording failed
             aside = torch.cuda.Stream()
             aside.wait_stream(torch.cuda.current_stream())
             with torch.cuda.stream(aside):

@@ -108,6 +108,7 @@ class Streams:
         row = self._take_row()
         past = self.state.last.new_zeros(0, self.model.levels) if past is None else past[-self.window :]
         mine = self.state.row(row)
+        mine["memory"].zero_()  # a number that is none would go on through slots that are hidden
         mine["seeds"].fill_(seed)
         mine["skipped"].fill_(skipped + before - len(past))
         mine["made"].fill_(skipped + before)
@@ -139,36 +140,40 @@ class Streams:
         self.sessions.pop()
         del self._plans[session], self._made[session]
 
-    def step(self) -> dict[int, Tensor]:
-        """Draw one frame of every session: its column (V,) of tokens, -1 in a session that has ended."""
-        if not self.sessions:
+    def step(self, only: int | None = None) -> dict[int, Tensor]:
+        """Draw one frame of every session, or of one alone: its column (V,) of tokens, -1 where it has ended."""
+        if only is not None:
+            self._exchange(self._row(only), 0)
+        rows = len(self.sessions) if only is None else 1
+        if not rows:
             return {}
-        for row, plan in self._unfinished():
+        for row, plan in self._unfinished(rows):
             if self._made[self.sessions[row]] >= plan.until:
                 self._begin(row, plan)
-        column = self._draw(len(self.sessions))
+        column = self._draw(rows)
         while due := self._due(column):
             for row, plan in due:  # the first frame of the next act comes in place of END; others draw what they drew
                 self._begin(row, plan)
-            column = self._draw(len(self.sessions))
+            column = self._draw(rows)
         self.accept(column)
-        return dict(zip(self.sessions, column.unbind(), strict=True))
+        return dict(zip(self.sessions[:rows], column.unbind(), strict=True))
 
     def states(self) -> Tensor:
         """Trunk states (s, L, w) of the active rows, from which their next frame is drawn."""
         return self._next.states(len(self.sessions))
 
     def accept(self, columns: Tensor) -> None:
-        """Take columns (s, V) as the next frame of the active rows, drawn or known."""
-        active = len(self.sessions)
-        self.state.last[:active] = columns
-        self.state.made[:active] += 1
-        for session in self.sessions:
+        """Take columns (s, V) as the next frame of the first s rows, drawn or known."""
+        rows = len(columns)
+        self.state.last[:rows] = columns
+        self.state.made[:rows] += 1
+        for session in self.sessions[:rows]:
             self._made[session] += 1
 
     def save(self, session: int) -> dict[str, Tensor]:
-        """All of a session as plain tensors; `resume` goes on with the very tokens that it would have drawn."""
-        tensors = {name: part.clone() for name, part in self.state.row(self._row(session)).items()}
+        """All of a session as plain tensors in the host's memory: a device has less. `resume` goes on with the very
+        tokens that it would have drawn."""
+        tensors = {name: part.to("cpu", copy=True) for name, part in self.state.row(self._row(session)).items()}
         return {**tensors, **self._plans[session].save()}
 
     def resume(self, saved: Mapping[str, Tensor]) -> int:
@@ -189,14 +194,14 @@ class Streams:
         self._plans[session], self._made[session] = Plan.load(saved), int(saved["made"])
         return session
 
-    def _unfinished(self) -> list[tuple[int, Plan]]:
-        """Rows that have acts to come."""
-        plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions))
+    def _unfinished(self, rows: int) -> list[tuple[int, Plan]]:
+        """Those of the first rows that have acts to come."""
+        plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions[:rows]))
         return [(row, plan) for row, plan in plans if len(plan.acts)]
 
     def _due(self, columns: Tensor) -> list[tuple[int, Plan]]:
         """Rows that have acts to come and have just drawn END."""
-        unfinished = self._unfinished()
+        unfinished = self._unfinished(len(columns))
         ended = (columns[:, 0] < 0).tolist() if unfinished else []
         return [(row, plan) for row, plan in unfinished if ended[row]]
 
@@ -244,6 +249,16 @@ class Streams:
         self._started += 1
         self.sessions.append(self._started)
         return len(self.sessions) - 1
+
+    def _exchange(self, row: int, other: int) -> None:
+        """Let two sessions change rows."""
+        if row != other:
+            second = self.state.row(other)
+            for name, first in self.state.row(row).items():
+                kept = first.clone()
+                first.copy_(second[name])
+                second[name].copy_(kept)
+            self.sessions[row], self.sessions[other] = self.sessions[other], self.sessions[row]
 
     def _row(self, session: int) -> int:
         if session not in self.sessions:

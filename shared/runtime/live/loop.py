@@ -236,19 +236,24 @@ class LiveLoop:
         streams, self._held = list(self._held.values()), {}
         for held in streams:
             held.session = None
-        sound = [held for held in streams if self._sound(held)]
+        room, sound = self._open_room(), list[Held]()
+        for held in streams:
+            if self._sound(held, room):
+                sound.append(held)
+            else:
+                room = self._open_room()
         if len(sound) == len(streams):
             raise error
-        self.room = self._open_room()
+        self.room = room
         for held in sound:
             self._join(held)
 
-    def _sound(self, held: Held) -> bool:
-        """Whether a stream can make its next frame."""
-        room = self._open_room()
+    def _sound(self, held: Held, room: Room) -> bool:
+        """Whether a stream can make its next frame in an empty room, which is empty again where it can."""
         try:
             session = _entered(room, held)
             encode_frame(room.catch_up(session, 1)[0].frame)
+            room.stop(session)
         except Exception as error:
             self._close(held, "it could not go on", as_problem(error))
             return False

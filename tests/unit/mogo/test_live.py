@@ -121,13 +121,21 @@ def test_a_paused_session_goes_on_with_the_frames_it_would_have_shown(generator:
     assert len(room) == 1
 
 
-def test_a_session_that_catches_up_holds_the_others_where_they_are(generator: Generator) -> None:
-    room = LiveRoom(generator, 2)
-    other, mine = room.start(text_features(0), 2), room.start(text_features(1), 5)
-    room.step()
-    assert [made.frame.number for made in room.catch_up(mine, 6)] == [1, 2, 3, 4, 5, 6]
-    after = room.step()
-    assert (after[mine].frame.number, after[other].frame.number) == (7, 1)
+def test_a_session_catches_up_alone_and_all_go_on_as_if_it_had_not_been_behind(generator: Generator) -> None:
+    room, alike = LiveRoom(generator, 3), LiveRoom(generator, 3)
+    others, mine = [room.start(text_features(0), 2), room.start(text_features(2), 3)], room.start(text_features(1), 5)
+    found = {name: [frame] for name, frame in room.step().items()}
+    found[mine] += room.catch_up(mine, 6)
+    for _ in range(3):
+        for name, frame in room.step().items():
+            found[name].append(frame)
+    assert [made.frame.number for made in found[mine]] == list(range(10))
+    for name, (text, seed) in zip([*others, mine], [(0, 2), (2, 3), (1, 5)], strict=True):
+        wanted = run(alike, alike.start(text_features(text), seed), len(found[name]))
+        assert [made.frame.number for made in found[name]] == list(range(len(wanted)))
+        for made, expected in zip(found[name], wanted, strict=True):
+            assert np.array_equal(made.tokens, expected.tokens)
+            np.testing.assert_allclose(made.frame.rotations, expected.frame.rotations, atol=1e-5)
 
 
 def test_frames_can_be_sent(generator: Generator) -> None:

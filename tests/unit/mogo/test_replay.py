@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import structlog
 import torch
 
 from tests.support.prepared import text_features
@@ -52,6 +53,35 @@ def test_rows_that_nobody_sits_in_change_nothing_where_they_are_computed_along(g
     assert torch.equal(played(along), played(alone))
 
 
+def refusing(error: type[RuntimeError], monkeypatch: pytest.MonkeyPatch) -> Streams:
+    """Streams whose step cannot be recorded."""
+
+    def refuse(_: Replayed) -> None:
+        raise error("operation not permitted when stream is capturing")
+
+    monkeypatch.setattr(Replayed, "_record", refuse)
+    streams = opened(transformer(), 4)
+    streams._draw = Replayed(streams._next, 4, CUDA)
+    return streams
+
+
+def test_a_step_that_cannot_be_recorded_is_run_as_it_is_and_the_log_says_so_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    streams = refusing(RuntimeError, monkeypatch)
+    with structlog.testing.capture_logs() as logs:
+        streams.prepare()
+        assert torch.equal(played(streams), played(opened(transformer(), 4)))
+    assert [(line["log_level"], line["error"]) for line in logs] == [
+        ("error", "operation not permitted when stream is capturing")
+    ]
+
+
+def test_no_room_for_a_recorded_step_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(torch.OutOfMemoryError):
+        refusing(torch.OutOfMemoryError, monkeypatch).prepare()
+
+
 @pytest.mark.gpu
 @on_a_gpu
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
@@ -59,7 +89,9 @@ def test_a_recorded_step_draws_what_the_step_itself_draws(dtype: torch.dtype) ->
     packed = PackedModel(transformer().to(CUDA), dtype=dtype)
     recorded, direct = Streams(packed, 4), Streams(packed, 4)
     assert isinstance(recorded._draw, Replayed)
-    recorded.prepare()
+    with structlog.testing.capture_logs() as refused:
+        recorded.prepare()
+    assert not refused
     step = direct._next
     direct._draw = lambda rows: step(4)[:rows].clone()
     assert torch.equal(played(recorded, CUDA), played(direct, CUDA))

@@ -100,6 +100,34 @@ def test_sessions_join_and_leave_between_frames_and_disturb_nobody() -> None:
     assert torch.equal(after[third], alone(3, 20))
 
 
+def test_one_session_goes_on_alone_and_the_others_then_draw_what_they_would_have_drawn() -> None:
+    streams = opened(transformer(), 3)
+    names = {streams.start(said(seed), seed): seed for seed in (1, 2, 3)}
+    found = {session: [column] for session, column in streams.step().items()}
+    middle = list(names)[1]
+    for _ in range(9):
+        (shown,) = streams.step(middle).items()
+        found[shown[0]].append(shown[1])
+    for _ in range(6):
+        for session, column in streams.step().items():
+            found[session].append(column)
+    assert {session: len(columns) for session, columns in found.items()} == {
+        session: 16 if session == middle else 7 for session in names
+    }
+    for session, seed in names.items():
+        assert torch.equal(torch.stack(found[session]), alone(seed, len(found[session])))
+
+
+def test_what_went_wrong_in_a_row_is_not_handed_on_to_who_sits_there_next() -> None:
+    streams = opened(transformer(), 1)
+    spoiled = streams.start(said(1), 1)
+    run(streams, 3)
+    streams.state.memory.fill_(torch.nan)
+    streams.stop(spoiled)
+    session = streams.start(said(2), 2)
+    assert torch.equal(run(streams, 5)[session], alone(2, 5))
+
+
 def test_tokens_depend_on_seed_and_prompt() -> None:
     streams = opened(transformer(), 3)
     a, b, c = streams.start(said(1), 1), streams.start(said(1), 2), streams.start(said(2), 1)
