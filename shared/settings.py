@@ -1,29 +1,106 @@
-"""Every setting of the product, read once from the environment (prefix `MAREY_`).
+"""Every setting of the product, read once from the environment (prefix `MAREY_`) and checked there.
 
 Secrets may come by file: `MAREY_DATABASE_URL_FILE=/run/secrets/db` is read where `MAREY_DATABASE_URL` is unset.
+docs/settings.md has a line for each.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import re
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
+from annotated_types import Ge, Gt, Le
 from platformdirs import user_data_path
-from pydantic import Field, SecretStr, field_validator, model_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    SecretStr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from shared.errors import InvalidInput
 from shared.rates import check_rates
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+PREFIX = "MAREY_"
+BY_FILE = (
+    *("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
+    "webhook_key",
+)
+"""Settings that may come by file."""
+LONGEST = 366 * 86_400
+"""Seconds; what is longer means for ever, and some clocks cannot count so far."""
+DEVICE = re.compile(r"auto|cpu|cuda(:[0-9]{1,3})?")
+DATABASES = ("postgresql+psycopg", "postgresql")
+QUEUES = ("redis", "rediss", "redis+socket")
+HOST = re.compile(r"(\[[^\]]*\]|[^:]*)(:[0-9]{1,5})?")
+WEB = re.compile(r"https?://[^/?#\s]")
+
+
+def _of_json(value: object) -> object:
+    """What a variable's text says, for settings that are lists or objects; what is no JSON is refused as the text."""
+    try:
+        return json.loads(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
+def _device(value: str) -> str:
+    if DEVICE.fullmatch(value) is None:
+        raise ValueError("Use auto, cpu, cuda or cuda:N.")
+    return value
+
+
+def _database(value: SecretStr) -> SecretStr:
+    return _address(value, DATABASES, "Write postgresql+psycopg://user:password@host:5432/name.")
+
+
+def _queue(value: SecretStr) -> SecretStr:
+    return _address(value, QUEUES, "Write redis://host:6379/0, rediss://… or redis+socket:///path.")
+
+
+def _address(value: SecretStr, schemes: tuple[str, ...], hint: str) -> SecretStr:
+    scheme, _, rest = value.get_secret_value().partition("://")
+    host = re.split("[/?]", rest.rpartition("@")[2], maxsplit=1)[0]  # a password may hold anything
+    if scheme not in schemes or HOST.fullmatch(host) is None:
+        raise ValueError(hint)
+    return value
+
+
+def _web(value: str) -> str:
+    if WEB.match(value) is None:
+        raise ValueError("Write it as https://marey.example.com.")
+    return value
+
+
+def _level(value: object) -> object:
+    return value.upper() if isinstance(value, str) and value.upper() in LEVELS else value
+
+
+Seconds = Annotated[float, Field(gt=0, le=LONGEST)]
+Port = Annotated[int, Field(ge=1, le=65535)]
+Database = Annotated[SecretStr, AfterValidator(_database)]
+Queue = Annotated[SecretStr, AfterValidator(_queue)]
+Web = Annotated[str, AfterValidator(_web)]
+Names = Annotated[list[str], NoDecode, BeforeValidator(_of_json)]
+Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
+LEVELS: tuple[str, ...] = get_args(Level)
 
 
 class Settings(BaseSettings):
     """Settings of every process; the defaults are those of the embedded profile."""
 
-    model_config = SettingsConfigDict(env_prefix="MAREY_", extra="ignore")
+    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, extra="ignore")
 
     home: Path = Field(default_factory=lambda: user_data_path("marey", appauthor=False))
     """Database, assets, logs, lock and `server.json` of the embedded server."""
@@ -31,13 +108,13 @@ class Settings(BaseSettings):
     models: Path = REPOSITORY / "models"
     """Folder of the model bundles."""
 
-    database_url: SecretStr | None = None
+    database_url: Database | None = None
     """`postgresql+psycopg://…`; unset = the embedded Postgres of `home`."""
 
-    queue_url: SecretStr | None = None
+    queue_url: Queue | None = None
     """`redis://…` or `redis+socket://…`; unset = the embedded Valkey of `home`."""
 
-    streams_url: SecretStr | None = None
+    streams_url: Queue | None = None
     """Redis of the frame streams; unset = `queue_url`."""
 
     store: str | None = None
@@ -52,68 +129,71 @@ class Settings(BaseSettings):
     s3_secure: bool = False
 
     host: str = "127.0.0.1"
-    port: int = 8400
-    allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
-    idle_seconds: float = Field(default=20.0, gt=0)
+    port: Port = 8400
+    allowed_hosts: Names = ["127.0.0.1", "localhost", "[::1]"]
+    idle_seconds: Seconds = 20.0
     """A connection to the API that asks for nothing for so long is closed, and so is one whose request has no whole
     head by then."""
-    body_seconds: float = Field(default=600.0, gt=0)
+    body_seconds: Seconds = 600.0
     """The body of a request must be here after this long: 64 MiB at 110 KiB a second."""
-    body_pause_seconds: float = Field(default=20.0, gt=0)
+    body_pause_seconds: Seconds = 20.0
     """It may be slower than 4 KiB a second for this long in all."""
-    rates: dict[str, str] = {}
+    rates: Annotated[dict[str, str], NoDecode, BeforeValidator(_of_json)] = {}
     """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
     is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
 
     require_licence: Literal["any", "commercial"] = "any"
     """`commercial` refuses bundles whose weights carry non-commercial terms."""
 
-    device: str = "auto"
+    device: Annotated[str, AfterValidator(_device)] = "auto"
     """`auto`, `cpu`, `cuda`, `cuda:1`, …"""
-    threads: int = 0
+    threads: int = Field(default=0, ge=0, le=1024)
     """Torch threads of one worker; 0 = cores divided by the torch children of this machine."""
 
-    lease_seconds: float = 10.0
-    heartbeat_seconds: float = 2.5
-    stall_seconds: float = 120.0
+    lease_seconds: Seconds = 10.0
+    """What a worker has claimed and does not renew for so long goes to others."""
+    heartbeat_seconds: Seconds = Field(default=2.5, validate_default=True)
+    """A worker renews its leases this often."""
+    stall_seconds: Seconds = 120.0
     """A decode loop without progress for this long loses its lease (first load and compile excepted)."""
-    sweep_seconds: float = 2.0
-    relay_seconds: float = 0.5
-    evaluation_seconds: float = 2.0
+    sweep_seconds: Seconds = 2.0
+    relay_seconds: Seconds = 0.5
+    evaluation_seconds: Seconds = 2.0
     """The scheduler looks this often whether a schedule is due or an evaluation can go on."""
-    retention_seconds: float = 60.0
+    retention_seconds: Seconds = 60.0
     """The scheduler looks this often for jobs whose days are over, and for files with erased prompts."""
-    max_attempts: int = 3
-    drain_seconds: float = 300.0
+    max_attempts: int = Field(default=3, ge=1, le=1000)
+    """An item that fails, or whose worker dies, so many times is given up."""
+    drain_seconds: Seconds = 300.0
     """A drain task claims nothing after this long and returns."""
 
     rewriter: Literal["none", "rules", "openai"] | None = None
     """Brings prompts into the words of captions before they are read; unset = what the bundle says, usually `none`.
     The API and all workers need the same."""
-    rewriter_url: str = "https://api.openai.com/v1"
+    rewriter_url: Web = "https://api.openai.com/v1"
     """Of `openai`: any endpoint that speaks `POST /chat/completions`."""
-    rewriter_model: str | None = None
+    rewriter_model: str | None = Field(default=None, validate_default=True)
     rewriter_key: SecretStr | None = None
     rewriter_seconds: float = Field(default=10.0, gt=0, le=60)
     """For one prompt, with all tries; then it is read as it was written."""
 
-    public_url: str | None = None
+    public_url: Web | None = None
     """Where clients reach the API, as `https://marey.example.com`; stands in webhooks. Unset = `host` and `port`."""
-    webhook_allow: list[str] = ["public"]
+    webhook_allow: Names = ["public"]
     """Networks that webhooks may tell, as `["public", "10.1.0.0/16"]`; `public` = the internet, by https."""
     webhook_key: SecretStr | None = None
     """Fernet keys of webhooks' signing secrets: the first encrypts, all decrypt. `marey serve` brings its own."""
-    webhook_seconds: float = 1.0
+    webhook_seconds: Seconds = 1.0
     """The scheduler looks this often whether there is something to tell."""
 
-    live_slots: int = 4
+    live_slots: int = Field(default=4, ge=0, le=1000)
     """Live streams of one worker at once."""
-    streams_per_key: int = 4
+    streams_per_key: int = Field(default=4, ge=0, le=1000)
     """Open live streams of one API key."""
-    stream_idle_seconds: float = 60.0
+    stream_idle_seconds: Seconds = 60.0
     """A live stream that nobody watches ends after this long."""
 
-    audit_days: float = Field(default=400.0, gt=0)
+    audit_days: float = Field(default=400.0, gt=0, le=36_525)
     """The audit log is kept this long."""
 
     metrics_host: str = "127.0.0.1"
@@ -121,7 +201,7 @@ class Settings(BaseSettings):
     """Where workers and the scheduler tell Prometheus their numbers, without a key; unset = nowhere. Each process needs
     a port of its own: `marey serve` counts up from this one. The API has `/metrics`."""
 
-    log_level: str = "INFO"
+    log_level: Annotated[Level, BeforeValidator(_level)] = "INFO"
     log_json: bool = False
 
     @property
@@ -141,22 +221,108 @@ class Settings(BaseSettings):
         try:
             return check_rates(values, where="MAREY_RATES")
         except InvalidInput as error:
-            raise ValueError(str(error)) from error
+            raise ValueError(f"{error.message}. {error.hint}") from error
+
+    @field_validator("webhook_allow")
+    @classmethod
+    def _known_networks(cls, values: list[str]) -> list[str]:
+        from shared.webhooks.addresses import Allowed  # with an HTTP client, which few processes need
+
+        try:
+            Allowed.of(values)
+        except InvalidInput as error:
+            raise ValueError(f"{error.message}. {error.hint}") from error
+        return values
+
+    @field_validator("heartbeat_seconds")
+    @classmethod
+    def _within_the_lease(cls, value: float, info: ValidationInfo) -> float:
+        lease = info.data.get("lease_seconds")
+        if lease is not None and value >= lease:
+            raise ValueError(f"It must be shorter than MAREY_LEASE_SECONDS, which is {lease:g}.")
+        return value
+
+    @field_validator("rewriter_model")
+    @classmethod
+    def _named_model(cls, value: str | None, info: ValidationInfo) -> str | None:
+        if value is None and info.data.get("rewriter") == "openai":
+            raise ValueError("MAREY_REWRITER=openai needs the name of your language model.")
+        return value
 
     @model_validator(mode="before")
     @classmethod
     def _secrets_by_file(cls, values: dict[str, object]) -> dict[str, object]:
-        for name in (
-            *("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
-            "webhook_key",
-        ):
-            path = os.environ.get(f"MAREY_{name.upper()}_FILE")
+        for name in BY_FILE:
+            variable = f"{PREFIX}{name.upper()}_FILE"
+            path = os.environ.get(variable)
             if path and name not in values:
-                values[name] = Path(path).read_text(encoding="utf-8").strip()
+                values[name] = _secret_of(Path(path), variable)
         return values
 
 
 @lru_cache(maxsize=1)
 def settings() -> Settings:
-    """The settings of this process."""
-    return Settings()
+    """The settings of this process.
+
+    Raises:
+        InvalidInput: a variable holds what cannot be used.
+    """
+    try:
+        return Settings()
+    except ValidationError as error:
+        raise _told(error) from None  # pydantic's own words quote secrets
+
+
+def _secret_of(path: Path, variable: str) -> str:
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        hint = "It names the file that holds the secret."
+        raise InvalidInput(f"{str(path)!r} cannot be read: {reason}", where=variable, hint=hint) from error
+
+
+def _told(error: ValidationError) -> InvalidInput:
+    """The first thing that is wrong: the variable, its value and what is allowed. A secret's value is not told."""
+    first = error.errors(include_url=False)[0]
+    name = str(first["loc"][0])
+    variable = PREFIX + name.upper()
+    value = "what it holds" if _is_secret(name) else repr(first["input"])
+    if not os.environ.get(variable) and os.environ.get(f"{variable}_FILE"):
+        variable += "_FILE"
+    own = first["type"] == "value_error"
+    hint = str(first["ctx"]["error"]) if own else _allowed(name)  # pyright: ignore[reportTypedDictNotRequiredAccess]
+    message = "is not set" if first["input"] is None else f"{value[:200]} cannot be used"
+    return InvalidInput(message, where=variable, hint=hint)
+
+
+def _is_secret(name: str) -> bool:
+    return "SecretStr" in str(Settings.model_fields[name].annotation)
+
+
+def _allowed(name: str) -> str:
+    """What a setting may be, from its type and bounds."""
+    field = Settings.model_fields[name]
+    kind: Any = field.annotation
+    if type(None) in get_args(kind):
+        kind = next(each for each in get_args(kind) if each is not type(None))
+    if get_origin(kind) is Literal:
+        return f"Use one of {', '.join(get_args(kind))}."
+    if kind in (int, float):
+        return f"Use {'a whole number' if kind is int else 'a number'}{_bounds(field.metadata)}."
+    return ALLOWED.get(get_origin(kind) or kind, "Write plain text.")
+
+
+def _bounds(metadata: list[Any]) -> str:
+    found: Mapping[type, Any] = {type(each): each for each in metadata}
+    low = f" of {found[Ge].ge:g}" if Ge in found else f" over {found[Gt].gt:g}"
+    joined = " to" if Ge in found else ", at most"
+    return f"{low}{joined} {found[Le].le}"
+
+
+ALLOWED = {
+    bool: "Use true or false.",
+    dict: 'Write an object in JSON, as {"read": "6000/minute"}.',
+    list: 'Write a list in JSON, as ["one", "two"].',
+}
+"""By type, where the type alone says it."""

@@ -42,6 +42,14 @@ def check_all() -> Iterator[Check]:
     yield _extra("worker", "torch", "generate, worker, train")
     yield _home()
     yield _server()
+    if _installed("pydantic_settings"):
+        from shared.settings import settings
+
+        try:
+            settings()
+        except MareyError as error:
+            yield broken("settings", error)
+            return  # all that follows needs them
     if _installed("fastapi"):
         from services.cli.checkup_backing import check_backing
 

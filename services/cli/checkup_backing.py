@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 from services.cli.checkup import Check, broken, free_space
 from services.cli.database import engine_of, settings_here
 from services.cli.place import read_server
+from services.cli.ports import try_port
 from shared.errors import MareyError, Unreachable
 
 if TYPE_CHECKING:
@@ -58,14 +58,10 @@ def _guarded(name: str, check: Callable[[], Check]) -> Iterator[Check]:
 
 
 def _port(config: Settings) -> Check:
-    family = socket.AF_INET6 if ":" in config.host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((config.host, config.port))
-        except OSError as error:
-            message = f"{config.port} of {config.host} cannot be used: {error.strerror}"
-            return Check("port", "warn", message, "`marey serve --port` and MAREY_PORT name another.")
+    try:
+        try_port(config.host, config.port)
+    except MareyError as error:
+        return Check("port", "warn", error.message, error.hint)
     return Check("port", "ok", f"{config.port} of {config.host} is free for `marey serve`")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shutil
 import signal
 import subprocess
@@ -22,6 +23,11 @@ TICK = 0.2
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
 """Seconds before a child that ended is started again; doubled each time it ends within a minute."""
 STEADY = 60.0
+TAIL = 2**16
+"""Bytes of a log that are searched for why its process ended."""
+LONGEST_LINE = 500
+ERROR_LINE = re.compile(r'^marey: |\[(error|critical) *\]|"level": "(error|critical)"|^\w+(\.\w+)*(Error|Exception)\b')
+"""A command's own words, a log line as text or as JSON, the end of a traceback."""
 STOP_SECONDS = 35.0
 """Workers release their leases within 30 s; longer and they are killed."""
 
@@ -32,6 +38,7 @@ class Child:
 
     Attributes:
         log: where its output goes; None = where ours does.
+        log_from: where in the log this process begins.
     """
 
     name: str
@@ -42,6 +49,7 @@ class Child:
     pause: float = FIRST_PAUSE
     began: float = 0.0
     due: float = 0.0
+    log_from: int = 0
 
     def keep(self, now: float) -> None:
         """Start it if it does not run and its pause is over."""
@@ -56,11 +64,27 @@ class Child:
             self.pause = FIRST_PAUSE
         where = "" if self.log is None else f" Its log: {self.log}"
         console.say(f"{self.name} ended ({_how(code)}); starting it again in {self.pause:g} s.{where}")
+        if code > 0 and (why := self._last_error()) is not None:
+            console.say(f"  {why}")
         self.process, self.due = None, now + self.pause
         self.pause = min(self.pause * 2, LONGEST_PAUSE)
 
+    def _last_error(self) -> str | None:
+        """The last line of its log that tells of an error; None = there is none since it was started."""
+        if self.log is None:
+            return None
+        try:
+            with self.log.open("rb") as stream:
+                stream.seek(max(self.log_from, self.log.stat().st_size - TAIL))
+                lines = stream.read().decode(errors="replace").splitlines()
+        except OSError:
+            return None
+        return next((line[:LONGEST_LINE] for line in reversed(lines) if ERROR_LINE.search(line)), None)
+
     def start(self, now: float) -> None:
         """Start it. It gets SIGTERM when we die, however we die."""
+        if self.log is not None:
+            self.log_from = self.log.stat().st_size if self.log.exists() else 0
         with contextlib.nullcontext() if self.log is None else self.log.open("ab") as output:
             self.process = subprocess.Popen(
                 [*_death_signal(), *self.command],

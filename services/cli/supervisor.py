@@ -7,7 +7,6 @@ import fcntl
 import json
 import os
 import signal
-import socket
 import time
 import urllib.error
 import urllib.request
@@ -18,14 +17,15 @@ from io import TextIOWrapper
 from services.cli import console
 from services.cli.children import Child, marey, metrics_port, stop_all
 from services.cli.place import Server, read_server, write_server
-from services.cli.roles.serving import GENERATORS, SHOWS, role_of, threads_of
+from services.cli.ports import try_port
+from services.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
 from shared.errors import Conflict, InvalidInput, MareyError
 from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
 from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
 from shared.settings import Settings
 from shared.storage import open_store
-from shared.webhooks.vault import key_file
+from shared.webhooks.vault import Vault, key_file
 
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")
@@ -69,10 +69,17 @@ class Supervisor:
         Raises:
             Conflict: another server runs on this home, or the port is taken.
             NotFound: there is no model to serve.
+            InvalidInput: a setting says what no child could start with.
         """
+        if (self.home / "lock").exists():
+            with self._locked():  # who runs here is told first: another port would not help
+                pass
         for queues in self.roles:
             role_of(queues, self.config)  # says what is wrong with a bundle before anything is started
-        _free_port(self.config.host, self.config.port)
+        if self.config.webhook_key is not None:
+            Vault.of(self.config)
+        check_device(self.config.device, self.roles)
+        try_port(self.config.host, self.config.port)
         with self._locked():
             for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
                 signal.signal(number, self._on_signal)
@@ -207,28 +214,6 @@ class Supervisor:
 
 
 _WHO_HINT = "Use that one, stop it, or give this one its own MAREY_HOME and --port."
-
-
-def _free_port(host: str, port: int) -> None:
-    """Raises:
-    Conflict: somebody listens there.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise Conflict(
-                f"port {port} of {host} cannot be used: {error.strerror}", hint="Choose another with --port (0 = any)."
-            ) from error
-
-
-def any_port(host: str) -> int:
-    """A port that is free now."""
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.bind((host, 0))
-        return probe.getsockname()[1]
 
 
 def _answers(url: str) -> bool:

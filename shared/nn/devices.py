@@ -1,13 +1,19 @@
-"""Which device, and what it does fast."""
+"""Which device, and what it does fast.
+
+`python -m shared.nn.devices cuda` says whether there is one, for processes that do without torch.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 
 import torch
 
 from shared.errors import InvalidInput
+
+HINT = "Set MAREY_DEVICE (of a training, --device) to cpu or auto."
 
 
 def choose_device(name: str) -> torch.device:
@@ -24,7 +30,9 @@ def choose_device(name: str) -> torch.device:
     except RuntimeError as error:
         raise InvalidInput(f"{name!r} is no device", hint="Use auto, cpu, cuda or cuda:N.") from error
     if device.type == "cuda" and not torch.cuda.is_available():
-        raise InvalidInput("there is no CUDA device here", where=name, hint="Use --device cpu or auto.")
+        raise InvalidInput("there is no CUDA device here", where=name, hint=HINT)
+    if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
+        raise InvalidInput(f"there are {torch.cuda.device_count()} CUDA devices here", where=name, hint=HINT)
     return device
 
 
@@ -35,3 +43,10 @@ def fast_bf16(device: torch.device) -> bool:
             return torch.cuda.is_bf16_supported(including_emulation=False)
     check: Callable[[], bool] | None = getattr(torch.cpu, "_is_avx512_bf16_supported", None)
     return os.environ.get("MAREY_BF16", "1") != "0" and check is not None and check()
+
+
+if __name__ == "__main__":
+    try:
+        choose_device(sys.argv[1])
+    except InvalidInput as error:
+        sys.exit(error.message)

@@ -75,12 +75,10 @@ class Endpoint:
         """What the settings say.
 
         Raises:
-            InvalidInput: no model, or no http address.
+            InvalidInput: no model.
         """
         if not config.rewriter_model:
             raise InvalidInput("no language model is named", where="MAREY_REWRITER_MODEL", hint="Name one of yours.")
-        if not config.rewriter_url.startswith(("http://", "https://")):
-            raise InvalidInput(f"{config.rewriter_url!r} is no http address", where="MAREY_REWRITER_URL")
         url = config.rewriter_url.rstrip("/")
         return cls(url, config.rewriter_model, config.rewriter_key, config.rewriter_seconds)
 

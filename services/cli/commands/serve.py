@@ -20,15 +20,18 @@ def serve(
             "None given = one child for prompts, every model that has a bundle here, and evaluations.",
         ),
     ] = None,
-    port: Annotated[int | None, typer.Option("--port", help="Port of the API; 0 = any that is free.")] = None,
+    port: Annotated[
+        int | None, typer.Option("--port", min=0, max=65535, help="Port of the API; 0 = any that is free.")
+    ] = None,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
     from services.cli.extras import needs_extra
+    from services.cli.ports import try_port
     from services.cli.roles.serving import default_roles, parse_roles
 
     try:
-        from services.cli.supervisor import Supervisor, any_port
+        from services.cli.supervisor import Supervisor
         from shared.settings import Settings, settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
@@ -36,7 +39,7 @@ def serve(
     if host is not None:
         changes["host"] = host
     if port is not None:
-        changes["port"] = port or any_port(host or settings().host)
+        changes["port"] = port or try_port(host or settings().host, 0)
     config: Settings = settings().model_copy(update=changes)
     Supervisor(config, parse_roles(roles or default_roles(config))).run()
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -19,6 +21,8 @@ HANDLERS = {
     "evaluator": "workers.evaluator.handler:create_handler",
 }
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
+TEXT = "text"
+"""The queue of prompts, which computes on no device."""
 SHOWS = {"mogo": "workers.mogo.live:create_show"}
 """What the live loop of each model that streams serves."""
 GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
@@ -63,6 +67,22 @@ def role_of(queues: Sequence[str], config: Settings) -> Role:
 
     preload = {q: choose_bundle(q, config=config).reference for q in queues if q in GENERATORS}
     return Role("+".join(queues), {queue: HANDLERS[queue] for queue in queues}, preload)
+
+
+def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
+    """Nothing, if the workers of these roles can compute on the device. Asks a process of its own: ours has no torch.
+
+    Raises:
+        InvalidInput: it is not there.
+    """
+    if not device.startswith("cuda") or all(queue == TEXT for role in roles for queue in role):
+        return
+    asked = subprocess.run(
+        [sys.executable, "-m", "shared.nn.devices", device], capture_output=True, text=True, check=False
+    )
+    if asked.returncode != 0:
+        said = (asked.stderr.strip().splitlines() or ["it cannot be used"])[-1]
+        raise InvalidInput(f"is {device}: {said}", where="MAREY_DEVICE", hint="Set it to cpu or auto.")
 
 
 def threads_of(config: Settings, torch_children: int) -> int:

@@ -13,7 +13,7 @@ import pytest
 from standardwebhooks.webhooks import Webhook
 from structlog.testing import capture_logs
 
-from services.cli.supervisor import any_port
+from services.cli.ports import try_port
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import Deliverer
 from shared.jobs import EventKind, transaction
@@ -183,7 +183,7 @@ def test_a_key_needs_the_scope_operate_and_another_tenant_sees_nothing(place: St
 
 
 def test_a_server_without_a_key_for_secrets_says_so(place: Studio) -> None:
-    config = place.config.model_copy(update={"webhook_key": None, "port": any_port("127.0.0.1")})
+    config = place.config.model_copy(update={"webhook_key": None, "port": try_port("127.0.0.1", 0)})
     with ApiThread(config) as url:
         headers = {"Authorization": f"Bearer {place.api.key}"}
         problem = refused(httpx2.post(f"{url}/v1/webhooks", json={"url": HOOK}, headers=headers), 403, "refused")

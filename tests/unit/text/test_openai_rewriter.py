@@ -219,11 +219,7 @@ def test_a_machine_chooses_its_rewriter_and_the_keys_of_features_tell_which() ->
     assert feature_key("walk", specs[0]) == feature_key("walk", spec)
 
 
-@pytest.mark.parametrize(
-    ("values", "where"),
-    [({}, "MAREY_REWRITER_MODEL"), ({"rewriter_model": "m", "rewriter_url": "file:///etc"}, "MAREY_REWRITER_URL")],
-)
-def test_settings_that_lead_nowhere_are_refused(values: dict[str, str], where: str) -> None:
+def test_no_language_model_is_asked_where_none_is_named() -> None:
     with pytest.raises(InvalidInput) as caught:
-        Endpoint.of(Settings.model_validate(values))
-    assert caught.value.where == where
+        Endpoint.of(Settings())
+    assert caught.value.where == "MAREY_REWRITER_MODEL"
