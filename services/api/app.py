@@ -26,6 +26,7 @@ from services.api.evaluations.routes import router as evaluations_router
 from services.api.guards import HostGuard
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
+from services.api.home.routes import router as home_router
 from services.api.jobs.events import message
 from services.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
 from services.api.jobs.routes import router as jobs_router
@@ -53,7 +54,8 @@ from shared.webhooks.vault import Vault
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams and sockets end at once."""
 ROUTERS = (
-    *(health_router, jobs_router, motions_router, streams_router, live_router, models_router, texts_router),
+    *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, models_router),
+    texts_router,
     *(evaluations_router, schedules_router, webhooks_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)

@@ -31,6 +31,10 @@ KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")
 TICK = 0.2
 LOG_LIMIT = 10 * 2**20
+KEYS = (
+    "{url}/live and other clients want a key: `marey admin keys create NAME` makes one. "
+    "Commands on this machine use that in {path}."
+)
 
 
 @dataclass
@@ -165,6 +169,7 @@ class Supervisor:
             if announced and not ready and _answers(f"{url}/readyz"):
                 ready = True
                 console.say("Ready. Submit with `marey submit 'a person waves'`; stop with Ctrl-C.")
+                console.say(KEYS.format(url=url, path=self.home / "server.json"))
             time.sleep(TICK)
 
     def _stop(self) -> None:

@@ -15,7 +15,8 @@ from shared.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi
 
-NOBODYS = {"GET /livez", "GET /readyz", "GET /live"}
+PAGES = {"GET /", "GET /live"}
+NOBODYS = {"GET /livez", "GET /readyz", *PAGES}
 """What wants no key: another one is put here on purpose, or the tests fail."""
 SCOPES = {"GET": "read", "PATCH": "operate", "DELETE": "operate", "POST": "operate"}
 """What a method wants, but for these."""
@@ -67,8 +68,8 @@ def test_the_document_has_every_route_and_says_which_scope_it_wants() -> None:
         if isinstance(route, APIRoute)
         for method in route.methods - {"HEAD"}
     }
-    assert served - OPERATIONS.keys() == {"GET /live"}  # a page
-    assert {operation for operation, scope in OPERATIONS.items() if scope is None} == NOBODYS - {"GET /live"}
+    assert served - OPERATIONS.keys() == PAGES
+    assert {operation for operation, scope in OPERATIONS.items() if scope is None} == NOBODYS - PAGES
     assert {name: OTHERS.get(name, SCOPES[name.split(" ")[0]]) for name in CLOSED} == CLOSED
 
 

@@ -57,7 +57,7 @@ BODIES: dict[str, dict[str, Any]] = {
 }
 """`<motion>` stands for the id of one."""
 NOBODYS = {
-    "/livez", "/readyz", "/live", "/live/{file}", "/v1/models", "/v1/models/{name}", "/v1/texts/parse",
+    "/", "/livez", "/readyz", "/live", "/live/{file}", "/v1/models", "/v1/models/{name}", "/v1/texts/parse",
 }  # fmt: skip
 """Paths that tell the same to everybody."""
 OF_ALL = {"/metrics"}
