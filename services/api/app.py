@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import uvicorn
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
@@ -33,6 +33,7 @@ from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.queries import known_query
 from services.api.rates import Rates
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
@@ -72,6 +73,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         description=DESCRIPTION,
         lifespan=lambda app: _lifespan(app, config),
         generate_unique_id_function=_operation_id,
+        dependencies=[Depends(known_query)],
         docs_url=None,
         redoc_url=None,
     )

@@ -9,7 +9,7 @@ from email.utils import format_datetime
 from typing import Annotated, Any
 from uuid import UUID
 
-from fastapi import Depends, Header, Response
+from fastapi import Depends, Header, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
 from services.api.context import Context
@@ -42,6 +42,7 @@ class FileView(View):
 class Part:
     """How much of a file a request wants."""
 
+    request: Request
     byte_range: Annotated[str | None, Header(alias="Range")] = None
     if_range: Annotated[str | None, Header(alias="If-Range")] = None
     if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None
@@ -51,22 +52,23 @@ AskedPart = Annotated[Part, Depends()]
 
 
 def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, part: Part) -> Response:
-    """The answer to a request for a file of `owner`; its ETag is its sha256."""
+    """The answer to a request for a file of `owner`; its ETag is its sha256. HEAD tells the whole file's size."""
     etag = f'"{file.sha256}"'
     if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
         return Response(status_code=304, headers={"ETag": etag})
-    object_key = asset_key(tenant, file.sha256)
-    filename = f"{owner}.{file.format}"
-    url = shared.store.presign(object_key, filename=filename, media_type=file.media_type)
-    if url is not None:
-        return RedirectResponse(url, status_code=307, headers=_valid_for(PRESIGN_SECONDS))
-    wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)
     headers = {
         "ETag": etag,
         "Accept-Ranges": "bytes",
         "Cache-Control": "private, immutable, max-age=86400",
-        "Content-Disposition": f'attachment; filename="{filename}"',
+        "Content-Disposition": f'attachment; filename="{owner}.{file.format}"',
     }
+    if part.request.method == "HEAD":  # also of a bucket, whose URLs are signed for GET alone
+        return Response(headers={**headers, "Content-Length": str(file.size)}, media_type=file.media_type)
+    object_key = asset_key(tenant, file.sha256)
+    url = shared.store.presign(object_key, filename=f"{owner}.{file.format}", media_type=file.media_type)
+    if url is not None:
+        return RedirectResponse(url, status_code=307, headers=_valid_for(PRESIGN_SECONDS))
+    wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)
     return _content(shared.store, object_key, file, wanted, headers)
 
 

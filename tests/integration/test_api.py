@@ -289,6 +289,11 @@ def test_a_file_comes_whole_with_its_sha256_as_etag(http: httpx2.Client, motion:
     etag = f'"{hashlib.sha256(content).hexdigest()}"'
     assert (response.status_code, response.content, response.headers["etag"]) == (200, content, etag)
     assert http.get(f"/v1/motions/{motion}/files/npz", headers={"If-None-Match": etag}).status_code == 304
+    head = http.head(f"/v1/motions/{motion}/files/npz")
+    assert (head.status_code, head.content) == (200, b"")
+    for name in ("etag", "content-length", "content-type", "content-disposition", "accept-ranges"):
+        assert head.headers[name] == response.headers[name]
+    assert http.head(f"/v1/motions/{motion}/files/glb").status_code == 404
     refused(http.get(f"/v1/motions/{motion}/files/glb"), 404, "not-found")
     refused(http.get(f"/v1/motions/{motion}/files/..%2f..%2fetc"), 404, "not-found")
     refused(http.get(f"/v1/motions/{uuid4()}/files/npz"), 404, "not-found")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from uuid import uuid4
 
 import httpx2
 import pytest
 
+from services.api.app import create_app, openapi
 from shared.runtime.embedded import EmbeddedServer
+from shared.settings import Settings
 from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_generator
 from tests.support.live_api import running_api, settings_of
 
@@ -66,3 +70,17 @@ def test_a_bundle_of_the_wrong_kind_or_of_nobody_is_told_by_the_field_that_names
         for field, name in (("bundle", JUDGE), ("bundle", "nobody"), ("evaluator", GENERATOR), ("evaluator", "nobody")):
             body = {"bundle": GENERATOR, "prompts": PROMPTS, **more, field: name}
             assert told(http.post(path, json=body)) == (422, field)
+
+
+def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: httpx2.Client) -> None:
+    for template, operations in openapi(create_app(Settings()))["paths"].items():
+        path = re.sub(r"{\w+}", lambda _: str(uuid4()), template)
+        for method in operations:
+            assert told(http.request(method, path, params={"nonsense": "1"})) == (422, "nonsense"), (method, template)
+
+
+def test_a_misspelt_filter_is_told_with_those_there_are(http: httpx2.Client) -> None:
+    response = http.get("/v1/motions", params={"tags": "show=zzz"})
+    assert told(response) == (422, "tags")
+    assert "tag, text" in response.json()["hint"]
+    assert http.get("/v1/motions", params={"tag": "show=zzz"}).json()["items"] == []

@@ -50,6 +50,7 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
         with api.http() as http:
             answer = http.get(path)
             assert answer.status_code == 307
+            assert http.head(path).headers["content-length"] == str(len(content))
         signed = answer.headers["location"]
         assert httpx2.get(signed).content == content
         assert httpx2.get(signed[:-4] + "0000").status_code == 403

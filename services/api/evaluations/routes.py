@@ -73,6 +73,7 @@ def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> Eval
     return service.detail(conn, jobs.cancel_evaluation(conn, key.tenant, evaluation))
 
 
+@router.head("/{evaluation}/report/{format}", include_in_schema=False)
 @router.get("/{evaluation}/report/{format}", response_class=Response, responses=FILE_RESPONSES)
 def get_report(
     evaluation: UUID,

@@ -104,6 +104,7 @@ def get_motion(motion: UUID, conn: Connection, key: Reader) -> MotionDetailView:
     return MotionDetailView.of(jobs.get_motion(conn, key.tenant, motion))
 
 
+@router.head("/{motion}/files/{format}", include_in_schema=False)
 @router.get("/{motion}/files/{format}", response_class=Response, responses=FILE_RESPONSES)
 def get_file(
     motion: UUID,
