@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
@@ -21,6 +22,9 @@ TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER = "2"
 """Seconds: a database or store that restarts is back in about that."""
+
+LONGEST_VALUE = 80
+SUBJECT = re.compile(r"^\w+ should")
 
 log = structlog.get_logger(__name__)
 
@@ -130,11 +134,12 @@ def install(app: FastAPI) -> None:
 def _validation(error: RequestValidationError) -> JSONResponse:
     problems = [_field_problem(e) for e in error.errors()]
     names = ", ".join(dict.fromkeys(p.field or "body" for p in problems))
+    many = len(problems) > 1  # of one, `where` says the field
     body = ProblemBody(
         type=TYPE_PREFIX + InvalidInput.problem_type,
         title="Invalid input",
         status=InvalidInput.status,
-        detail="; ".join(f"{p.field or 'body'}: {p.message}" for p in problems[:5]),
+        detail="; ".join(f"{p.field or 'body'}: {p.message}" if many else p.message for p in problems[:5]),
         where=names,
         problems=problems[:1000],
         total=len(problems),
@@ -165,7 +170,19 @@ def _field_problem(error: Mapping[str, Any]) -> FieldProblem:
     if error["type"] == "json_invalid":  # its path is a position
         return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
     field = ".".join(str(part) for part in path) or str(place)
-    return FieldProblem(field=_clean(field), message=_clean(str(error["msg"])) or "")
+    return FieldProblem(field=_clean(field), message=_clean(_sentence(error)) or "")
+
+
+def _sentence(error: Mapping[str, Any]) -> str:
+    """What pydantic says, with the value it says it of, where that is short."""
+    kind, message, value = str(error["type"]), str(error["msg"]), error.get("input")
+    if kind == "missing":
+        return "is missing"
+    if not isinstance(value, str | int | float) or len(shown := repr(value)) > LONGEST_VALUE:
+        return message
+    if kind.startswith("uuid"):
+        return f"{shown} is no id: that is a UUID, as 01234567-89ab-cdef-0123-456789abcdef"
+    return f"{shown} cannot be used: {SUBJECT.sub('it should', message)}"
 
 
 def _clean(text: str | None) -> str | None:

@@ -84,7 +84,7 @@ def _home() -> Check:
 
     folder = home()
     try:
-        check_folder(folder)
+        check_folder(folder, hint="Make it writable for this user, or set MAREY_HOME to another folder.")
     except MareyError as error:
         return broken("home", error)
     return free_space("home", folder)

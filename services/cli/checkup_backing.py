@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from services.cli.checkup import Check, broken, free_space
@@ -31,7 +32,8 @@ def check_backing() -> Iterator[Check]:
     from shared.settings import settings
 
     config = settings_here()
-    runs_here = read_server(config.home.expanduser().absolute()) is not None
+    home = config.home.expanduser().absolute()
+    runs_here = read_server(home) is not None
     if not runs_here and not os.environ.get("MAREY_SERVER"):
         yield _port(config)
     if not runs_here and settings().database_url is None:
@@ -42,7 +44,7 @@ def check_backing() -> Iterator[Check]:
         yield found
         if found.state != "bad":
             yield from _guarded("clock", lambda: _clock(engine))
-            yield from _guarded("workers", lambda: workers(engine))
+            yield from _guarded("workers", lambda: workers(engine, home / "logs" if runs_here else None))
             yield from _guarded("scheduler", lambda: scheduler(engine))
     finally:
         engine.dispose()
@@ -96,12 +98,20 @@ def clock_check(there: datetime, before: datetime, after: datetime) -> Check:
     return Check("clock", state, f"{skew:.1f} s between this machine and the database", hint)
 
 
-def workers(engine: sa.Engine) -> Check:
+def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
+    """That what waits is served, and none fell silent.
+
+    Args:
+        logs: of the `marey serve` that runs here and starts workers itself; None = there is none.
+    """
     from shared.jobs import list_workers, queue_depths, transaction
 
     with transaction(engine) as conn:
         known, depths = list_workers(conn), queue_depths(conn)
     live = sorted({worker.queue for worker in known if worker.live})
+    if not live and logs is not None:
+        hint = f"Wait while it loads its model; if that takes minutes, see {logs}."
+        return Check("workers", "warn", "none is ready yet; the server that runs here starts its own", hint)
     alone = sorted({row.queue for row in depths if row.waiting} - set(live))
     if alone:
         message = f"items wait in {', '.join(alone)}, and no worker serves that"

@@ -19,6 +19,7 @@ from services.cli.watching import watch_job
 from shared.errors import MareyError, NotFound, TimedOut, Unreachable
 
 OUT = Path("out/demo")
+INTERRUPTED = 130
 START_SECONDS = 120.0
 """Making the database, importing torch and loading the model: 15 s here; a slow disk takes longer."""
 JOB_SECONDS = 240.0
@@ -56,6 +57,9 @@ def main() -> int:
     except MareyError as error:
         console.say(f"make demo: {error}")
         return error.exit_code
+    except KeyboardInterrupt:
+        console.say("make demo: interrupted")
+        return INTERRUPTED
     failed = sum(line["state"] != "succeeded" for line in lines)
     console.say(f"{len(lines) - failed} motions (.bvh, .npz, .png) in {OUT}/ after {time.monotonic() - began:.0f} s.")
     console.say("Open a .bvh in Blender (File, Import, Motion Capture), or a .png in any viewer.")

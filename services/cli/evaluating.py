@@ -209,7 +209,7 @@ def _settings(given: Sequence[str]) -> dict[str, float]:
 
 
 def _caption(found: dict[str, Any]) -> str:
-    return f"{found['name'] or found['id'][-8:]} {found['state']}"
+    return f"{found['name'] or found['id']} {found['state']}"
 
 
 def _sleep(deadline: float | None, evaluation: str) -> None:

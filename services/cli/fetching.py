@@ -32,8 +32,11 @@ class Download:
     path: Path
 
 
-def check_folder(folder: Path) -> Path:
+def check_folder(folder: Path, hint: str = "Choose another folder.") -> Path:
     """The folder, made if need be and tried for writing.
+
+    Args:
+        hint: what to do if it cannot be written.
 
     Raises:
         InvalidInput: it cannot be made or written.
@@ -43,9 +46,7 @@ def check_folder(folder: Path) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InvalidInput(
-            f"cannot write here: {error.strerror}", where=str(folder), hint="Choose another folder with -o."
-        ) from error
+        raise InvalidInput(f"cannot write here: {error.strerror}", where=str(folder), hint=hint) from error
     return folder
 
 

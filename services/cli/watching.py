@@ -85,7 +85,7 @@ def _ended(now: dict[str, Any]) -> int:
 
 def _caption(job: dict[str, Any], now: dict[str, Any]) -> str:
     bad = sum(now["counters"][name] for name in ("failed", "dead", "cancelled"))
-    return f"{job['name'] or job['id'][-8:]} {now['state']}" + (f", {bad} without result" if bad else "")
+    return f"{job['name'] or job['id']} {now['state']}" + (f", {bad} without result" if bad else "")
 
 
 def _tell(bar: Any, event: dict[str, Any], quiet: bool) -> None:

@@ -35,7 +35,11 @@ def test_not_found_is_3(marey: Marey) -> None:
 
 
 def test_usage_is_2(marey: Marey) -> None:
-    marey("jobs", "show", "nonsense").refused(2, "job")
+    for command in (("jobs", "show"), ("fetch",)):
+        marey(*command, "nope").refused(2, "marey: job: 'nope' is no id: that is a UUID")
+    marey("submit", "walk", "--priority", 99999).refused(2, "priority: '99999' cannot be used", "1000")
+    marey("motions", "list", "--tag", "").refused(2, "tag", "'' cannot be used: it should have at least 1 character")
+    marey("webhooks", "add", "https://x.example", "--event", "nope").refused(2, "events.0: 'nope'", "job.ended")
     marey("nonsense").refused(2, "nonsense")
     marey("submit", "--nonsense").refused(2, "--nonsense")
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
 
-from tests.support.marey import Marey
+from tests.support.marey import REPOSITORY, Marey
 
 
 @pytest.mark.parametrize(
@@ -52,3 +58,27 @@ def test_a_device_that_is_not_there_is_told_before_anything_starts(offline: Mare
     wanting("serve", "--port", 0).refused(2, "MAREY_DEVICE", "no CUDA device", "cpu or auto")
     assert not (offline.home / "logs").exists()
     wanting("generate", "a person waves").refused(2, "no CUDA device", "MAREY_DEVICE")
+
+
+def test_doctor_says_what_to_do_with_a_home_that_cannot_be_written(offline: Marey, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    checks = replace(offline, environment={"MAREY_HOME": str(tmp_path / "file" / "home")})("doctor", "--json").lines
+    (home,) = (check for check in checks if check["name"] == "home")
+    assert home["state"] == "bad"
+    assert "MAREY_HOME" in home["hint"]
+    assert "-o" not in home["hint"].split()
+
+
+def test_an_interrupted_demo_ends_like_any_command(tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    command = [sys.executable, "-m", "services.cli.demo"]
+    demo = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
+    log = tmp_path / "out" / "demo" / ".home" / "serve.log"
+    while not log.exists():
+        assert demo.poll() is None
+        time.sleep(0.1)
+    demo.send_signal(signal.SIGINT)
+    said = demo.communicate(timeout=120)[1].decode()
+    assert demo.returncode == 130, said
+    assert "make demo: interrupted" in said
+    assert "Traceback" not in said

@@ -98,7 +98,7 @@ def fetch_job(
     wanted = [f.value for f in formats] if formats else None
     said = None if only is None else only.value
     planned = plan(client.pages(f"/v1/jobs/{job}/items", review=said, limit=1000), folder, wanted, template)
-    check_folder(folder)
+    check_folder(folder, hint="Choose another folder with -o.")
     check_manifest(folder, overwrite=overwrite)
     downloads = [download for _, files in planned for download in files]
     with console.bar() as bar:

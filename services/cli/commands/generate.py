@@ -65,7 +65,7 @@ def generate(
     _check(items, chosen)
     planned = _plan(items, chosen)
     kinds = [f.value for f in formats or options.FileFormat]
-    check_folder(output)
+    check_folder(output, hint="Choose another folder with -o.")
     studio = OneShot(chosen, config)
     if chosen.manifest.random:
         console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")

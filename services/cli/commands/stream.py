@@ -66,7 +66,7 @@ def stream(
     if fetch is not None:
         from services.cli.fetching import check_folder
 
-        check_folder(fetch)  # before anything begins
+        check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything begins
     from services.cli.client import Client
 
     with Client.here() as client:

@@ -50,7 +50,7 @@ def submit(
     if fetch is not None:
         from services.cli.fetching import check_folder
 
-        check_folder(fetch)  # before anything is enqueued
+        check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     items = read_prompts(prompts, file, input_format)
     items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants, fps=fps)
     with Lines(item.as_json() for item in items) as lines, Client.here() as client:

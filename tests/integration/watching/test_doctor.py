@@ -35,6 +35,7 @@ def test_a_database_of_an_older_revision_wants_migrating(engine: sa.Engine) -> N
 
 def test_items_that_nobody_serves_are_told_with_the_worker_to_start(engine: sa.Engine) -> None:
     bad(backing.workers(engine), "none", "marey serve", state="warn")
+    bad(backing.workers(engine, Path("logs")), "runs here", "Wait", state="warn")
     submit_items(engine, 2)
     parse_texts(engine)
     bad(backing.workers(engine), "items wait in hgm3", "marey worker hgm3")
