@@ -7,8 +7,10 @@ from typing import Annotated
 
 from fastapi import Depends, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
+from starlette.requests import HTTPConnection
 
 from services.api.context import Context, Shared
+from services.api.queries import check_query
 from shared.errors import Refused, Unauthenticated
 from shared.jobs import ApiKey, authenticate, transaction
 
@@ -58,15 +60,18 @@ def check_scope(key: ApiKey, scope: str) -> None:
         raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
 
 
-def requires(kind: str | None = None) -> Callable[[Context, ApiKey, SecurityScopes], ApiKey]:
+def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiKey, SecurityScopes], ApiKey]:
     """A dependency: the caller's key, if `admit` lets it pass for the scopes that the route's `Security` names.
 
     The OpenAPI document says them, too.
     """
 
-    def check(shared: Shared, key: Annotated[ApiKey, Depends(caller)], wanted: SecurityScopes) -> ApiKey:
+    def check(
+        asked: HTTPConnection, shared: Shared, key: Annotated[ApiKey, Depends(caller)], wanted: SecurityScopes
+    ) -> ApiKey:
         for scope in wanted.scopes:
             admit(shared, key, scope, kind)
+        check_query(asked)  # only now: nobody unknown is told what a route takes
         return key
 
     return check

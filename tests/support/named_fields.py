@@ -13,7 +13,7 @@ from schemathesis.checks import CheckContext
 from services.api.queries import LONGEST_NAME
 
 REFUSALS = (400, 409, 413, 415, 422)
-OF_ANY = {"body", "content-type", "content-encoding", "content-length"}
+OF_ANY = {"body", "query", "content-type", "content-encoding", "content-length"}
 
 
 def names_the_field(_context: CheckContext, response: Response, case: Case) -> None:
