@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on stdout.")]
+Limit = Annotated[
+    int | None, typer.Option("--limit", min=1, help="Show at most this many; none given = all.", show_default=False)
+]
+PAGE = 1000
+"""Elements of one request of a listing, and rows of one drawn table: a long one is not held in memory."""
 
 
 def stderr() -> Console:
@@ -40,11 +46,21 @@ def result_json(value: Any) -> None:
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe."""
+    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe, each line as it comes."""
     if not sys.stdout.isatty():
         for row in rows:
             result("\t".join(_cell(value) for value in row))
         return
+    left = iter(rows)
+    piece = list(islice(left, PAGE))
+    while True:
+        _draw(columns, piece)
+        piece = list(islice(left, PAGE))
+        if not piece:
+            return
+
+
+def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -63,14 +79,27 @@ def listing(
     cell: Callable[[dict[str, Any], str], object],
     *,
     as_json: bool,
+    limit: int | None = None,
 ) -> None:
-    """Elements of a listing of the API: a line of JSON each, or a table with what `cell` makes of each column."""
-    rows = list(found)  # all of them, or the error alone
-    if not as_json:
-        table(columns, ([cell(each, column) for column in columns] for each in rows))
-        return
-    for each in rows:
-        result_json(each)
+    """Elements of a listing as they come: a line of JSON each, or a table with what `cell` makes of each column.
+
+    Args:
+        limit: show at most so many, and say if there are more; None = all.
+    """
+    left = iter(found)
+    shown = islice(left, limit)
+    if as_json:
+        for each in shown:
+            result_json(each)
+    else:
+        table(columns, ([cell(each, column) for column in columns] for each in shown))
+    if limit is not None and next(left, None) is not None:
+        say(f"There are more than these {limit}: --limit shows more, without it all.")
+
+
+def page_size(limit: int | None) -> int:
+    """How many elements of a listing to ask for at a time, where at most `limit` are shown."""
+    return PAGE if limit is None else min(limit, PAGE)
 
 
 def bar() -> Progress:

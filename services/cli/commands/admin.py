@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,6 +23,8 @@ app.add_typer(tenants.app, name="tenants")
 app.add_typer(keys.app, name="keys")
 app.command("export")(backup.export)
 app.command("import")(backup.import_)
+
+AUDIT_COLUMNS = ("at", "tenant", "actor", "key", "verb", "target", "data")
 
 
 @app.command()
@@ -69,20 +71,15 @@ def audit(
     key: Annotated[str | None, typer.Option("--key", help="By the key of this id alone.")] = None,
     verb: Annotated[str | None, typer.Option("--verb", help="As job.cancel; or a noun, as job.")] = None,
     days: Annotated[float | None, typer.Option("--days", min=0, help="In the last so many days.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 50,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """Show who did what, newest first: by name of the key, or of whoever ran `marey admin`."""
     wanted = None if key is None else identifier(key, "a key", "`marey admin keys list` shows them.")
     since = None if days is None else datetime.now(UTC) - timedelta(days=days)
     with connection() as conn:
-        rows = [_audit_row(row) for row in _audited(conn, limit, tenant=tenant, key=wanted, verb=verb, since=since)]
-    if as_json:
-        for row in rows:
-            console.result_json(row)
-    else:
-        columns = ("at", "tenant", "actor", "key", "verb", "target", "data")
-        console.table(columns, ([row[name] for name in columns[:-1]] + [_in_words(row["data"])] for row in rows))
+        found = _audited(conn, console.page_size(limit), tenant=tenant, key=wanted, verb=verb, since=since)
+        console.listing(map(_audit_row, found), AUDIT_COLUMNS, _audit_cell, as_json=as_json, limit=limit)
 
 
 def doctor(as_json: console.Json = False) -> None:
@@ -106,15 +103,14 @@ def doctor(as_json: console.Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _audited(conn: sa.Connection, limit: int, **which: Any) -> Iterator[AuditRow]:
-    """The newest `limit` rows, page by page."""
+def _audited(conn: sa.Connection, size: int, **which: Any) -> Iterator[AuditRow]:
+    """The rows, newest first, `size` at a time."""
     from shared.jobs import list_audit
 
     cursor: str | None = None
-    while limit > 0:
-        page = list_audit(conn, cursor=cursor, limit=min(limit, 1000), **which)
+    while True:
+        page = list_audit(conn, cursor=cursor, limit=size, **which)
         yield from page.rows
-        limit -= len(page.rows)
         cursor = page.cursor
         if cursor is None:
             return
@@ -125,5 +121,7 @@ def _audit_row(row: AuditRow) -> dict[str, Any]:
     return {**own, "tenant": row.tenant, "actor": row.actor, "verb": row.verb, "target": row.target}
 
 
-def _in_words(data: Mapping[str, object]) -> str:
-    return ", ".join(f"{name}={value}" for name, value in data.items())
+def _audit_cell(row: dict[str, Any], column: str) -> object:
+    if column == "data":
+        return ", ".join(f"{name}={value}" for name, value in row["data"].items())
+    return row[column]

@@ -87,7 +87,7 @@ def wait_for(
 @app.command("list")
 def list_runs(
     state: Annotated[State | None, typer.Option("--state", help="Only runs in this state.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """List runs, newest first: their states, and which regressed."""
@@ -193,19 +193,13 @@ def cancel(runs: Runs, as_json: console.Json = False) -> None:
                 console.say(f"{each} {found['state']}")
 
 
-def show_runs(path: str, limit: int, as_json: bool, **params: Any) -> None:
+def show_runs(path: str, limit: int | None, as_json: bool, **params: Any) -> None:
     """The runs of a listing, newest first."""
-    from itertools import islice
-
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = list(islice(client.pages(path, limit=min(limit, 1000), **params), limit))
-    if as_json:
-        for each in found:
-            console.result_json(each)
-        return
-    console.table(COLUMNS, ([_cell(each, column) for column in COLUMNS] for each in found))
+        found = client.pages(path, limit=console.page_size(limit), **params)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit)
 
 
 def _cell(run: dict[str, Any], column: str) -> object:

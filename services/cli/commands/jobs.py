@@ -22,6 +22,7 @@ FIELDS = (
     *("id", "name", "comment", "state", "control", "priority", "fail_early"),
     *("created", "started", "finished", "expires", "erased"),
 )
+COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
@@ -40,23 +41,15 @@ class State(StrEnum):
 @app.command("list")
 def list_jobs(
     state: Annotated[State | None, typer.Option("--state", help="Only jobs in this state.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """List jobs, newest first."""
-    from itertools import islice
-
     from services.cli.client import Client
 
     with Client.here() as client:
-        params = {"state": state.value if state else None, "limit": min(limit, 1000)}
-        found = list(islice(client.pages("/v1/jobs", **params), limit))
-    if as_json:
-        for job in found:
-            console.result_json(job)
-        return
-    columns = ("id", "name", "state", "priority", "done", "total", "created")
-    console.table(columns, ((*(j[c] for c in columns[:4]), _done(j), j["total"], j["created"]) for j in found))
+        found = client.pages("/v1/jobs", state=state.value if state else None, limit=console.page_size(limit))
+        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit)
 
 
 @app.command()
@@ -259,5 +252,7 @@ def _show_place(place: dict[str, Any]) -> None:
     console.result(f"{'':<10} {place['estimate']['basis']}")
 
 
-def _done(job: dict[str, Any]) -> int:
-    return sum(job["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
+def _cell(job: dict[str, Any], column: str) -> object:
+    if column == "done":
+        return sum(job["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
+    return job[column]

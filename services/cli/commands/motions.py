@@ -16,6 +16,7 @@ app = typer.Typer(help="Motions on the server: find them, keep, reject and re-ro
 
 MOST = 1000
 """Motions of one request."""
+COLUMNS = ("id", "index", "name", "tags", "seed", "review", "seconds", "prompt")
 
 Motions = Annotated[list[str], typer.Argument(metavar="ID…", help="Ids of motions; - reads them from stdin.")]
 Comment = Annotated[str | None, typer.Option("--comment", help="Why; stands beside the verdict.")]
@@ -43,12 +44,10 @@ def list_motions(
         list[Review] | None, typer.Option("--review", help="What was said of it; several: any of them.")
     ] = None,
     job: Annotated[str | None, typer.Option("--job", help="Of this job, in the order they were made.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many.")] = 50,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """List motions that fit everything given, newest first."""
-    from itertools import islice
-
     from services.cli.client import Client
 
     params: dict[str, Any] = {
@@ -57,16 +56,10 @@ def list_motions(
         "text": text,
         "review": [review.value for review in reviews] if reviews else None,
         "job": job,
-        "limit": min(limit, MOST),
+        "limit": console.page_size(limit),
     }
     with Client.here() as client:
-        found = list(islice(client.pages("/v1/motions", **params), limit))
-    if as_json:
-        for motion in found:
-            console.result_json(motion)
-        return
-    columns = ("id", "index", "name", "tags", "seed", "review", "seconds", "prompt")
-    console.table(columns, (_cells(motion) for motion in found))
+        console.listing(client.pages("/v1/motions", **params), COLUMNS, _cell, as_json=as_json, limit=limit)
 
 
 @app.command()
@@ -142,10 +135,12 @@ def _ids(motions: list[str]) -> Iterator[list[str]]:
         yield ids[first : first + MOST]
 
 
-def _cells(motion: dict[str, Any]) -> tuple[object, ...]:
-    seconds = round(motion["frames"] / motion["fps"], 2)
-    own = (motion[name] for name in ("id", "index", "name"))
-    return (*own, "; ".join(motion["tags"]), motion["seed"], review_of(motion), seconds, motion["prompt"])
+def _cell(motion: dict[str, Any], column: str) -> object:
+    if column == "tags":
+        return "; ".join(motion["tags"])
+    if column == "seconds":
+        return round(motion["frames"] / motion["fps"], 2)
+    return review_of(motion) if column == "review" else motion[column]
 
 
 def review_of(motion: dict[str, Any]) -> str | None:

@@ -69,7 +69,7 @@ def list_schedules(as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        console.listing(client.pages("/v1/schedules", limit=1000), COLUMNS, _cell, as_json=as_json)
+        console.listing(client.pages("/v1/schedules", limit=console.PAGE), COLUMNS, _cell, as_json=as_json)
 
 
 @app.command()
@@ -100,7 +100,7 @@ def run(schedule: Id, as_json: console.Json = False) -> None:
 @app.command()
 def history(
     schedule: Id,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 20,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """List the runs of a schedule, newest first."""

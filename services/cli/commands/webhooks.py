@@ -62,7 +62,7 @@ def list_webhooks(as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        console.listing(client.pages("/v1/webhooks", limit=1000), COLUMNS, _cell, as_json=as_json)
+        console.listing(client.pages("/v1/webhooks", limit=console.PAGE), COLUMNS, _cell, as_json=as_json)
 
 
 @app.command()
@@ -131,12 +131,10 @@ def deliveries(
         str | None, typer.Argument(metavar="[EVENT]", help="Of one delivery: every try of it.", show_default=False)
     ] = None,
     state: Annotated[State | None, typer.Option("--state", help="Only those.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")] = 50,
+    limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
-    from itertools import islice
-
     from services.cli.client import Client
 
     with Client.here() as client:
@@ -144,8 +142,8 @@ def deliveries(
             _show_tries(client.get(f"/v1/webhooks/{webhook}/deliveries/{event}"), as_json)
             return
         wanted = {"state": state.value} if state else {}
-        pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=min(limit, 1000), **wanted)
-        console.listing(islice(pages, limit), DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json)
+        pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=console.page_size(limit), **wanted)
+        console.listing(pages, DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json, limit=limit)
 
 
 @app.command()
