@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from services.cli.client import Client
-from services.cli.names import DEFAULT_TEMPLATE, Naming, file_name, slug
+from services.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from shared.errors import Conflict, InvalidFile, InvalidInput, Unreachable
 from shared.hashing import sha256_of
 
@@ -63,18 +63,12 @@ def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] |
         Conflict: a wanted format was not made.
     """
     planned: list[tuple[dict[str, Any], list[Download]]] = []
-    taken: dict[str, str] = {}
+    names = FileNames(template)
     for item in items:
         downloads: list[Download] = []
         motion = item["motion"]
         for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
-            name = file_name(template, naming(item), file["format"])
-            if taken.setdefault(name.casefold(), item["id"]) != item["id"]:
-                raise InvalidInput(
-                    f"two motions would be written to {name}",
-                    where="--name-template",
-                    hint="Put {index} and {seed} in.",
-                )
+            name = names.of(item["id"], naming(item), file["format"])
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
             downloads.append(Download(url, file["sha256"], file["size"], folder / name))
         planned.append((item, downloads))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import string
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from shared.errors import InvalidInput
@@ -80,6 +80,27 @@ def file_name(template: str, naming: Naming, extension: str) -> str:
         InvalidInput: what comes out is not a plain file name, or the item lacks a tag.
     """
     return _file_name(template, naming, extension, _Values(values_of(naming.tags)))
+
+
+class FileNames:
+    """File names of one run, of which no two motions have the same."""
+
+    def __init__(self, template: str) -> None:
+        self._template = template
+        self._owners: dict[str, Hashable] = {}
+
+    def of(self, motion: Hashable, naming: Naming, extension: str) -> str:
+        """The file name of a motion, which is told from the others by `motion`.
+
+        Raises:
+            InvalidInput: as `file_name`; or another motion has it, also where systems do not tell cases apart.
+        """
+        name = file_name(self._template, naming, extension)
+        if self._owners.setdefault(name.casefold(), motion) != motion:
+            raise InvalidInput(
+                f"two motions would be written to {name}", where="--name-template", hint="Put {index} and {seed} in."
+            )
+        return name
 
 
 def values_of(tags: Sequence[str]) -> dict[str, str]:

@@ -48,7 +48,9 @@ Template = Annotated[
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that hold something else.")]
 Seconds = Annotated[float | None, typer.Option("--seconds", help="Length; none given = the model decides.")]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first variant; none given = drawn.")]
-Variants = Annotated[int | None, typer.Option("--variants", help="Motions of each prompt.")]
+Variants = Annotated[
+    int | None, typer.Option("--variants", help="Motions of each prompt; a row's own number comes first.")
+]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; none given = the model's.")]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import csv
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import Literal
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import Literal, cast
 
 from services.cli.text_files import GZIP_ENDING, open_text, where_of
 from shared.errors import InvalidInput
 from shared.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
 from shared.evaluation_prompts import EvaluationPrompt, read_prompts
-from shared.items import COLUMNS, MAX_BODY_BYTES, InvalidItems, Item, Problem, Unreadable, read_items, read_json
+from shared.items import (
+    CHECKS,
+    COLUMNS,
+    MAX_BODY_BYTES,
+    OUTPUT_FPS,
+    InvalidItems,
+    Item,
+    Problem,
+    Unreadable,
+    read_items,
+    read_json,
+)
 
 Format = Literal["csv", "jsonl", "txt"]
 Rows = Iterator[tuple[int | None, object]]
@@ -22,18 +33,57 @@ Lines = Iterator[tuple[int, str]]
 TAG_SEPARATOR = ";"
 
 
-def items_from_prompts(prompts: Sequence[str]) -> Iterator[Item]:
+NO_DEFAULTS: Mapping[str, object] = MappingProxyType({})
+
+
+def defaults_of(
+    *,
+    model: str | None = None,
+    bundle: str | None = None,
+    seconds: float | None = None,
+    seed: int | None = None,
+    variants: int | None = None,
+    fps: float | None = None,
+) -> Mapping[str, object]:
+    """The fields of a row where it says nothing itself, from the options of the command.
+
+    Raises:
+        InvalidInput: one cannot be; by the name of its option.
+    """
+    given = (
+        ("--model", "model", model),
+        ("--bundle", "model", bundle),  # names it more exactly
+        ("--seconds", "seconds", seconds),
+        ("--seed", "seed", seed),
+        ("--variants", "variants", variants),
+        ("--fps", "settings", None if fps is None else {OUTPUT_FPS: fps}),
+    )
+    found: dict[str, object] = {}
+    for option, field, value in given:
+        if value is None:
+            continue
+        try:
+            found[field] = CHECKS[field](value)
+        except InvalidInput as error:
+            raise InvalidInput(error.message, where=option, hint=error.hint) from None
+    return found
+
+
+def items_from_prompts(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> Iterator[Item]:
     """Items of prompts given as arguments; a problem names the number of the argument."""
-    return read_items([(i, {"prompt": p}) for i, p in enumerate(prompts, 1)], where="PROMPT")
+    return read_items(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), where="PROMPT")
 
 
-def items_from_file(path: str, file_format: Format | None = None) -> Iterator[Item]:
+def items_from_file(
+    path: str, file_format: Format | None = None, defaults: Mapping[str, object] = NO_DEFAULTS
+) -> Iterator[Item]:
     """Items of a file, or of stdin for `-`, as they are read; they count only once all are (`shared.items.checked`).
 
     Args:
         path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also packed
             as `.gz`, or `-`.
         file_format: for `-` and other endings; stdin is otherwise guessed from its first line.
+        defaults: fields of a line where it says nothing itself.
 
     Raises:
         InvalidItems: with every problem of every line.
@@ -41,7 +91,8 @@ def items_from_file(path: str, file_format: Format | None = None) -> Iterator[It
         TooLarge: over `MAX_BODY_BYTES` of text, or over `MAX_ITEMS` motions; it is not read further.
         NotFound, InvalidInput: no such file, or no way to tell its format.
     """
-    return read_items(rows_of_file(path, file_format), where=where_of(path))
+    lines = rows_of_file(path, file_format)
+    return read_items(((number, _completed(raw, defaults)) for number, raw in lines), where=where_of(path))
 
 
 def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
@@ -65,26 +116,16 @@ def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence
             yield from _jsonl(lines) if chosen == "jsonl" else _txt(lines)
 
 
-def with_defaults(
-    items: Iterable[Item], *, model: str | None = None, seconds: float | None = None, seed: int | None = None,
-    variants: int | None = None,
-    fps: float | None = None,
-) -> Iterator[Item]:  # fmt: skip
-    """The items with the options of the command where an item itself says nothing; checked anew if any was given."""
-    if (model, seconds, seed, variants, fps) == (None,) * 5:
-        return iter(items)
-    changed = (
-        replace(
-            item,
-            model=item.model or model,
-            seconds=item.seconds if item.seconds is not None else seconds,
-            seed=item.seed if item.seed is not None else seed,
-            variants=item.variants if item.variants != 1 else variants or 1,
-            settings=item.settings if fps is None else {"fps": fps, **item.settings},
-        )
-        for item in items
-    )
-    return read_items((None, item.as_json()) for item in changed)
+def _completed(raw: object, defaults: Mapping[str, object]) -> object:
+    """A row with the defaults for what it does not say; settings are told one by one."""
+    if not defaults or not isinstance(raw, Mapping):
+        return raw
+    row = cast("Mapping[object, object]", raw)
+    whole = {**defaults, **{name: value for name, value in row.items() if value is not None}}
+    ours, theirs = defaults.get("settings"), row.get("settings")
+    if isinstance(ours, Mapping) and isinstance(theirs, Mapping):
+        whole["settings"] = {**ours, **theirs}
+    return whole
 
 
 def _by_ending(path: str) -> Format:

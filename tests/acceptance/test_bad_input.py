@@ -112,6 +112,32 @@ def test_a_name_template_with_path_tricks(offline: Marey, tmp_path: Path, templa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("more", [(), ("--overwrite",)])
+def test_a_name_that_two_motions_would_share_is_refused_before_one_is_made(
+    offline: Marey, tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    share = ("generate", "a person walks", "-o", tmp_path / "out", *more)
+    ran = offline(*share, "--variants", 3, "--name-template", "y_{index}")
+    ran.refused(2, "--name-template: two motions would be written to y_0.bvh", "{index} and {seed}")
+    ran = offline("generate", "a person walks", "A person walks!", "-o", tmp_path / "out", "--seed", 1,
+                  "--name-template", "{name}", *more)  # fmt: skip
+    ran.refused(2, "two motions would be written to a-person-walks.bvh")
+    lines = [{"prompt": "a person bows", "tags": [tag] if tag else []} for tag in ("shot=1", "shot=2", "", "shot=4")]
+    ran = offline("generate", "-f", "-", "-o", tmp_path / "out", "--name-template", "{tag[shot]}", *more,
+                  stdin="\n".join(map(json.dumps, lines)))  # fmt: skip
+    ran.refused(2, "has no tag shot=…")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("variants", [0, -1, 101])
+def test_a_number_of_variants_that_no_row_could_have_is_refused(offline: Marey, tmp_path: Path, variants: int) -> None:
+    for command in ("generate", "submit"):
+        where = ("-o", tmp_path / "out") if command == "generate" else ()
+        ran = offline(command, "a person walks", f"--variants={variants}", *where)
+        ran.refused(2, f"--variants: {variants} is outside 1 to 100")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_enqueued(marey: Marey, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     before = marey.jobs()

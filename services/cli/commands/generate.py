@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from services.cli import console, options, rows
 from services.cli.commands.submit import read_prompts
-from services.cli.names import Naming, check_template, file_name, slug
+from services.cli.names import FileNames, Naming, check_template, slug
 from shared.errors import Conflict, InvalidBundle, InvalidInput
 from shared.items import MAX_SEED, InvalidItems, Item, Problem
 
@@ -28,7 +28,8 @@ class Planned:
     item: Item
     variant: int
     wanted: Wanted
-    naming: Naming
+    paths: dict[str, Path]
+    """Where it goes, by format."""
 
 
 def generate(
@@ -53,8 +54,8 @@ def generate(
     from services.cli.roles.oneshot import OneShot
 
     check_template(name_template)
-    items = read_prompts(prompts, file, input_format)
-    items = list(rows.with_defaults(items, model=model, seconds=seconds, seed=seed, variants=variants, fps=fps))
+    defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    items = list(read_prompts(prompts, file, input_format, defaults))
     try:
         from shared.bundles import choose_bundle
         from shared.settings import settings
@@ -63,8 +64,8 @@ def generate(
     config = settings()
     chosen = choose_bundle(bundle or _one_model(items), config=config)
     _check(items, chosen)
-    planned = _plan(items, chosen)
     kinds = [f.value for f in formats or options.FileFormat]
+    planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
     studio = OneShot(chosen, config)
     if chosen.manifest.random:
@@ -73,7 +74,7 @@ def generate(
         task = bar.add_task("generating", total=len(planned))
         made = studio.make([p.wanted for p in planned])
         for plan, (_, clip, elapsed) in zip(planned, made, strict=True):
-            line = _write(plan, clip, elapsed, chosen, output, name_template, kinds, overwrite=overwrite)
+            line = _write(plan, clip, elapsed, chosen, overwrite=overwrite)
             bar.advance(task)
             _tell_rewrite(clip)
             if as_json:
@@ -133,8 +134,15 @@ def _one_model(items: Iterable[Item]) -> str:
     return models[0]
 
 
-def _plan(items: list[Item], bundle: Bundle) -> list[Planned]:
+def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[str]) -> list[Planned]:
+    """What to make and where each motion goes.
+
+    Raises:
+        InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
+    """
     from services.cli.roles.oneshot import Wanted
+
+    names = FileNames(template)
 
     def of(index: int, item: Item) -> Iterator[Planned]:
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
@@ -142,27 +150,18 @@ def _plan(items: list[Item], bundle: Bundle) -> list[Planned]:
             wanted = Wanted(item.prompt, seed + variant, item.seconds, item.settings)
             name = item.name or slug(item.prompt)
             naming = Naming(index, name, seed + variant, variant, bundle.manifest.model, "local", item.tags)
-            yield Planned(item, variant, wanted, naming)
+            paths = {kind: folder / names.of((index, variant), naming, kind) for kind in kinds}
+            yield Planned(item, variant, wanted, paths)
 
     return [plan for index, item in enumerate(items) for plan in of(index, item)]
 
 
-def _write(
-    plan: Planned,
-    clip: MotionClip,
-    elapsed: float,
-    bundle: Bundle,
-    folder: Path,
-    template: str,
-    kinds: list[str],
-    *,
-    overwrite: bool,
-) -> dict[str, Any]:
+def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, overwrite: bool) -> dict[str, Any]:
     from shared.motion.bvh import format_bvh
     from shared.motion.files import write_atomically
 
     contents = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
-    paths = {kind: folder / file_name(template, plan.naming, kind) for kind in kinds}
+    paths = plan.paths
     changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
     for kind in changed:
         if paths[kind].exists() and not overwrite:

@@ -11,7 +11,7 @@ from services.cli import console, options, rows
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from shared.items import Item
 
@@ -51,8 +51,8 @@ def submit(
         from services.cli.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
-    items = read_prompts(prompts, file, input_format)
-    items = rows.with_defaults(items, model=bundle or model, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    defaults = rows.defaults_of(model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    items = read_prompts(prompts, file, input_format, defaults)
     with Lines(item.as_json() for item in items) as lines, Client.here() as client:
         job = client.submit(
             lines,
@@ -95,9 +95,15 @@ def _tell_dry_run(checked: dict[str, Any]) -> None:
 
 
 def read_prompts(
-    prompts: list[str] | None, file: str | None, input_format: options.InputFormat | None
+    prompts: list[str] | None,
+    file: str | None,
+    input_format: options.InputFormat | None,
+    defaults: Mapping[str, object] = rows.NO_DEFAULTS,
 ) -> Iterator[Item]:
     """The items of PROMPT… or of -f, as they are read (`rows.items_from_file`).
+
+    Args:
+        defaults: `rows.defaults_of` the options of the command.
 
     Raises:
         InvalidInput: none or both are given, or what is there cannot be used.
@@ -105,13 +111,13 @@ def read_prompts(
     if prompts and file:
         raise InvalidInput("both PROMPT and -f are given", hint="Give the one or the other.")
     if file:
-        return rows.items_from_file(file, None if input_format is None else input_format.value)
+        return rows.items_from_file(file, None if input_format is None else input_format.value, defaults)
     for prompt in prompts or ():
         if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and Path(prompt).is_file():
             raise InvalidInput("is a file, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
     if not prompts:
         raise InvalidInput("there is no prompt", hint="Give one or more in quotes, or a file of them with -f.")
-    return rows.items_from_prompts(prompts)
+    return rows.items_from_prompts(prompts, defaults)
 
 
 def _follow(client, job: str, folder: Path | None, formats, timeout: float | None, as_json: bool) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.names import DEFAULT_TEMPLATE, Naming, check_template, file_name, slug
+from services.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, check_template, file_name, slug
 from shared.errors import InvalidInput
 from shared.items import NAME, read_item
 
@@ -17,6 +17,13 @@ def naming(name: str = "wave") -> Naming:
 
 def test_the_default_name_sorts_and_tells_the_seed() -> None:
     assert file_name(DEFAULT_TEMPLATE, naming(), "bvh") == "00007_wave_41.bvh"
+
+
+def test_no_two_motions_get_one_name_on_any_system() -> None:
+    names = FileNames("{name}")
+    assert [names.of(1, naming(), kind) for kind in ("npz", "bvh", "npz")] == ["wave.npz", "wave.bvh", "wave.npz"]
+    with pytest.raises(InvalidInput, match=r"--name-template: two motions would be written to Wave\.npz"):
+        names.of(2, naming("Wave"), "npz")
 
 
 @given(st.text(max_size=200))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.rows import evaluation_prompts_from_file, items_from_file, with_defaults
+from services.cli.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
 from shared.errors import InvalidFile, InvalidInput, NotFound
 from shared.evaluation_prompts import EvaluationPrompt
 from shared.items import InvalidItems, Item
@@ -113,11 +114,42 @@ def test_a_file_that_is_not_there_or_tells_no_format_or_holds_nothing_is_refused
         list(items_from_file(write(tmp_path, "p.csv", "prompt\n")))
 
 
-def test_options_of_the_command_stand_in_where_a_line_says_nothing() -> None:
-    items = [Item("a person waves", seconds=2.0), Item("a person bows")]
-    assert [i.seconds for i in with_defaults(items, seconds=4.0, seed=1)] == [2.0, 4.0]
-    with pytest.raises(InvalidItems, match=r"seconds: 1000 is outside 0\.5 to 60"):
-        list(with_defaults(items, seconds=1000.0))
+def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Path) -> None:
+    defaults = defaults_of(seconds=4.0, seed=1, variants=3, model="hgm3", bundle="hgm3-starter", fps=30.0)
+    lines = [
+        '{"prompt": "a person bows"}',
+        '{"prompt": "a person waves", "seconds": 2, "seed": 0, "variants": 1, "model": "mogo", '
+        '"settings": {"fps": 60}}',
+        '{"prompt": "a person walks", "seconds": null, "settings": {"guidance": 3}}',
+    ]
+    assert list(items_from_file(write(tmp_path, "p.jsonl", "\n".join(lines)), defaults=defaults)) == [
+        Item("a person bows", None, 4.0, 1, 3, "hgm3-starter", (), {"fps": 30.0}),
+        Item("a person waves", None, 2.0, 0, 1, "mogo", (), {"fps": 60.0}),
+        Item("a person walks", None, 4.0, 1, 3, "hgm3-starter", (), {"fps": 30.0, "guidance": 3.0}),
+    ]
+    table = write(tmp_path, "p.csv", "prompt,variants,seed\na person bows,1,\na person waves,,9\n")
+    found = [(item.variants, item.seed) for item in items_from_file(table, defaults=defaults)]
+    assert found == [(1, 1), (3, 9)]
+    assert [item.variants for item in items_from_prompts(["a person bows"], defaults)] == [3]
+
+
+@pytest.mark.parametrize(
+    ("option", "given", "said"),
+    [
+        ("--variants", {"variants": 0}, "0 is outside 1 to 100"),
+        ("--variants", {"variants": 101}, "101 is outside 1 to 100"),
+        ("--seconds", {"seconds": 1000.0}, r"1000 is outside 0\.5 to 60"),
+        ("--seed", {"seed": -1}, "-1 is outside 0"),
+        ("--fps", {"fps": 0.0}, "0 is outside 1 to 240"),
+        ("--bundle", {"model": "hgm3", "bundle": "no such"}, "'no such' is not the name"),
+    ],
+)
+def test_an_option_that_no_row_could_have_is_refused_by_its_own_name(
+    option: str, given: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(InvalidInput, match=said) as caught:
+        defaults_of(**given)
+    assert caught.value.where == option
 
 
 @given(st.binary(max_size=300), st.sampled_from(["csv", "jsonl", "txt"]))
