@@ -95,7 +95,7 @@ def download_all(
 
     Args:
         overwrite: replace files that hold something else.
-        done: called after each file.
+        done: called after each file, by the thread that fetched it; not after this function has ended.
 
     Raises:
         Conflict: a file is there and holds something else.
@@ -109,8 +109,8 @@ def download_all(
             missing.append(download)
     with ThreadPoolExecutor(PARALLEL) as pool:
         try:
-            for download in pool.map(lambda d: _download(client, d), missing):
-                done(download)
+            for _ in pool.map(lambda download: done(_download(client, download)), missing):
+                pass
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

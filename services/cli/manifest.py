@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 import secrets
+import stat
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,10 @@ from services.cli.rows import TAG_SEPARATOR
 from shared.errors import Conflict, InvalidInput
 
 NAME = "manifest.csv"
+RECORD = ".manifest-earlier.csv"
+"""Lines that manifests of the folder once had and no longer have, while their files lie there; there is none else."""
+PLAIN = re.compile(r"[^\W_][^/\\:\x00-\x1f]*")
+"""Names that stay in their folder, as `names.file_name` makes them."""
 COLUMNS = (
     *("index", "name", "tags", "prompt", "seed", "state", "review", "npz", "bvh", "licence", "variant", "model"),
     *("bundle", "frames", "fps", "error", "comment", "replaces", "motion", "item", "job"),
@@ -52,24 +58,87 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     return {name: "" if values.get(name) is None else str(values[name]) for name in COLUMNS}
 
 
-def write_manifest(folder: Path, job: str, rows: Sequence[Row], *, overwrite: bool = False) -> Path:
+def write_manifest(
+    folder: Path, job: str, rows: Sequence[Row], *, overwrite: bool = False, whole: bool = True
+) -> list[Path]:
     """Write the lines of a job; those of other jobs, whose clips lie in the same folder, stay.
+
+    Args:
+        overwrite: replace a `manifest.csv` that we did not write.
+        whole: these are all the lines of the job; else those that stood there of other items stay too.
+
+    Returns:
+        Files in the folder that this or an earlier manifest named for the job and the new one does not.
 
     Raises:
         Conflict: as `check_manifest`.
         InvalidInput: the folder cannot be written.
     """
     path = folder / NAME
+    before = _known(path, overwrite=overwrite)
+    if not whole:
+        told = {row["item"] for row in rows}
+        rows = [*rows, *(row for row in before if row["job"] == job and row["item"] not in told)]
+    new = [*(row for row in before if row["job"] != job), *rows]
+    left = _record(folder, [*_known(folder / RECORD, overwrite=True), *before], new)
+    _write(path, new)  # after the record: what breaks off here loses no name
+    return [folder / name for row, name in left if row["job"] == job]
+
+
+def remove_left(folder: Path, left: Iterable[Path]) -> None:
+    """Remove what `write_manifest` gave.
+
+    Raises:
+        InvalidInput: a file cannot be removed.
+    """
+    for path in left:
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise InvalidInput(f"cannot be removed: {error.strerror}", where=str(path)) from error
+    _record(folder, _known(folder / RECORD, overwrite=True), _known(folder / NAME, overwrite=True))
+
+
+def _record(folder: Path, earlier: Iterable[Row], now: Iterable[Row]) -> list[tuple[Row, str]]:
+    """Write down which earlier lines have a file here that no line names now; these files, each with its line."""
+    named = {name.casefold() for row in now for name in _files(row)}
+    found = {name: row for row in earlier for name in _files(row) if name.casefold() not in named}
+    left = [(row, name) for name, row in found.items() if _is_file(folder / name)]
+    if left:
+        _write(folder / RECORD, list({tuple(_files(row)): row for row, _ in left}.values()))
+    else:
+        (folder / RECORD).unlink(missing_ok=True)
+    return left
+
+
+def _known(path: Path, *, overwrite: bool) -> list[Row]:
+    """The lines of a manifest; none of one that is not ours, if that may go."""
     try:
-        others = [row for row in _read(path) if row["job"] != job]
+        return _read(path)
     except Conflict:
         if not overwrite:
             raise
-        others = []
-    content = _format((*others, *rows))
+        return []
+
+
+def _files(row: Row) -> list[str]:
+    """The names of a line's files. Anybody may have written the line: what is no plain name of a clip is left out."""
+    names = ((row[kind], f".{kind}") for kind in ("npz", "bvh"))
+    return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
+
+
+def _is_file(path: Path) -> bool:
+    """Whether this is a file itself, not a link to one."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except OSError:
+        return False
+
+
+def _write(path: Path, rows: Iterable[Row]) -> None:
+    content = _format(rows)
     if not path.exists() or path.read_bytes() != content:
         _replace(path, content)
-    return path
 
 
 def _format(rows: Iterable[Row]) -> bytes:
@@ -101,7 +170,7 @@ def _read(path: Path) -> list[Row]:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{NAME}.{secrets.token_hex(4)}.part")
+    part = path.with_name(f".{path.name.lstrip('.')}.{secrets.token_hex(4)}.part")
     try:
         with part.open("xb") as stream:
             stream.write(content)

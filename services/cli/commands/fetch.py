@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,12 +11,15 @@ import typer
 
 from services.cli import console, options
 from services.cli.names import check_template
+from shared.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from services.cli.client import Client
     from services.cli.fetching import Download
+
+    Planned = list[tuple[dict[str, Any], list[Download]]]
 
 
 class Review(StrEnum):
@@ -32,6 +36,9 @@ def fetch(
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
     only: Annotated[Review | None, typer.Option("--only", help="Only motions of which this was said.")] = None,
+    prune: Annotated[
+        bool, typer.Option("--prune", help="Remove files of earlier fetches of a job that are not among these.")
+    ] = False,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
@@ -47,7 +54,7 @@ def fetch(
             folder = output if len(jobs) == 1 else output / job
             write_job(
                 client, job, folder, formats,
-                template=name_template, only=only, overwrite=overwrite, as_json=as_json,
+                template=name_template, only=only, prune=prune, overwrite=overwrite, as_json=as_json,
             )  # fmt: skip
 
 
@@ -59,11 +66,12 @@ def write_job(
     *,
     template: str = options.TEMPLATE,
     only: Review | None = None,
+    prune: bool = False,
     overwrite: bool = False,
     as_json: bool = False,
 ) -> None:
     """Fetch what a job has made so far and print a line for each of its items, in input order."""
-    lines = fetch_job(client, job, folder, formats, template=template, only=only, overwrite=overwrite)
+    lines = fetch_job(client, job, folder, formats, template=template, only=only, prune=prune, overwrite=overwrite)
     for line in lines:
         if as_json:
             console.result_json(line)
@@ -85,28 +93,71 @@ def fetch_job(
     *,
     template: str = options.TEMPLATE,
     only: Review | None = None,
+    prune: bool = False,
     overwrite: bool = False,
 ) -> list[dict[str, Any]]:
     """Fetch what a job has made so far, and write the manifest; the output line of each of its items, in input order.
 
     Args:
         only: items with a motion of which this was said.
+        prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from services.cli.fetching import check_folder, download_all, plan
-    from services.cli.manifest import check_manifest, row_of, write_manifest
+    from services.cli.fetching import check_folder, plan
+    from services.cli.manifest import check_manifest, remove_left, write_manifest
 
     wanted = [f.value for f in formats] if formats else None
     said = None if only is None else only.value
     planned = plan(client.pages(f"/v1/jobs/{job}/items", review=said, limit=1000), folder, wanted, template)
     check_folder(folder, hint="Choose another folder with -o.")
     check_manifest(folder, overwrite=overwrite)
-    downloads = [download for _, files in planned for download in files]
+    done: set[Path] = set()
+    try:
+        _download(client, [file for _, files in planned for file in files], done, overwrite=overwrite)
+    except Conflict:
+        raise  # before anything was touched
+    except BaseException:
+        _write_part(folder, job, planned, done, overwrite=overwrite)
+        raise
+    left = write_manifest(folder, job, _rows(planned), overwrite=overwrite)
+    if prune:
+        remove_left(folder, left)
+    if left:
+        told = "were removed." if prune else "lie there, of takes that are not among these: --prune removes them."
+        console.say(f"{console.home_relative(folder)}: {len(left)} files of earlier fetches of job {job} {told}")
+    return [output_line(item, files) for item, files in planned]
+
+
+def _download(client: Client, downloads: Sequence[Download], done: set[Path], *, overwrite: bool) -> None:
+    from services.cli.fetching import download_all
+
     with console.bar() as bar:
         task = bar.add_task("fetching", total=len(downloads))
-        download_all(client, downloads, overwrite=overwrite, done=lambda _: bar.advance(task))
-    rows = [row_of(item, {file.path.suffix[1:]: file.path.name for file in files}) for item, files in planned]
-    write_manifest(folder, job, rows, overwrite=overwrite)
-    return [output_line(item, files) for item, files in planned]
+
+        def tell(download: Download) -> None:
+            done.add(download.path)
+            bar.advance(task)
+
+        download_all(client, downloads, overwrite=overwrite, done=tell)
+
+
+def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, overwrite: bool) -> None:
+    """The manifest of a fetch that broke off. What ended it will be told, so not what fails here."""
+    from services.cli.manifest import write_manifest
+
+    whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
+    with suppress(MareyError):
+        write_manifest(folder, job, _rows(whole), overwrite=overwrite, whole=False)
+        wanted = sum(len(files) for _, files in planned)
+        console.say(
+            f"{console.home_relative(folder)}: {len(done)} of {wanted} files are there, and in manifest.csv; "
+            "the same command goes on."
+        )
+
+
+def _rows(planned: Planned) -> list[dict[str, str]]:
+    from services.cli.manifest import row_of
+
+    return [row_of(item, {file.path.suffix[1:]: file.path.name for file in files}) for item, files in planned]
 
 
 def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:

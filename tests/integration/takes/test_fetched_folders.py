@@ -1,0 +1,171 @@
+"""The folder of a fetch: what is left of an earlier one, and what is there when one breaks off."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.cli.client import Client
+from services.cli.commands.fetch import fetch_job
+from services.cli.manifest import RECORD, remove_left, write_manifest
+from services.cli.place import Server
+from shared.errors import InvalidFile
+from tests.support.command import Command
+from tests.support.live_api import LiveApi
+
+NAMES = ("--name-template", "{name}")
+
+
+@pytest.fixture
+def job(api: LiveApi) -> str:
+    """Twenty motions, made."""
+    with api.client() as client:
+        job = client.submit([{"prompt": f"a person walks {n} steps", "name": f"take{n:02}"} for n in range(20)])["id"]
+    api.work()
+    return job
+
+
+def manifest(folder: Path) -> list[dict[str, str]]:
+    with (folder / "manifest.csv").open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.suffix in (".npz", ".bvh"))
+
+
+def rejected_after_a_fetch(marey: Command, job: str, folder: Path) -> list[str]:
+    """A folder of kept takes, three of which are rejected then; the others' names."""
+    ids = {m["name"]: m["id"] for m in marey("motions", "list", "--job", job, "--json").ok().lines}
+    marey("motions", "keep", *ids.values()).ok()
+    marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok()
+    marey("motions", "reject", *(ids[f"take{n:02}"] for n in range(3))).ok()
+    return sorted(ids)[3:]
+
+
+def test_files_of_takes_that_are_not_chosen_any_more_are_told_and_pruned(
+    marey: Command, job: str, tmp_path: Path
+) -> None:
+    folder = tmp_path / "final"
+    kept = rejected_after_a_fetch(marey, job, folder)
+    for own in ("take00.txt", "mine.npz", "take00.npz.bak"):
+        (folder / own).write_text("mine")
+    for _ in range(2):  # said until they are gone, though the manifest has forgotten them
+        ran = marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok()
+        assert f"6 files of earlier fetches of job {job}" in ran.err
+        assert "--prune" in ran.err
+        assert [row["name"] for row in manifest(folder)] == kept
+        assert len(files(folder)) == 41
+    ran = marey("fetch", job, "-o", folder, "--only", "kept", "--prune", *NAMES).ok()
+    assert "6 files of earlier fetches" in ran.err
+    assert files(folder) == sorted(["mine.npz", *(f"{name}.{kind}" for name in kept for kind in ("npz", "bvh"))])
+    assert {"take00.txt", "take00.npz.bak", "manifest.csv"} < {path.name for path in folder.iterdir()}
+    assert not (folder / RECORD).exists()
+    assert "earlier" not in marey("fetch", job, "-o", folder, "--only", "kept", *NAMES).ok().err
+
+
+def test_one_call_may_fetch_and_prune_and_a_take_that_is_kept_again_is_not_left(
+    marey: Command, job: str, tmp_path: Path
+) -> None:
+    rejected_after_a_fetch(marey, job, tmp_path)
+    marey("fetch", job, "-o", tmp_path, "--only", "kept", *NAMES).ok()
+    assert "earlier" not in marey("fetch", job, "-o", tmp_path, *NAMES).ok().err
+    assert not (tmp_path / RECORD).exists()
+    marey("fetch", job, "-o", tmp_path, "--only", "kept", "--prune", *NAMES).ok()
+    assert len(files(tmp_path)) == 34
+
+
+def test_clips_of_another_job_in_the_folder_are_not_pruned(
+    api: LiveApi, marey: Command, job: str, tmp_path: Path
+) -> None:
+    other = marey("submit", "a person hops", "--seed", 1).ok().out.strip()
+    api.work()
+    marey("fetch", other, "-o", tmp_path, *NAMES).ok()
+    marey("fetch", job, "-o", tmp_path, *NAMES).ok()
+    marey("fetch", job, "-o", tmp_path, "--only", "kept", "--prune", *NAMES).ok()
+    assert files(tmp_path) == ["a-person-hops.bvh", "a-person-hops.npz"]
+    assert [row["job"] for row in manifest(tmp_path)] == [other]
+
+
+def test_names_of_a_manifest_do_not_lead_out_of_the_folder(marey: Command, job: str, tmp_path: Path) -> None:
+    folder = tmp_path / "final"
+    outside = tmp_path / "other.npz"
+    outside.write_text("mine")
+    marey("fetch", job, "-o", folder, "--format", "npz", *NAMES).ok()
+    (folder / "sub").mkdir()
+    (folder / "sub" / "deep.npz").write_text("mine")
+    (folder / "notes.txt").write_text("mine")
+    (folder / "link.npz").symlink_to(outside)
+    (folder / "dir.npz").mkdir()
+    rows = manifest(folder)
+    tricks = (
+        "../other.npz",
+        str(outside),
+        "sub/deep.npz",
+        "notes.txt",
+        "manifest.csv",
+        "link.npz",
+        "dir.npz",
+        "..",
+        "",
+    )
+    forged = [{**rows[0], "item": str(number), "npz": trick} for number, trick in enumerate(tricks)]
+    left = write_manifest(folder, job, [*rows, *forged])
+    assert left == []
+    assert write_manifest(folder, job, rows[1:]) == [folder / "take00.npz"]
+    remove_left(folder, [folder / "take00.npz"])
+    assert (outside.read_text(), (folder / "sub" / "deep.npz").read_text()) == ("mine", "mine")
+    assert (folder / "notes.txt").exists()
+    assert (folder / "link.npz").is_symlink()
+    assert len(files(folder)) == 21
+
+
+class Breaking(Client):
+    """A client whose command is interrupted, or whose server is lost, at its twelfth file."""
+
+    def __init__(self, server: Server, error: BaseException) -> None:
+        super().__init__(server)
+        self._error = error
+        self._left = 11
+
+    @contextmanager
+    def stream(self, path: str, *more: Any, **options: Any) -> Iterator[Any]:
+        self._left -= 1
+        if self._left < 0:
+            raise self._error
+        with super().stream(path, *more, **options) as response:
+            yield response
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")], ids=["ctrl-c", "disk"])
+def test_a_fetch_that_breaks_off_leaves_a_manifest_of_what_is_there_and_the_next_completes_it(
+    api: LiveApi, marey: Command, job: str, tmp_path: Path, error: BaseException, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Breaking(Server(api.url, api.key), error) as client, pytest.raises((KeyboardInterrupt, InvalidFile)):
+        fetch_job(client, job, tmp_path, template="{name}")
+    there = files(tmp_path)
+    rows = manifest(tmp_path)
+    assert 0 < len(rows) < 20
+    assert all(row[kind] in there for row in rows for kind in ("npz", "bvh"))
+    told = {row[kind] for row in rows for kind in ("npz", "bvh")}
+    assert all(name.replace(".npz", ".bvh") not in there or name in told for name in there if name.endswith(".npz"))
+    assert "11 of 40 files are there, and in manifest.csv" in capsys.readouterr().err
+    marey("fetch", job, "-o", tmp_path, *NAMES).ok()
+    assert (len(manifest(tmp_path)), len(files(tmp_path))) == (20, 40)
+
+
+def test_a_fetch_of_more_that_breaks_off_keeps_the_lines_of_what_was_there(
+    api: LiveApi, marey: Command, job: str, tmp_path: Path
+) -> None:
+    marey("fetch", job, "-o", tmp_path, "--format", "bvh", *NAMES).ok()
+    with Breaking(Server(api.url, api.key), KeyboardInterrupt()) as client, pytest.raises(KeyboardInterrupt):
+        fetch_job(client, job, tmp_path, template="{name}")
+    rows = {row["name"]: row for row in manifest(tmp_path)}
+    assert len(rows) == 20
+    assert {row["bvh"] for row in rows.values()} == {f"{name}.bvh" for name in rows}
+    assert {bool(row["npz"]) for row in rows.values()} == {True, False}
