@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -12,7 +13,7 @@ import typer
 
 from services.cli import console
 from services.cli.commands.motions import Review, review_of
-from shared.errors import InvalidInput, NotFound
+from shared.errors import Conflict, InvalidInput, NotFound
 
 if TYPE_CHECKING:
     from services.cli.client import Client
@@ -23,6 +24,8 @@ MOST_A_PAGE = 100
 """A hundred strips are a picture of 33,000 pixels; a hundred players 5 MB."""
 MOST = 1000
 """Motions of one call."""
+CONTINUED = re.compile(r"-from-\d+$")
+"""How a call that goes on is told to name its first page."""
 
 
 def review(
@@ -40,6 +43,7 @@ def review(
     ] = None,
     skip: Annotated[int, typer.Option("--skip", min=0, help="Leave out so many at the start.")] = 0,
     limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many.")] = MOST,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace pages that are there already.")] = False,
 ) -> None:
     """Draw the motions of a job, in the order they were made, on pages to choose by or on contact sheets."""
     from services.cli.client import Client
@@ -59,6 +63,7 @@ def review(
         paths = [
             output.with_stem(output.stem + (f"-{number}" if number > 1 else "")) for number in range(1, len(pages) + 1)
         ]
+        _check_free(paths, overwrite=overwrite)
         with console.bar() as bar:
             task = bar.add_task("drawing", total=len(found))
             for number, page in enumerate(pages):
@@ -74,7 +79,28 @@ def review(
     for path in paths:
         console.result(console.home_relative(path))
     if more:
-        console.say(f"There are more: --skip {skip + len(found)} goes on; --limit, --review and --tag choose.")
+        skipped = skip + len(found)
+        following = output.with_stem(f"{CONTINUED.sub('', output.stem)}-from-{skipped + 1}")
+        console.say(
+            f"There are more: `--skip {skipped} -o {console.home_relative(following)}` goes on; "
+            "--limit, --review and --tag choose."
+        )
+
+
+def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
+    """Nothing, if the pages may be written.
+
+    Raises:
+        Conflict: one is there already.
+    """
+    there = [path for path in paths if path.exists()]
+    if there and not overwrite:
+        more = f", and {len(there) - 1} more of {len(paths)} pages" if len(there) > 1 else ""
+        raise Conflict(
+            f"is there already{more}",
+            where=str(there[0]),
+            hint="Name another file with -o, or --overwrite.",
+        )
 
 
 def _motions(

@@ -53,12 +53,30 @@ def test_every_motion_is_on_one_of_the_pages_with_what_was_said(marey: Command, 
 def test_a_contact_sheet_has_a_row_for_each_and_the_rest_is_announced(marey: Command, job: str, tmp_path: Path) -> None:
     ran = marey("review", job, "-o", tmp_path / "r.png", "--limit", 2, "--skip", 1, "--tag", "shot=010").ok()
     assert [Path(line).name for line in ran.out.splitlines()] == ["r.png"]
-    assert "--skip 3 goes on" in ran.err
+    assert f"`--skip 3 -o {tmp_path / 'r-from-4.png'}` goes on" in ran.err
     with Image.open(tmp_path / "r.png") as two:
         height = two.height
-    marey("review", job, "-o", tmp_path / "r.png", "--limit", 1, "--skip", 4).ok()
+    marey("review", job, "-o", tmp_path / "r.png", "--limit", 1, "--skip", 4, "--overwrite").ok()
     with Image.open(tmp_path / "r.png") as one:
         assert 300 < height - one.height < 450
+
+
+def test_pages_that_are_there_stay_and_what_goes_on_is_named_otherwise(
+    marey: Command, job: str, tmp_path: Path
+) -> None:
+    told = ("review", job, "--per-page", 1, "--limit", 2)
+    assert "r-from-3.html" in marey(*told, "-o", tmp_path / "r.html").ok().err
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    ran = marey(*told, "-o", tmp_path / "r.html", "--skip", 2)
+    ran.refused(2, f"{tmp_path / 'r.html'}: is there already, and 1 more of 2 pages", "-o", "--overwrite")
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    ran = marey(*told, "-o", tmp_path / "r-from-3.html", "--skip", 2).ok()
+    assert "r-from-5.html" in ran.err
+    assert {name: embedded(tmp_path / name, "cards")["count"] for name in ("r.html", "r-from-3.html")} == {
+        "r.html": "1 to 1 of 2 and more", "r-from-3.html": "3 to 3 of 4 and more",
+    }  # fmt: skip
+    marey(*told, "-o", tmp_path / "r.html", "--skip", 2, "--overwrite").ok()
+    assert embedded(tmp_path / "r.html", "cards")["count"] == "3 to 3 of 4 and more"
 
 
 def test_what_cannot_be_drawn_is_said(marey: Command, job: str, tmp_path: Path) -> None:
