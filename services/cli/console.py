@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from shared.errors import InvalidInput
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
+INTERRUPTED = 130
+"""The exit code of a command that a person ended."""
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line on stdout.")]
 Limit = Annotated[
     int | None, typer.Option("--limit", min=1, help="Show at most this many; none given = all.", show_default=False)
 ]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 PAGE = 1000
 """Elements of one request of a listing, and rows of one drawn table: a long one is not held in memory."""
 
@@ -109,6 +115,36 @@ def bar() -> Progress:
     return Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=stderr()
     )
+
+
+@contextmanager
+def goes_on(what: str, hint: str) -> Generator[None]:
+    """Ctrl-C in here ends the command alone, and that is said: what goes on, and how to look at it."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"{what} goes on.\n  {hint}")
+        raise
+
+
+def confirm(question: str, *, yes: bool) -> None:
+    """Nothing, if that may be done: by `--yes`, or because a person says so.
+
+    Raises:
+        InvalidInput: there is no terminal to ask at.
+        typer.Exit: the person says no.
+    """
+    if yes:
+        return
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise InvalidInput("this is asked at a terminal, and there is none", where=question, hint="-y does it unasked.")
+    try:
+        agreed = typer.confirm(question, err=True)
+    except typer.Abort:
+        raise KeyboardInterrupt from None  # Ctrl-C, or the end of the input
+    if not agreed:
+        say("nothing was done")
+        raise typer.Exit(INTERRUPTED)
 
 
 def home_relative(path: str | os.PathLike[str]) -> str:

@@ -118,7 +118,7 @@ def watch_evaluation(
         Unreachable: the server was away for longer than `PATIENCE`.
     """
     deadline = None if timeout is None else time.monotonic() + timeout
-    with console.bar() as bar:
+    with console.goes_on(f"evaluation {evaluation}", _wait_hint(evaluation)), console.bar() as bar:
         bar.disable = quiet
         task = bar.add_task("", total=None)
         reachable = time.monotonic()
@@ -218,6 +218,10 @@ def _sleep(deadline: float | None, evaluation: str) -> None:
         raise TimedOut(
             "the time allowed has passed; the evaluation goes on",
             where=f"evaluation {evaluation}",
-            hint=f"`marey eval wait {evaluation}` waits again.",
+            hint=_wait_hint(evaluation),
         )
     time.sleep(min(POLL, left))
+
+
+def _wait_hint(evaluation: str) -> str:
+    return f"`marey eval wait {evaluation}` waits again; `marey eval cancel {evaluation}` ends it."

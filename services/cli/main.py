@@ -30,7 +30,6 @@ from services.cli.commands import (
 from shared import tracing
 from shared.errors import MareyError
 
-INTERRUPTED = 130
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "text", "train", "data"})
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a collector that does not answer."""
@@ -38,7 +37,8 @@ PATIENCE = 2.0
 HELP = """Text in, 3D human motion out.
 
 Exit codes: 0 all succeeded; 1 internal error; 2 usage or invalid input; 3 not found; 4 unreachable; 5 refused;
-6 ended with failed, dead or cancelled items; 7 --timeout passed; 8 evaluation regressed; 130 interrupted."""
+6 ended with failed, dead or cancelled items; 7 --timeout passed; 8 evaluation regressed; 130 interrupted, or
+answered with no."""
 
 
 class Commands(TyperGroup):
@@ -55,7 +55,7 @@ class Commands(TyperGroup):
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             console.say("marey: interrupted")
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(console.INTERRUPTED) from None
         except BrokenPipeError:
             sys.stderr.close()  # the reader of our output left; Python would complain at exit
             raise typer.Exit(0) from None

@@ -29,7 +29,7 @@ def watch_job(client: Client, job: str, *, timeout: float | None = None, quiet: 
         Unreachable: the server was away for longer than `PATIENCE`.
     """
     deadline = None if timeout is None else time.monotonic() + timeout
-    with console.bar() as bar:
+    with console.goes_on(f"job {job}", _watch_hint(job)), console.bar() as bar:
         bar.disable = quiet
         state = client.get(f"/v1/jobs/{job}")
         task = bar.add_task(_caption(state, state), total=state["total"], completed=_ended(state))
@@ -75,8 +75,12 @@ def _patience(deadline: float | None, job: str) -> float:
         return 30.0
     left = deadline - time.monotonic()
     if left <= 0:
-        raise TimedOut("the time allowed has passed; the job goes on", where=f"job {job}", hint="Watch it again later.")
+        raise TimedOut("the time allowed has passed; the job goes on", where=f"job {job}", hint=_watch_hint(job))
     return min(30.0, left)
+
+
+def _watch_hint(job: str) -> str:
+    return f"`marey jobs watch {job}` watches it again; `marey jobs cancel {job}` ends it."
 
 
 def _ended(now: dict[str, Any]) -> int:

@@ -149,12 +149,11 @@ def comment(
 
 
 @app.command()
-def delete(jobs: Jobs, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
     from services.cli.client import Client
 
-    if not yes:
-        typer.confirm(f"Delete {len(jobs)} jobs with their motions?", abort=True, err=True)
+    console.confirm(f"Delete {len(jobs)} jobs with their motions?", yes=yes)
     with Client.here() as client:
         for job in jobs:
             client.delete(f"/v1/jobs/{job}")
@@ -164,14 +163,13 @@ def delete(jobs: Jobs, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do
 @app.command()
 def erase(
     jobs: Jobs,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: console.Yes = False,
     as_json: console.Json = False,
 ) -> None:
     """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
     from services.cli.client import Client
 
-    if not yes:
-        typer.confirm(f"Forget the prompts of {len(jobs)} jobs for good?", abort=True, err=True)
+    console.confirm(f"Forget the prompts of {len(jobs)} jobs for good?", yes=yes)
     with Client.here() as client:
         for job in jobs:
             found = client.post(f"/v1/jobs/{job}/erase")

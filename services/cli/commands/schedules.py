@@ -110,12 +110,11 @@ def history(
 
 
 @app.command()
-def delete(schedules: Ids, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+def delete(schedules: Ids, yes: console.Yes = False) -> None:
     """Delete schedules; their runs stay."""
     from services.cli.client import Client
 
-    if not yes:
-        typer.confirm(f"Delete {len(schedules)} schedules?", abort=True, err=True)
+    console.confirm(f"Delete {len(schedules)} schedules?", yes=yes)
     with Client.here() as client:
         for each in schedules:
             client.delete(f"/v1/schedules/{each}")

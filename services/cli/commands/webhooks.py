@@ -112,12 +112,11 @@ def rotate(
 
 
 @app.command()
-def remove(webhooks: Ids, yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False) -> None:
+def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     """Remove webhooks, with their deliveries and log."""
     from services.cli.client import Client
 
-    if not yes:
-        typer.confirm(f"Remove {len(webhooks)} webhooks?", abort=True, err=True)
+    console.confirm(f"Remove {len(webhooks)} webhooks?", yes=yes)
     with Client.here() as client:
         for each in webhooks:
             client.delete(f"/v1/webhooks/{each}")
