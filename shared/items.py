@@ -49,7 +49,8 @@ SETTINGS = {
 """Settings of sampling, each with its range; which of them a model has, its bundle says. One with whole bounds is
 whole."""
 
-NAME = re.compile(r"[^\W_][\w .()+=@,-]{0,99}", re.ASCII)
+MAX_NAME = 100
+NAME = re.compile(rf"[^\W_][\w .()+=@,-]{{0,{MAX_NAME - 1}}}", re.ASCII)
 """A name becomes a file name on the client: plain characters, no separators, no leading dot or dash."""
 RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 """Names that Windows keeps for devices."""
@@ -101,9 +102,7 @@ class InvalidItems(InvalidInput):
         self.total = len(found) if total is None else total
         self.problems = tuple(found[:MAX_PROBLEMS])
         count = "1 problem" if self.total == 1 else f"{self.total} problems"
-        super().__init__(
-            f"{count} in the input; nothing was submitted", where=where, hint="Correct them and try again."
-        )
+        super().__init__(f"{count} in the input; none of it is used", where=where, hint="Correct them and try again.")
 
     def __str__(self) -> str:
         lines = [f"  {problem}" for problem in self.problems]
@@ -232,9 +231,13 @@ def checked(
 
 def _name(value: object) -> str:
     text = _text(value)
-    if not NAME.fullmatch(text) or text.endswith((".", " ")) or ".." in text or RESERVED.fullmatch(text):
+    if len(text) > MAX_NAME:
+        raise InvalidInput(f"has {len(text)} characters; file names take up to {MAX_NAME} of it")
+    if RESERVED.fullmatch(text):
+        raise InvalidInput(f"{text!r} cannot be a file name: Windows keeps it for a device")
+    if not NAME.fullmatch(text) or text.endswith((".", " ")) or ".." in text:
         raise InvalidInput(
-            f"{text[:60]!r} cannot be a file name: use up to 100 of A-Z a-z 0-9 space _ . ( ) + = @ , - "
+            f"{text[:60]!r} cannot be a file name: use A-Z a-z 0-9 space _ . ( ) + = @ , - "
             "and begin with a letter or digit"
         )
     return text

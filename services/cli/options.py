@@ -53,5 +53,6 @@ Variants = Annotated[
 ]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; none given = the model's.")]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
-Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]
+Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]
+BundleOrFolder = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]
 TEMPLATE = DEFAULT_TEMPLATE

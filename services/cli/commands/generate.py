@@ -37,7 +37,7 @@ def generate(
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
     model: options.Model = None,
-    bundle: options.Bundle = None,
+    bundle: options.BundleOrFolder = None,
     seconds: options.Seconds = None,
     seed: options.Seed = None,
     variants: options.Variants = None,

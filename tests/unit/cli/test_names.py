@@ -52,6 +52,14 @@ def test_a_name_with_path_tricks_is_refused(name: str) -> None:
     assert [p.field for p in problems] == ["name"]
 
 
+@pytest.mark.parametrize(
+    ("name", "why"), [("CON", "Windows keeps it for a device"), ("x" * 300, "has 300 characters"), ("Zoë", "use A-Z")]
+)
+def test_a_name_is_told_why_it_is_refused(name: str, why: str) -> None:
+    _, (problem,) = read_item({"prompt": "a person waves", "name": name})
+    assert why in problem.message
+
+
 @given(st.text(alphabet="ab./\\: \0é-_", max_size=12))
 def test_a_name_that_passes_stays_in_its_folder(name: str) -> None:
     item, _ = read_item({"prompt": "a person waves", "name": name})

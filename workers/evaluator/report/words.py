@@ -13,7 +13,7 @@ from workers.evaluator.report.parts import Metric, Repeats, Value
 MINUS, SPACE = "\u2212", "\u00a0"
 SUBJECTS: dict[Against, str] = {"last run": "the last run", "pinned baseline": "the pinned baseline"}
 MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-NOTHING_EARLIER = "There is no earlier evaluation with this evaluator and this data to compare with."
+NOTHING_EARLIER = "There is no earlier evaluation of this model with this evaluator and this data to compare with."
 LEGEND = "↑ higher is better, ↓ lower is better."
 CHANGES = (
     "A change holds the difference, what it means, and its 95\u00a0% interval, by paired bootstrap over the prompts of "
