@@ -17,10 +17,8 @@ import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from standardwebhooks.webhooks import Webhook
 
-from services.scheduler.main import scheduler_main
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import EACH, Deliverer
-from shared.errors import InvalidInput
 from shared.jobs import (
     DEFAULT_TENANT,
     Attempt,
@@ -31,7 +29,7 @@ from shared.jobs import (
     send_test,
     transaction,
 )
-from shared.settings import REPOSITORY, Settings
+from shared.settings import REPOSITORY
 from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
@@ -279,13 +277,3 @@ def test_a_scheduler_that_is_killed_loses_nothing_and_sweeps_while_receivers_han
     assert "webhook_delivered" in logs
     for hidden in ("secret-path", SECRET, KEY):
         assert hidden not in logs
-
-
-def test_a_scheduler_whose_rule_for_addresses_makes_no_sense_does_not_start(database_url: str, queue_url: str) -> None:
-    config = Settings.model_validate(
-        {"database_url": database_url, "queue_url": queue_url, "webhook_allow": ["everything"]}
-    )
-    stopping = threading.Event()
-    stopping.set()
-    with pytest.raises(InvalidInput, match="everything"):
-        scheduler_main(config, stopping=stopping)
