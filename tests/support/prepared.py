@@ -81,6 +81,7 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
             mirrored=False,
             spliced=(),
             acts=(acts[i % len(acts)],) if acts else ("walk", "bow") if joined(i) else ("walk",),
+            sides=("", "") if joined(i) and not acts else ("",),
             measured=Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side=""),
             captions=(f"a person does {acts[i % len(acts)]}", acts[i % len(acts)]) if acts else ("one", "two"),
             seams=(20,) if joined(i) and not acts else (),

@@ -29,7 +29,7 @@ def train_stage(name: str, options: TrainOptions[EvaluatorConfig]) -> dict[str, 
     data = MotionData.load(options.prepared, choose_device(options.device))
     encoder = open_encoder(CaptionTexts.load(data.prepared).spec)
     torch.manual_seed(options.seed)
-    stage, sha256 = TMRStage(options.config, data, encoder), data.sha256
+    stage, sha256 = TMRStage(options.config, data, encoder), data.prepared.sha256
     del data  # the stage has kept what it reads, a quarter of the features
     metrics = RECIPE.train(stage, options) | stage.test()
     finish(stage.module, options, stage.name, metrics, sha256)

@@ -13,6 +13,7 @@ from workers.hgm3.data import CaptionData
 from workers.hgm3.stage_masked import MaskedStage
 from workers.hgm3.stage_residual import LengthStage, ResidualStage
 from workers.hgm3.tokenizer import Tokenizer
+from workers.training.drawn import load_drawn
 from workers.training.loop import start_process_group
 from workers.training.motions import MotionData, load_tokens
 from workers.training.staging import TrainOptions, finish, train_all, use_threads
@@ -46,20 +47,23 @@ def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float
     clips = data.prepared.clips
     data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
     if name == "masked":
+        drawn = load_drawn(options.run, tokenizer, data.prepared)
+        if drawn is not None:
+            clips, tokens, captions = drawn.extend(clips, tokens, captions)
         stage = MaskedStage(options.config, clips, tokens, captions)
     elif name == "residual":
         stage = ResidualStage(options.config, clips, tokens, captions, codebooks)
     else:
         stage = LengthStage(options.config, clips, tokens, captions)
     metrics = RECIPE.train(stage, options)
-    finish(stage.module, options, name, metrics, data.sha256)
+    finish(stage.module, options, name, metrics, data.prepared.sha256)
     return metrics
 
 
 def _train_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> dict[str, float]:
     stage = TokenizerStage(options.config, data, Tokenizer(options.config))
     metrics = RECIPE.train(stage, options) | stage.test()
-    finish(stage.module, options, stage.name, metrics, data.sha256)
+    finish(stage.module, options, stage.name, metrics, data.prepared.sha256)
     return metrics
 
 

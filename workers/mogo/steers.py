@@ -92,7 +92,7 @@ def load_steers(
         rollouts: `config.rollouts` more leave what these draw; None = all leave captured motion.
     """
     drawn = "" if rollouts is None else f":{config.rollouts}:{rollouts.fingerprint}"
-    key = f"{data.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}{drawn}"
+    key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}:{config.steers}:{config.max_frames}{drawn}"
     made = _Making(config, data.prepared, np.asarray(clips), np.asarray(weights))
     values = made_once(
         run / FILE, key, data.features.device, lambda: vars(_encoded(tokenizer, data, list(made.joined(rollouts))))

@@ -45,7 +45,7 @@ def _train_tokenizer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
     config = options.config
     stage = TokenizerStage(config, data, tokenizer, lambda: scale_penalty(tokenizer, config.tokenizer))
     metrics = RECIPE.train(stage, options) | stage.test()
-    finish(stage.module, options, stage.name, metrics, data.sha256)
+    finish(stage.module, options, stage.name, metrics, data.prepared.sha256)
     return metrics
 
 
@@ -73,7 +73,7 @@ def transformer_stage(
     torch.manual_seed(options.seed)
     clips = data.prepared.clips
     steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES), captions)
-    return TransformerStage(options.config, clips, tokens, captions, steers, network), data.sha256
+    return TransformerStage(options.config, clips, tokens, captions, steers, network), data.prepared.sha256
 
 
 def _data(options: TrainOptions[MOGOConfig]) -> MotionData:

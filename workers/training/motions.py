@@ -5,7 +5,6 @@ Choices of data come from a numpy generator that the loop seeds from (seed, step
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,11 +41,6 @@ class MotionData:
             torch.from_numpy(prepared.mean).to(device),
             torch.from_numpy(prepared.std).to(device),
         )
-
-    @property
-    def sha256(self) -> str:
-        """Hash of the manifest, which names every file's."""
-        return hashlib.sha256(self.prepared.manifest.model_dump_json().encode()).hexdigest()
 
     def originals(self, split: str) -> list[Clip]:
         """Captured clips of a split: no mirror images, no loops or splices."""
@@ -129,7 +123,7 @@ class TokenData:
 
 def load_tokens(run: Path, tokenizer: MotionTokenizer, data: MotionData) -> TokenData:
     """Tokens of all clips: encoded once for a tokenizer and its data, then read from the run folder."""
-    key = f"{data.sha256}:{fingerprint(tokenizer)}"
+    key = f"{data.prepared.sha256}:{fingerprint(tokenizer)}"
     device = data.features.device
     return TokenData(**made_once(run / TOKENS, key, device, lambda: vars(TokenData.encode(tokenizer, data))))
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -32,6 +32,11 @@ class SentenceData:
             InvalidFile: texts of another encoder's width.
         """
         return SentenceData(**sentence_fields(texts, counts, width, device))
+
+    def repeated(self, clips: NDArray[np.int64]) -> Self:
+        """The same, where more clips follow that have the captions of these (M,)."""
+        first, count = (np.concatenate([own, own[clips]]) for own in (self.first, self.count))
+        return replace(self, first=first, count=count)
 
     def choose(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Tensor:
         """One caption of each clip (B,) at random."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -75,6 +76,11 @@ class PreparedData:
         if len(local) != manifest.frames + manifest.clips or len(roots) != len(local):
             raise InvalidFile("joints do not fit the clips", where=str(path))
         return cls(path, manifest, clips, features, mean, std, local, roots)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the manifest, which names every file's."""
+        return hashlib.sha256(self.manifest.model_dump_json().encode()).hexdigest()
 
     @property
     def layout(self) -> FeatureLayout:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workers.training.data.manifest import Clip
 
-SEQUENCE_SHARE = {2: 0.28, 3: 0.04}
+SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Share of the draws that are sequences of two and of three acts; clips of one act have the rest."""
 
 ACT_WEIGHT = {"walk": 3.0, "walk_back": 2.5, "bow": 2.0, "turn": 1.5}

@@ -1,0 +1,84 @@
+"""Motions that a model drew for captions of training clips: trained on as further clips, with those captions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from safetensors import safe_open
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from shared.errors import InvalidFile
+from shared.nn.motion_tokenizer import MotionTokenizer
+from workers.training.data.manifest import Clip
+from workers.training.data.prepared import PreparedData
+from workers.training.motions import TokenData
+from workers.training.sentences import SentenceData
+
+C = TypeVar("C", bound=SentenceData)
+
+FILE = "practice.safetensors"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """M motions, their tokens end to end."""
+
+    clips: NDArray[np.int64]  # (M,) whose caption each was drawn for
+    lengths: Tensor  # (M,) int64 tokens
+    tokens: Tensor  # (N, V) int64
+
+    @classmethod
+    def of(cls, motions: Sequence[tuple[int, Tensor]]) -> Drawn:
+        """Of clips and the tokens (n, V) drawn for each."""
+        clips = np.array([clip for clip, _ in motions], np.int64)
+        return cls(clips, torch.tensor([len(tokens) for _, tokens in motions]), torch.cat([t for _, t in motions]))
+
+    def write(self, run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> None:
+        """Leave them in a run folder."""
+        run.mkdir(parents=True, exist_ok=True)
+        tensors = {"clips": torch.from_numpy(self.clips), "lengths": self.lengths, "tokens": self.tokens.short()}
+        temporary = (run / FILE).with_suffix(".part")
+        save_file(tensors, temporary, metadata={"key": _key(tokenizer, prepared)})
+        temporary.replace(run / FILE)
+
+    def extend(self, clips: Sequence[Clip], tokens: TokenData, captions: C) -> tuple[list[Clip], TokenData, C]:
+        """Clips, tokens and captions with these behind them."""
+        device = tokens.tokens.device
+        lengths = self.lengths.to(device)
+        starts = len(tokens.tokens) + lengths.cumsum(0) - lengths
+        more = replace(
+            tokens,
+            tokens=torch.cat([tokens.tokens, self.tokens.to(device)]),
+            starts=torch.cat([tokens.starts, starts[:, None].expand(-1, tokens.phases)]),
+            lengths=torch.cat([tokens.lengths, lengths[:, None].expand(-1, tokens.phases)]),
+        )
+        return [*clips, *(clips[clip] for clip in self.clips)], more, captions.repeated(self.clips)
+
+
+def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> Drawn | None:
+    """What was left in a run folder; None = nothing.
+
+    Raises:
+        InvalidFile: drawn with another tokenizer, or for other data.
+    """
+    file = run / FILE
+    if not file.is_file():
+        return None
+    with safe_open(file, "pt") as opened:
+        key = opened.metadata()["key"]
+    if key != _key(tokenizer, prepared):
+        hint = "Remove it, or draw again (`python -m workers.hgm3.practice`)."
+        raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)
+    values = load_file(file)
+    return Drawn(values["clips"].numpy(), values["lengths"], values["tokens"].long())
+
+
+def _key(tokenizer: MotionTokenizer, prepared: PreparedData) -> str:
+    return f"{prepared.sha256}:{float(tokenizer.codebooks.double().abs().sum()):.6f}"
