@@ -18,6 +18,7 @@ from pathlib import Path
 
 import psutil
 
+from shared.errors import MareyError
 from shared.settings import settings
 
 TELL_SECONDS = 3.0
@@ -118,4 +119,7 @@ def _read(path: Path) -> WorkerStatus | None:
 
 
 if __name__ == "__main__":
-    sys.exit(not probe(settings().home, ready="ready" in sys.argv[1:]))
+    try:
+        sys.exit(not probe(settings().home, ready="ready" in sys.argv[1:]))
+    except MareyError as error:
+        sys.exit(f"{error}")

@@ -85,3 +85,11 @@ def test_the_probe_is_a_command(tmp_path: Path) -> None:
     assert subprocess.run(command, env=environment, check=False).returncode == 1
     write_status(tmp_path, "one", WorkerStatus(7, True, 3.0, time.time()))
     assert subprocess.run(command, env=environment, check=False).returncode == 0
+
+
+def test_the_probe_says_which_setting_is_wrong() -> None:
+    command = [sys.executable, "-m", "shared.runtime.status"]
+    ran = subprocess.run(command, env={**os.environ, "MAREY_PORT": "abc"}, check=False, capture_output=True, text=True)
+    assert ran.returncode == 1
+    assert "MAREY_PORT" in ran.stderr
+    assert "Traceback" not in ran.stderr
