@@ -82,7 +82,8 @@ class FolderStore:
                 file.close()
                 raise range_past_end(key, start, size)
             file.seek(start)
-        return Opened(size, read_chunks(file, length))
+        left = size - start
+        return Opened(size, read_chunks(file, left if length is None else min(length, left)))
 
     def exists(self, key: str) -> bool:
         """See `AssetStore.exists`."""

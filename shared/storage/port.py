@@ -170,14 +170,14 @@ def range_past_end(key: str, start: int, size: int) -> InvalidInput:
     return InvalidInput(f"the range begins at byte {start} of {size}", where=key)
 
 
-def read_chunks(file: BinaryIO, length: int | None) -> Iterator[bytes]:
-    """Chunks of an open file, which is closed at the end."""
+def read_chunks(file: BinaryIO, length: int) -> Iterator[bytes]:
+    """The next `length` bytes of an open file in chunks; the file is closed at the end.
+
+    No read asks for more than is left: it is given that much memory before the first byte is there, and most files
+    are a hundredth of a chunk.
+    """
     with file:
         left = length
-        while left is None or left > 0:
-            chunk = file.read(CHUNK if left is None else min(CHUNK, left))
-            if not chunk:
-                return
-            if left is not None:
-                left -= len(chunk)
+        while left > 0 and (chunk := file.read(min(CHUNK, left))):
+            left -= len(chunk)
             yield chunk

@@ -8,6 +8,7 @@ import os
 import stat
 import threading
 import time
+import tracemalloc
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -50,6 +51,20 @@ def test_a_file_of_many_megabytes_comes_back(store: AssetStore, tmp_path: Path) 
     opened = store.open(key_of(content))
     assert opened.size == len(content)
     assert b"".join(opened.chunks) == content
+
+
+@pytest.mark.parametrize(("start", "length"), [(0, None), (100, None), (0, 4096), (4000, 2**30)])
+def test_a_small_file_takes_little_memory(folder_store: FolderStore, start: int, length: int | None) -> None:
+    content = bytes(4096)
+    folder_store.put(key_of(content), content)
+    opened = folder_store.open(key_of(content), start, length)
+    tracemalloc.start()
+    try:
+        assert b"".join(opened.chunks) == content[start:]
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 2**16
 
 
 def test_an_empty_object_is_an_object(store: AssetStore) -> None:
