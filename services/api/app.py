@@ -46,6 +46,7 @@ from services.text.routes import router as texts_router
 from shared.errors import InvalidInput
 from shared.jobs import create_engine
 from shared.runtime.logs import configure_logging
+from shared.runtime.malloc import one_heap
 from shared.settings import Settings, settings
 from shared.storage import open_store
 from shared.tracing import configure_tracing
@@ -152,6 +153,7 @@ def write_openapi(path: Path) -> None:
 
 def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
+    one_heap()
     config = settings()
     # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
