@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 from shared.bundles import find_bundle
@@ -19,6 +20,21 @@ class NoLabeller:
     def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
         """No frames."""
         return [() for _ in sentences]
+
+
+class OneAtATime:
+    """A labeller that serves one thread after the other; their networks and tokenizers promise no more."""
+
+    def __init__(self, labeller: RoleLabeller) -> None:
+        self._labeller = labeller
+        self._lock = threading.Lock()
+        self.name = labeller.name
+        self.sha256 = labeller.sha256
+
+    def label(self, sentences: Sequence[Sequence[str]]) -> list[tuple[Frame, ...]]:
+        """Its frames."""
+        with self._lock:
+            return self._labeller.label(sentences)
 
 
 def load_labeller(name: str) -> RoleLabeller:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +20,7 @@ from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
 from shared.text.guard import changed_meaning
 from shared.text.keys import NO_LABELLER, feature_key
-from shared.text.labellers import load_labeller
+from shared.text.labellers import OneAtATime, load_labeller
 from shared.text.prompts import check_prompt
 from shared.text.rewriters import NotRewritten, PromptRewriter, load_rewriter
 from shared.text.roles import RoleLabeller
@@ -36,7 +37,8 @@ EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
 class TextPipeline:
     """Prompts in, graphs and features out.
 
-    A vector depends on its text alone, so features are equal in any batch.
+    A vector depends on its text alone, so features are equal in any batch. Thread-safe as `load` makes it: labeller and
+    encoder serve one thread after the other, and whoever waits for a rewriter keeps nobody waiting.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class TextPipeline:
         self.encoder = encoder
         self._speller: Speller | None = None
         self._pooled: OrderedDict[str, NDArray[np.float32]] = OrderedDict()
+        self._lock = threading.Lock()
 
     @classmethod
     def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
@@ -72,7 +75,7 @@ class TextPipeline:
             NotFound: weights are not here; the hint says how to get them.
             InvalidBundle: they are here, but not those `spec` names.
         """
-        labeller = load_labeller(spec.labeller)
+        labeller = OneAtATime(load_labeller(spec.labeller))
         return cls(
             spec,
             rewriter=load_rewriter(spec.rewriter, labeller),
@@ -160,14 +163,18 @@ class TextPipeline:
         if self.spec.node_features == "pooled":
             rows = self.pooled([node.text for node in graph.nodes])
         else:
-            sentence = self.encoder.encode(_strip(graph.text))
+            with self._lock:
+                sentence = self.encoder.encode(_strip(graph.text))
             starts = _word_starts(graph)
             rows = [self._span(sentence, graph, starts, node) for node in graph.nodes]
         return np.stack(rows).astype(np.float16)
 
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """Pooled encodings (W,) of texts without the punctuation at their ends; the latest few thousand are kept."""
-        stripped = [_strip(text) for text in texts]
+        with self._lock:
+            return self._pooled_of([_strip(text) for text in texts])
+
+    def _pooled_of(self, stripped: Sequence[str]) -> list[NDArray[np.float32]]:
         found = {text: self._pooled[text] for text in stripped if text in self._pooled}
         missing = [text for text in dict.fromkeys(stripped) if text not in found]
         if missing:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 from uuid import UUID
 
 import numpy as np
@@ -24,7 +26,9 @@ from shared.streams.acts import Begun
 from shared.streams.bell import Bell
 from shared.streams.control import Control
 from shared.streams.frames import Frame
-from tests.support.live_loop import LiveWorker, Studio
+from shared.streams.redis import LEASE_MS
+from shared.text.features import TextFeatures
+from tests.support.live_loop import LiveWorker, Studio, parse
 from tests.support.runtime import Loop
 from workers.generating.handler import GeneratorHandler
 from workers.mogo.bundle import random_bundle
@@ -54,7 +58,7 @@ def studio(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Stud
 def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Iterator[Start]:
     workers: list[LiveWorker] = []
 
-    def begin(slots: int = 2, room: type[LiveRoom] = LiveRoom, **options: float) -> LiveWorker:
+    def begin(slots: int = 2, room: type[LiveRoom] = LiveRoom, **options: Any) -> LiveWorker:
         workers.append(LiveWorker(engine, client, lambda: room(generator, slots), **options))
         return workers[-1]
 
@@ -309,6 +313,64 @@ def test_a_prompt_that_cannot_be_read_fails_its_stream(studio: Studio, start: St
     studio.send(good, Control("steer", "refused"))
     studio.send(good, Control("steer", "a person waves"))
     studio.until(lambda: whole(studio, good)[-1].prompt == 1, "the next prompt")
+
+
+class Rewriter:
+    """Reads prompts that say so when it is told to, the others at once."""
+
+    def __init__(self) -> None:
+        self.go = threading.Event()
+        self.asked: list[str] = []
+
+    def parse(self, prompt: str) -> TextFeatures:
+        self.asked.append(prompt)
+        if prompt.endswith("slowly"):
+            assert self.go.wait(60)
+        return parse(prompt)
+
+
+def test_a_prompt_that_is_read_for_longer_than_a_lease_lasts_is_read_once(
+    studio: Studio, start: Start, engine: sa.Engine
+) -> None:
+    rewriter = Rewriter()
+    stream = studio.begin("a person walks slowly")
+    start(slots=1, parse=rewriter.parse)
+    studio.until(lambda: bool(rewriter.asked), "the reading")
+    start(slots=1, parse=rewriter.parse)  # it would take what has no lease
+    time.sleep(2 * LEASE_MS / 1000)
+    rewriter.go.set()
+    studio.until(lambda: studio.shown(stream) > 3, "frames")
+    assert rewriter.asked == ["a person walks slowly"]
+    assert studio.row(stream).fence == 1
+
+
+def test_a_prompt_that_is_read_for_long_holds_up_its_own_stream_alone(studio: Studio, start: Start) -> None:
+    rewriter = Rewriter()
+    one, other = studio.begin(seed=1), studio.begin(seed=2)
+    start(parse=rewriter.parse)
+    studio.until(lambda: min(studio.shown(one), studio.shown(other)) > 0, "frames of both")
+    studio.send(one, Control("steer", "a person waves slowly"))
+    studio.send(one, Control("steer", "a person bows"))
+    studio.until(lambda: "a person waves slowly" in rewriter.asked, "the reading")
+    recorded = studio.row(one).frames
+    studio.send(other, Control("steer", "a person jumps"))
+    studio.until(lambda: whole(studio, other)[-1].prompt == 1, "the other stream's prompt")
+    studio.until(lambda: studio.row(one).frames > recorded, "records meanwhile")
+    assert {frame.prompt for frame in whole(studio, one)} == {0}
+    rewriter.go.set()
+    studio.until(lambda: len(prompts_of(studio, one)) == 3, "both prompts, in order")
+    assert [text for _, text in prompts_of(studio, one)][1:] == ["a person waves slowly", "a person bows"]
+
+
+def test_a_stop_does_not_wait_for_a_prompt_that_is_being_read(studio: Studio, start: Start) -> None:
+    rewriter = Rewriter()
+    stream = studio.begin()
+    start(parse=rewriter.parse)
+    studio.until(lambda: studio.shown(stream) > 0, "frames")
+    studio.send(stream, Control("steer", "a person waves slowly"))
+    studio.send(stream, Control("stop"))
+    studio.until(lambda: studio.row(stream).state is StreamState.ENDED, "the end")
+    rewriter.go.set()
 
 
 @pytest.mark.parametrize("before", StreamState)

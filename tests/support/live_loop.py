@@ -26,7 +26,7 @@ from shared.jobs import (
 )
 from shared.runtime.live.keeper import QUEUE, Keeper
 from shared.runtime.live.loop import LiveLoop
-from shared.runtime.live.port import Room
+from shared.runtime.live.port import Parse, Room
 from shared.streams.control import Control, ControlQueue
 from shared.streams.frames import Frame, decode_frame
 from shared.streams.redis import FrameStream, Gap
@@ -52,7 +52,13 @@ class LiveWorker:
     """One live worker; `kill` leaves everything as a SIGKILL would."""
 
     def __init__(
-        self, engine: sa.Engine, client: redis.Redis, open_room: Callable[[], Room], *, idle_seconds: float = 600.0
+        self,
+        engine: sa.Engine,
+        client: redis.Redis,
+        open_room: Callable[[], Room],
+        *,
+        idle_seconds: float = 600.0,
+        parse: Parse = parse,
     ) -> None:
         self._stopping = threading.Event()
         self.loop = LiveLoop(open_room, lambda over: self.keeper.over(over))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from shared.jobs import StreamChunk, StreamRow, StreamState
 from shared.runtime.live.port import LiveFrame, Tokens
+from shared.runtime.live.reading import Reading
 from shared.streams.acts import Begun
-from shared.streams.control import ControlQueue
+from shared.streams.control import Control, ControlQueue
 from shared.streams.frames import Frame
 from shared.streams.redis import FrameStream, Lease
 from shared.streams.watch import Watch
@@ -27,6 +29,7 @@ class Held:
         opening: of the first prompt.
         session: its name in the room; None before it joined and after it left.
         read: id of the last message that was read; `obeyed` of the last that is in force.
+        heard: messages to obey, each with its id, in order; `reading` is of the first, where that is a steer.
         acts: those that began, of all prompts; `recorded_acts` of them are written down.
         unwritten: frames that Redis has not got yet.
         delayed: messages to obey when the frames that another worker showed are drawn again.
@@ -54,6 +57,8 @@ class Held:
     recorded_prompts: int
     acts: list[Begun]
     session: int | None = None
+    heard: deque[tuple[str, Control]] = field(default_factory=deque[tuple[str, Control]])
+    reading: Reading | None = None
     unwritten: list[Frame] = field(default_factory=list[Frame])
     delayed: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
     state: StreamState = StreamState.LIVE

@@ -34,6 +34,7 @@ from shared.runtime.faults import as_problem, patiently
 from shared.runtime.live.held import Held
 from shared.runtime.live.loop import LiveLoop, Over
 from shared.runtime.live.port import Parse, Room
+from shared.runtime.live.reading import Opening, Reading
 from shared.runtime.logs import logger
 from shared.streams.bell import Bell
 from shared.streams.control import Control, ControlQueue
@@ -46,6 +47,8 @@ log = logger(__name__)
 LISTEN_SECONDS = 0.05
 TAKE_SECONDS = 0.5
 RECORD_SECONDS = 1.0
+READ_SECONDS = 0.1
+"""Prompts are mostly read in milliseconds: each is waited for so long, then looked for every `LISTEN_SECONDS`."""
 CLOSE_PATIENCE = 60.0
 STALL_SECONDS = 10.0
 QUEUE = "live"
@@ -58,7 +61,7 @@ class Keeper(threading.Thread):
     Args:
         engine, client: Postgres and Redis.
         worker: this worker's row, renewed every second.
-        parse: reads prompts.
+        parse: reads prompts, on several threads.
         idle_seconds: a stream that nobody watched for so long ends.
     """
 
@@ -79,8 +82,10 @@ class Keeper(threading.Thread):
         self._stopping = stopping
         self._over: queue.SimpleQueue[Over] = queue.SimpleQueue()
         self._bell = Bell(client)
+        self._openings: dict[str, Opening] = {}
         self._held: dict[str, Held] = {}
         self._rounds = (
+            _Round(self._open, LISTEN_SECONDS),
             _Round(self._listen, LISTEN_SECONDS),
             _Round(self._answer, LISTEN_SECONDS),
             _Round(self._take, TAKE_SECONDS),
@@ -123,7 +128,7 @@ class Keeper(threading.Thread):
         while not self._stopping.wait(RENEW_SECONDS):
             if time.monotonic() - self._loop.ticked > STALL_SECONDS:
                 continue  # the loop hangs: let another worker have its streams
-            for held in list(self._held.values()):
+            for held in (*list(self._openings.values()), *list(self._held.values())):
                 try:
                     held.frames.renew(held.lease)
                 except LeaseLost:
@@ -131,10 +136,13 @@ class Keeper(threading.Thread):
                 except Unreachable as error:
                     log.warning("not_renewed", stream=str(held.row.id), error=error.message)
 
-    def _lose(self, held: Held) -> None:
+    def _lose(self, held: Opening | Held) -> None:
         held.lost = True
-        self._held.pop(str(held.row.id), None)
-        self._loop.leave(held)
+        if isinstance(held, Held):
+            self._held.pop(str(held.row.id), None)
+            self._loop.leave(held)
+        else:
+            self._openings.pop(str(held.row.id), None)
         metrics.LIVE_LOST.inc()
         log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
 
@@ -144,16 +152,19 @@ class Keeper(threading.Thread):
         if self._bell.rang():
             self._take()
 
+    def _is_full(self) -> bool:
+        return len(self._openings) + len(self._held) >= self._room.capacity
+
     def _take(self) -> None:
-        if len(self._held) >= self._room.capacity:
+        if self._is_full():
             return
         with transaction(self._engine) as conn:
             waiting = open_streams(conn, self._room.bundle)
         # Those that were live somewhere come first: somebody watches them.
         for row in sorted(waiting, key=lambda row: row.state is StreamState.WAITING):
-            if len(self._held) >= self._room.capacity:
+            if self._is_full():
                 return
-            if str(row.id) not in self._held:
+            if str(row.id) not in self._held and str(row.id) not in self._openings:
                 self._try(row)
 
     def _try(self, row: StreamRow) -> None:
@@ -173,11 +184,25 @@ class Keeper(threading.Thread):
                 frames.release(lease)
 
     def _begin(self, past: StreamPast, frames: FrameStream, lease: Lease) -> None:
-        row = past.row
-        prompts = list(past.prompts) or [(0, row.prompt)]
+        prompts = [past.row.prompt, *(text for _, text in past.prompts[-1:])]
+        opening = Opening(past, frames, lease, Reading(self._parse, list(dict.fromkeys(prompts))))
+        self._openings[str(past.row.id)] = opening
+        if opening.reading.is_done(READ_SECONDS):
+            self._join(opening)
+
+    def _open(self) -> None:
+        for opening in list(self._openings.values()):
+            if opening.reading.is_done():
+                self._join(opening)
+
+    def _join(self, opening: Opening) -> None:
+        """Its prompts are read: it goes on."""
+        past, row, frames, lease = opening.past, opening.row, opening.frames, opening.lease
+        self._openings.pop(str(row.id), None)
+        if opening.lost:
+            return
         try:
-            opening = self._parse(row.prompt)
-            text = opening if prompts[-1][1] == row.prompt else self._parse(prompts[-1][1])
+            features = opening.reading.features()
         except MareyError as error:
             self._end(row, lease, "its prompt cannot be read", error)
             frames.release(lease)
@@ -189,10 +214,10 @@ class Keeper(threading.Thread):
             controls=ControlQueue(self._redis, str(row.id)),
             watch=Watch(self._redis, str(row.id)),
             lease=lease,
-            text=text,
-            opening=opening,
+            text=features[-1],
+            opening=features[0],
             tokens=list(tokens),
-            prompts=prompts,
+            prompts=opening.prompts,
             seen=time.monotonic(),
             read=row.control,
             obeyed=row.control,
@@ -211,24 +236,34 @@ class Keeper(threading.Thread):
         for held in list(self._held.values()):
             for identity, message in held.controls.read(held.read):
                 held.read = identity
-                self._obey(held, identity, message)
+                if isinstance(message, InvalidInput):
+                    log.warning("message_refused", stream=str(held.row.id), error=message.message)
+                elif message.kind == "stop":
+                    self._loop.end(held, "stopped")
+                else:
+                    held.heard.append((identity, message))
+            while held.heard and self._obey(held, *held.heard[0]):
+                held.heard.popleft()
 
-    def _obey(self, held: Held, identity: str, message: Control | InvalidInput) -> None:
-        if isinstance(message, InvalidInput):
-            log.warning("message_refused", stream=str(held.row.id), error=message.message)
-        elif message.kind == "steer":
-            assert message.prompt is not None
-            try:
-                text = self._parse(message.prompt)
-            except MareyError as error:
-                log.warning("prompt_refused", stream=str(held.row.id), error=error.message)
-            else:
-                self._loop.steer(held, message.prompt, text, identity)
-        elif message.kind == "stop":
-            self._loop.end(held, "stopped")
-        else:
+    def _obey(self, held: Held, identity: str, message: Control) -> bool:
+        """Pass a message on to the loop; False while its prompt is being read, and all behind it wait."""
+        if message.prompt is None:
             state = StreamState.PAUSED if message.kind == "pause" else StreamState.LIVE
             self._loop.switch(held, state, identity)
+            return True
+        if held.reading is None:
+            held.reading = Reading(self._parse, [message.prompt])
+            held.reading.is_done(READ_SECONDS)
+        if not held.reading.is_done():
+            return False
+        reading, held.reading = held.reading, None
+        try:
+            (text,) = reading.features()
+        except MareyError as error:
+            log.warning("prompt_refused", stream=str(held.row.id), error=error.message)
+        else:
+            self._loop.steer(held, message.prompt, text, identity)
+        return True
 
     # --- writing down ---
 
@@ -292,6 +327,8 @@ class Keeper(threading.Thread):
     def _give_back(self) -> None:
         """This worker stops: another goes on at once, behind the last frame that was shown."""
         self._loop.finished.wait(STALL_SECONDS)
+        for opening in list(self._openings.values()):
+            self._guarded(lambda opening=opening: _released(opening))
         for held in list(self._held.values()):
             self._guarded(lambda held=held: self._write(held))
             self._guarded(lambda held=held: _released(held))
@@ -342,5 +379,5 @@ def clip_of(held: Held, room: Room) -> tuple[NewItem, bytes] | None:
     return item, blob
 
 
-def _released(held: Held) -> None:
+def _released(held: Opening | Held) -> None:
     held.frames.release(held.lease)

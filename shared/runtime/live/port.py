@@ -96,7 +96,7 @@ class Room(Protocol):
 
 
 Parse: TypeAlias = Callable[[str], TextFeatures]
-"""Reads a prompt. Raises `InvalidInput`."""
+"""Reads a prompt; may be called on several threads at once. Raises `InvalidInput`."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Show:
 
     Attributes:
         open_room: an empty room; called again when one broke.
-        parse: reads prompts, on a thread of its own.
+        parse: reads prompts, each on a thread of its own.
         device: for the worker's row.
     """
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +16,7 @@ from hypothesis import strategies as st
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle, InvalidInput, NotFound
+from shared.text import pipeline as pipelines
 from shared.text.keys import feature_key, resolve
 from shared.text.pipeline import TextPipeline
 
@@ -36,6 +41,43 @@ def test_features_are_equal_in_any_batch_and_order(pipeline: TextPipeline) -> No
     alone = [TextPipeline.load(TextSpec()).features([PROMPTS[1]])[0].to_blob()]
     assert together == backwards
     assert together[1] == alone[0]
+
+
+def test_threads_share_a_pipeline_and_its_parts_see_one_at_a_time(
+    pipeline: TextPipeline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    busy, met = threading.Lock(), threading.Event()
+
+    def alone(function: Callable[..., Any]) -> Callable[..., Any]:
+        def called(*args: Any) -> Any:
+            if not busy.acquire(blocking=False):
+                met.set()
+                return function(*args)
+            try:
+                met.wait(0.02)  # time for another one to come
+                return function(*args)
+            finally:
+                busy.release()
+
+        return called
+
+    for name, load, method in (
+        ("labeller", pipelines.load_labeller, "label"),
+        ("encoder", pipelines.load_encoder, "pooled"),
+    ):
+
+        def loaded(*args: Any, load: Callable[..., Any] = load, method: str = method) -> Any:
+            part = load(*args)
+            monkeypatch.setattr(part, method, alone(getattr(part, method)))
+            return part
+
+        with monkeypatch.context() as patch:
+            patch.setattr(pipelines, f"load_{name}", loaded)
+            shared = TextPipeline.load(TextSpec())
+        with ThreadPoolExecutor(len(PROMPTS)) as pool:
+            found = list(pool.map(lambda prompt, shared=shared: shared.features([prompt])[0].to_blob(), PROMPTS))
+        assert not met.is_set(), name
+        assert found == [features.to_blob() for features in pipeline.features(PROMPTS)]
 
 
 def test_punctuation_at_the_end_does_not_change_a_vector(pipeline: TextPipeline) -> None:

@@ -1,0 +1,84 @@
+"""Prompts, read aside: a rewriter may take its time, and the keeper has other streams to look after."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shared.errors import MareyError
+from shared.jobs import StreamPast, StreamRow
+from shared.runtime.faults import as_problem
+from shared.runtime.live.port import Parse
+from shared.runtime.logs import logger
+from shared.streams.redis import FrameStream, Lease
+from shared.text.features import TextFeatures
+
+log = logger(__name__)
+
+
+class Reading:
+    """The features of some prompts, from a thread of its own that dies with the process.
+
+    Args:
+        parse: reads one prompt; may be called on several threads at once.
+        prompts: in the order of the answer.
+    """
+
+    def __init__(self, parse: Parse, prompts: Sequence[str]) -> None:
+        self._parse, self._prompts = parse, prompts
+        self._found: list[TextFeatures] = []
+        self._problem: MareyError | None = None
+        self._done = threading.Event()
+        threading.Thread(target=self._read, name="reader", daemon=True).start()
+
+    def is_done(self, seconds: float = 0.0) -> bool:
+        """Whether there is an answer, now or within so many seconds."""
+        return self._done.wait(seconds)
+
+    def features(self) -> list[TextFeatures]:
+        """Of each prompt, once it is done.
+
+        Raises:
+            MareyError: one of them cannot be read.
+        """
+        assert self._done.is_set()
+        if self._problem is not None:
+            raise self._problem
+        return self._found
+
+    def _read(self) -> None:
+        try:
+            self._found = [self._parse(prompt) for prompt in self._prompts]
+        except Exception as error:
+            self._problem = as_problem(error)
+            if self._problem is not error:
+                log.exception("prompt_not_read")
+        finally:
+            self._done.set()
+
+
+@dataclass(eq=False)
+class Opening:
+    """A stream that this worker has taken and whose prompts are being read; its lease is renewed like any other.
+
+    Attributes:
+        reading: of the first prompt, and of the one in force where that is another.
+        lost: another worker has it.
+    """
+
+    past: StreamPast
+    frames: FrameStream
+    lease: Lease
+    reading: Reading
+    lost: bool = False
+
+    @property
+    def row(self) -> StreamRow:
+        """As it was taken."""
+        return self.past.row
+
+    @property
+    def prompts(self) -> list[tuple[int, str]]:
+        """Every prompt so far, with the frame from which it is in force."""
+        return list(self.past.prompts) or [(0, self.row.prompt)]
