@@ -9,7 +9,7 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from services.api.problems import problem_response
-from services.api.streams.wire import StreamProtocol
+from services.api.streams.wire import PING_SECONDS, PONG_SECONDS, StreamProtocol
 from shared.errors import TooSlow
 from shared.settings import Settings
 
@@ -77,5 +77,7 @@ def connection_options(config: Settings) -> dict[str, Any]:
         "timeout_keep_alive": config.idle_seconds,
         "ws": StreamProtocol,
         "ws_max_size": 64 * 2**10,  # what is too long for us is answered; what is over this is not even read
+        "ws_ping_interval": PING_SECONDS,
+        "ws_ping_timeout": PONG_SECONDS,
         "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 from contextlib import suppress
+from typing import Any
 
 from anyio import Lock
 from fastapi import WebSocket
@@ -21,6 +22,10 @@ TOLD = (401, 403, 404, 422)
 REASON_BYTES = 123  # RFC 6455
 BUFFER_BYTES = 4096
 """Twenty frames of 22 joints, a second."""
+PING_SECONDS, PONG_SECONDS = 20.0, 20.0
+"""Between an answer and the next ping, and for the answer."""
+FLUSH_SECONDS = 5.0
+"""For what is still on its way when a socket is closed."""
 
 
 class Wire:
@@ -80,11 +85,33 @@ class StreamProtocol(WebSocketsSansIOProtocol):
 
     Its own, and those of the kernel, hold minutes of them: sends would go on long after the client stopped to take
     what is sent, and what it then gets first is as old.
+
+    A socket that is closed is gone soon, too. asyncio closes a connection when all is sent, which a client that takes
+    nothing puts off for ever: it would keep its place here, and the stream that it had us pause.
     """
 
     def __init__(self, *args: object, **options: object) -> None:
         super().__init__(*args, **options)  # type: ignore[arg-type]
         self.conn.debug = False  # it would write headers to the log, and with them the key
+
+    def keepalive_timeout(self) -> None:
+        """A ping was not answered."""
+        super().keepalive_timeout()
+        self._cut_after(FLUSH_SECONDS)
+
+    def shutdown(self) -> None:
+        """The server stops."""
+        super().shutdown()
+        self._cut_after(FLUSH_SECONDS)
+
+    async def send(self, message: Any) -> None:
+        """Send what the application says."""
+        await super().send(message)
+        if message["type"] == "websocket.close":
+            self._cut_after(self.close_timeout + FLUSH_SECONDS)
+
+    def _cut_after(self, seconds: float) -> None:
+        self.loop.call_later(seconds, self.transport.abort)  # nothing, where the connection is gone by then
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Open the connection."""

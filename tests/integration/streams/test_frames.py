@@ -5,8 +5,11 @@ from __future__ import annotations
 import time
 
 import httpx2
+import pytest
 import redis
 
+from services.api import connections
+from services.api.streams import wire
 from shared.jobs import StreamState
 from shared.motion.skeleton import HUMANML3D
 from shared.settings import Settings
@@ -110,6 +113,23 @@ def test_a_client_that_goes_away_leaves_no_stream_paused(api: LiveApi, stream: s
         assert hand.heard() == [Control("pause")]
         slow.connection.socket.close()
     assert hand.heard() == [Control("resume")]
+
+
+def test_a_client_that_takes_nothing_any_more_is_let_go(
+    config: Settings, stream: str, secret: str, hand: Hand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(connections, "PING_SECONDS", 1.0)
+    monkeypatch.setattr(connections, "PONG_SECONDS", 3.0)
+    monkeypatch.setattr(wire, "FLUSH_SECONDS", 0.1)
+    with ApiThread(beside(config)) as url, watching(url, f"{stream}?slow=pause", secret, narrow=True) as dead:
+        hand.show(5)
+        dead.until_frame(4)
+        for _ in range(LATE // 100):
+            hand.show(100)
+        assert hand.heard() == [Control("pause")]
+        heard: list[Control] = []
+        until(lambda: heard or heard.extend(hand.heard()))
+        assert heard == [Control("resume")]
 
 
 def test_a_stream_is_watched_as_long_as_a_socket_is_open(
