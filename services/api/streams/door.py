@@ -25,6 +25,7 @@ KEY_PREFIX = "marey.key."
 MAX_FRAME = 2**32
 Slow = Literal["skip", "pause"]
 SLOW: tuple[str, ...] = get_args(Slow)
+QUERY = ("from", "slow")
 
 log = structlog.get_logger(__name__)
 
@@ -67,6 +68,7 @@ def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams)
     """
     key = authenticated(shared, secret)
     admit(shared, key, "read")
+    _check_names(query)
     first, slow = first_frame(query.get("from")), _slow(query.get("slow"))
     if slow == "pause":
         check_scope(key, "submit")  # it is a message like those a client sends
@@ -77,6 +79,13 @@ def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams)
     with transaction(shared.engine) as conn:
         row = get_stream(conn, key.tenant, identifier)
         return Visit(key, row, stream_prompts(conn, identifier), service.made_by(shared, row), first, slow == "pause")
+
+
+def _check_names(query: QueryParams) -> None:
+    """As `queries.check_query` for routes: a misspelt `from` would show the stream from its beginning."""
+    for name in query:
+        if name not in QUERY:
+            raise InvalidInput(f"{name[:40]!r} is no parameter of a socket; {' and '.join(QUERY)} are", where="query")
 
 
 def first_frame(given: str | None) -> int:
