@@ -80,7 +80,7 @@ class LiveMotion:
         state = self.start()
         early, late = features[:-MEMORY], features[-MEMORY:]
         if len(early):
-            state = replace(state, root=self._decoder.run(early, state.root)[1])
+            state = replace(state, root=self._decoder.follow(early, state.root))
         for frame in late:
             _, state = self.step(frame[None], state)
         return state

@@ -9,7 +9,8 @@ from shared.errors import InvalidInput
 from shared.motion.features import HUMANML3D_263
 from shared.motion.finish import finish_motion
 from shared.motion.kinematics import forward_kinematics
-from shared.motion.live import LiveMotion, LiveState
+from shared.motion.live import MEMORY, LiveMotion, LiveState
+from shared.motion.live_features import LiveDecoder
 from shared.motion.rotations import angle_between
 from shared.motion.skeleton import HUMANML3D, Skeleton
 from tests.support.motions import drift
@@ -99,3 +100,11 @@ def test_a_skeleton_without_feet_is_refused():
     plain = Skeleton("x", ("a", "b"), (-1, 0), np.ones((2, 3), np.float32), (0, 1))
     with pytest.raises(InvalidInput, match="feet"):
         LiveMotion(HUMANML3D_263, plain)
+
+
+def test_a_stream_of_minutes_is_gone_on_with_without_posing_all_of_it(monkeypatch):
+    posed = []
+    step = LiveDecoder.step
+    monkeypatch.setattr(LiveDecoder, "step", lambda self, *args: posed.append(1) or step(self, *args))
+    LiveMotion(HUMANML3D_263, HUMANML3D).after(np.tile(features_of(), (50, 1)))
+    assert len(posed) == MEMORY

@@ -78,11 +78,26 @@ def test_minutes_of_walking_end_where_the_whole_says():
     np.testing.assert_allclose(joints, HUMANML3D_263.decode(features), atol=1e-6)
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 1000), st.integers(0, 20), st.integers(1, 200))
+def test_a_root_that_is_followed_without_joints_ends_where_steps_end(seed, before, frames):
+    features = features_of(HUMANML3D_263, seed, before + frames)
+    live = LiveDecoder(HUMANML3D_263)
+    state = live.run(features[:before], live.start())[1] if before else live.start()
+    followed, stepped = live.follow(features[before:], state), live.run(features[before:], state)[1]
+    for name in ("half_yaw", "place", "step"):
+        found, expected = getattr(followed, name), getattr(stepped, name)
+        assert found.shape == expected.shape
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
 @pytest.mark.parametrize("bad", [np.zeros((1, 262)), np.zeros(263), np.zeros((0, 263)), np.zeros((1, 1, 263))])
 def test_features_of_another_shape_are_refused(bad):
     live = LiveDecoder(HUMANML3D_263)
     with pytest.raises(InvalidInput, match="shape"):
         live.run(bad, live.start())
+    with pytest.raises(InvalidInput, match="shape"):
+        live.follow(bad, live.start())
 
 
 def test_a_state_of_other_streams_is_refused():
