@@ -112,7 +112,7 @@ from shared.jobs.schedules import (
 )
 from shared.jobs.scoring import commit_score, load_score
 from shared.jobs.states import EvaluationState, ItemState, JobControl, JobState, Review, Stage, StreamState
-from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamRow
+from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
 from shared.jobs.streams import (
     abandoned_streams,
     add_chunk,
@@ -124,6 +124,7 @@ from shared.jobs.streams import (
     stream_acts,
     stream_prompts,
     take_stream,
+    told_prompts,
 )
 from shared.jobs.submit import submit
 from shared.jobs.sweep import sweep
@@ -272,6 +273,7 @@ __all__ = [
     "Stage",
     "StreamChunk",
     "StreamPast",
+    "StreamPrompt",
     "StreamRow",
     "StreamState",
     "SubmittedJob",
@@ -397,6 +399,7 @@ __all__ = [
     "suspend_tenant",
     "sweep",
     "take_stream",
+    "told_prompts",
     "transaction",
     "upgrade",
     "usage",

@@ -55,7 +55,7 @@ FORGET = (
     """,
     "UPDATE motion_file SET erasing = true FROM motion "
     "WHERE motion.id = motion_file.motion_id AND motion.job_id = :job AND motion_file.format = 'npz'",
-    "UPDATE stream_chunk SET prompts = '[]' FROM stream "
+    "UPDATE stream_chunk SET prompts = '[]', reads = NULL FROM stream "
     "WHERE stream.id = stream_chunk.stream_id AND stream.job_id = :job",
     "UPDATE stream SET prompt = '' WHERE job_id = :job",
     "DELETE FROM idempotency WHERE job_id = :job",

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import NamedTuple
 from uuid import UUID
 
 from shared.jobs.states import StreamState
 from shared.jobs.types import Problem
 from shared.streams.acts import Begun
+from shared.streams.reads import ReadAs
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,16 @@ class StreamRow:
     ended: datetime | None
 
 
+class StreamPrompt(NamedTuple):
+    """A prompt of a stream as whoever watches is told of it."""
+
+    frame: int
+    """From which it was in force."""
+    prompt: str
+    read: ReadAs | None = None
+    """None where that is not on record."""
+
+
 @dataclass(frozen=True)
 class StreamPast:
     """What a worker goes on from.
@@ -87,7 +99,7 @@ class StreamChunk:
         first: number of its first frame.
         frames: how many.
         tokens: int16, little-endian, a column of V levels a frame.
-        prompts: those that came into force in it.
+        prompts: those that came into force in it; `reads`, of as many, says how each was read.
         control: id of the last message that was obeyed.
         state: live or paused; None = as before.
         acts: those that began in it.
@@ -100,3 +112,4 @@ class StreamChunk:
     control: str
     state: StreamState | None = None
     acts: Sequence[Begun] = ()
+    reads: Sequence[ReadAs] | None = None

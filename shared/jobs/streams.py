@@ -21,11 +21,12 @@ from shared.jobs.journal import CLOCK, interval
 from shared.jobs.listings import cut_page, page_limit, read_cursor
 from shared.jobs.outbox import tell_of_stream
 from shared.jobs.states import OPEN_STREAMS, StreamState
-from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamRow
+from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
 from shared.jobs.submit import check_text, submit
 from shared.jobs.tenants import get_tenant
 from shared.jobs.types import NewItem, NewJob, Page, Problem
 from shared.streams.acts import Begun
+from shared.streams.reads import ReadAs
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
 RETRY_SECONDS = 10
@@ -107,6 +108,17 @@ def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
     return [(int(frame), str(text)) for prompts in conn.execute(query).scalars() for frame, text in prompts]
 
 
+def told_prompts(conn: sa.Connection, stream: UUID) -> list[StreamPrompt]:
+    """`stream_prompts`, each with how it was read."""
+    table = schema.stream_chunk.c
+    query = sa.select(table.prompts, table.reads).where(table.stream_id == stream).order_by(table.first)
+    return [
+        StreamPrompt(int(frame), str(text), None if reads is None else ReadAs(*reads[number]))
+        for prompts, reads in conn.execute(query)
+        for number, (frame, text) in enumerate(prompts)
+    ]
+
+
 def stream_acts(conn: sa.Connection, stream: UUID) -> list[Begun]:
     """Every act of a stream that began and is on record; none of what workers wrote that did not record acts."""
     table = schema.stream_chunk.c
@@ -169,6 +181,7 @@ def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk)
                 tokens=chunk.tokens,
                 prompts=[[frame, text] for frame, text in chunk.prompts],
                 acts=[list(act) for act in chunk.acts],
+                reads=sa.null() if chunk.reads is None else [list(read) for read in chunk.reads],
             )
         )
     return True

@@ -110,6 +110,15 @@ def test_a_steer_is_in_force_once_frames_carry_its_number(tab, server):
     tab.wait("document.getElementById('facts').textContent.includes('latency')")
 
 
+def test_what_a_rewriter_made_of_a_prompt_stands_beside_it(tab, server):
+    begin(tab)
+    server.walk.prompts[0] |= {"rewritten": "A person strolls.", "not_rewritten": None}
+    tab.type("now a jump", "prompt")
+    tab.press("Enter")
+    tab.wait("document.querySelector('#prompts .text').textContent === 'a person walks (read as: A person strolls.)'")
+    tab.wait(f"{IN_FORCE} === 'now a jump'")
+
+
 def test_a_steer_that_cannot_be_used_is_told_and_the_walk_goes_on(tab):
     begin(tab)
     tab.type("☃", "prompt")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 from uuid import UUID
 
@@ -14,7 +15,16 @@ import redis
 import sqlalchemy as sa
 import torch
 
-from shared.jobs import StreamState, get_job, list_items, stream_acts, stream_prompts, transaction
+from shared.jobs import (
+    StreamPrompt,
+    StreamState,
+    get_job,
+    list_items,
+    stream_acts,
+    stream_prompts,
+    told_prompts,
+    transaction,
+)
 from shared.jobs.states import STREAM_TRANSITIONS, ItemState
 from shared.runtime.live import keeper
 from shared.runtime.live.held import Held
@@ -26,6 +36,7 @@ from shared.streams.acts import Begun
 from shared.streams.bell import Bell
 from shared.streams.control import Control
 from shared.streams.frames import Frame
+from shared.streams.reads import ReadAs
 from shared.streams.redis import LEASE_MS
 from shared.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
@@ -128,6 +139,33 @@ def test_a_stream_shows_frames_obeys_and_becomes_a_motion(
     assert item.motion.frames == len(frames)
     assert item.motion.metadata["stream"] == str(stream)
     assert item.motion.metadata["prompts"] == [[0, "a person walks"], [turned, "a person waves"]]
+
+
+def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, start: Start, engine: sa.Engine) -> None:
+    def rewriting(prompt: str) -> TextFeatures:
+        return replace(parse(prompt), rewritten=f"{prompt} ahead", not_rewritten=None)
+
+    def refusing(prompt: str) -> TextFeatures:
+        return replace(parse(prompt), rewritten=prompt, not_rewritten="it changes the verbs")
+
+    def told() -> list[StreamPrompt]:
+        with transaction(engine) as conn:
+            return told_prompts(conn, stream)
+
+    stream = studio.begin("a person walks")
+    first = start(parse=rewriting)
+    studio.until(lambda: studio.row(stream).frames > 0, "a record")
+    studio.send(stream, Control("steer", "a person runs"))
+    studio.until(lambda: len(told()) == 2, "the second prompt's record")
+    first.kill()
+    start(parse=refusing)
+    studio.send(stream, Control("steer", "a person bows"))
+    studio.until(lambda: len(told()) == 3, "the third prompt's record")
+    assert [each.read for each in told()] == [
+        ReadAs("a person walks ahead"),
+        ReadAs("a person runs ahead"),
+        ReadAs("a person bows", "it changes the verbs"),
+    ]
 
 
 def test_a_paused_stream_stands_still_and_goes_on_where_it_was(studio: Studio, start: Start) -> None:

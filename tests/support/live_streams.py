@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import socket
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 from uuid import UUID
@@ -20,6 +20,7 @@ from shared.jobs import StreamChunk, StreamState, add_chunk, end_stream, take_st
 from shared.settings import REPOSITORY, Settings
 from shared.streams.control import START, Control, ControlQueue
 from shared.streams.frames import Frame, encode_frame
+from shared.streams.reads import ReadAs
 from shared.streams.redis import FrameStream
 from workers.mogo.bundle import random_bundle
 
@@ -60,10 +61,12 @@ class Hand:
         self._next += count
         return [encode_frame(frame) for frame in made]
 
-    def note(self, *prompts: tuple[int, str], state: StreamState | None = None) -> None:
+    def note(
+        self, *prompts: tuple[int, str], state: StreamState | None = None, reads: Sequence[ReadAs] | None = None
+    ) -> None:
         """Put on record what was shown since."""
         count = self._next - self._noted
-        chunk = StreamChunk(self._noted, count, bytes(2 * count), prompts, "0-0", state)
+        chunk = StreamChunk(self._noted, count, bytes(2 * count), prompts, "0-0", state, reads=reads)
         with transaction(self.engine) as conn:
             assert add_chunk(conn, self.stream, self.lease.fence, chunk)
         self._noted = self._next

@@ -53,6 +53,7 @@ class Plan:
         begin: status and problem that `POST` answers; None = 201.
         deaf: it does not stop when it is asked to.
         told: further messages that a socket begins with.
+        read: how prompts were read, by their numbers.
     """
 
     frames: int = 30
@@ -67,6 +68,7 @@ class Plan:
     begin: tuple[int, dict[str, Any]] | None = None
     deaf: bool = False
     told: list[Any] = field(default_factory=list)
+    read: dict[int, dict[str, str | None]] = field(default_factory=dict)
 
 
 class StreamServer:
@@ -139,7 +141,10 @@ class StreamServer:
             "created": "2026-01-01T00:00:00Z",
             "started": None,
             "ended": None,
-            "prompts": [{"number": n, "frame": f, "prompt": p} for n, (f, p) in enumerate(self.prompts)],
+            "prompts": [
+                {"number": n, "frame": f, "prompt": p, **self.plan.read.get(n, {})}
+                for n, (f, p) in enumerate(self.prompts)
+            ],
             "skeleton": {
                 "names": list(HUMANML3D.joint_names),
                 "parents": list(HUMANML3D.parents),

@@ -17,7 +17,7 @@ from services.api.streams import service
 from services.api.streams.session import Session, Visit
 from services.api.streams.wire import Wire, close_code
 from shared.errors import InvalidInput, MareyError, NotFound
-from shared.jobs import get_stream, stream_prompts, transaction
+from shared.jobs import get_stream, told_prompts, transaction
 
 PROTOCOL = "marey.stream.v1"
 KEY_PREFIX = "marey.key."
@@ -78,7 +78,7 @@ def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams)
         raise NotFound("there is no such stream", where=f"stream {stream[:64]}") from None
     with transaction(shared.engine) as conn:
         row = get_stream(conn, key.tenant, identifier)
-        return Visit(key, row, stream_prompts(conn, identifier), service.made_by(shared, row), first, slow == "pause")
+        return Visit(key, row, told_prompts(conn, identifier), service.made_by(shared, row), first, slow == "pause")
 
 
 def _check_names(query: QueryParams) -> None:

@@ -16,7 +16,7 @@ from services.api.problems import ProblemBody
 from services.api.schemas import View
 from shared.bundles import Bundle
 from shared.items import MAX_SEED
-from shared.jobs import StreamRow, StreamState
+from shared.jobs import StreamPrompt, StreamRow, StreamState
 from shared.motion.features import layout
 from shared.motion.skeleton import Skeleton
 
@@ -79,6 +79,14 @@ class PromptView(View):
     number: int = Field(description="As in frames: from 0; each steer counts one on.")
     frame: int
     prompt: str
+    rewritten: str | None = Field(description="As it was read; null where that is not on record.")
+    not_rewritten: str | None = Field(description="Why what the rewriter made of it was not used.")
+
+    @classmethod
+    def of(cls, number: int, told: StreamPrompt) -> PromptView:
+        """From what is on record."""
+        rewritten, reason = (None, None) if told.read is None else told.read
+        return cls(number=number, frame=told.frame, prompt=told.prompt, rewritten=rewritten, not_rewritten=reason)
 
 
 class StreamView(View):
@@ -116,9 +124,9 @@ class StreamDetailView(StreamView):
     skeleton: SkeletonView | None = Field(description=f"What the frames drive; {GONE}")
 
     @classmethod
-    def detail(cls, row: StreamRow, made: Made, prompts: Sequence[tuple[int, str]]) -> StreamDetailView:
+    def detail(cls, row: StreamRow, made: Made, prompts: Sequence[StreamPrompt]) -> StreamDetailView:
         """From a row, and its prompts with the frame each is in force from."""
-        told = [PromptView(number=number, frame=frame, prompt=text) for number, (frame, text) in enumerate(prompts)]
+        told = [PromptView.of(number, prompt) for number, prompt in enumerate(prompts)]
         return cls(prompts=told, skeleton=made.skeleton, **_fields(row, made))
 
 

@@ -24,7 +24,7 @@ from shared.jobs import (
     create_stream,
     end_stream,
     get_stream,
-    stream_prompts,
+    told_prompts,
     transaction,
 )
 from shared.jobs.states import OPEN_STREAMS
@@ -74,7 +74,7 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
 
 def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetailView:
     """A stream with its prompts and skeleton."""
-    return StreamDetailView.detail(row, made_by(shared, row), stream_prompts(conn, row.id))
+    return StreamDetailView.detail(row, made_by(shared, row), told_prompts(conn, row.id))
 
 
 def made_by(shared: Context, row: StreamRow) -> Made:

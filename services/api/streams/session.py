@@ -23,7 +23,7 @@ from services.api.streams.service import is_over
 from services.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
 from services.api.streams.wire import Wire, close_code
 from shared.errors import MareyError, Unreachable
-from shared.jobs import ApiKey, StreamRow, StreamState, check_key, get_stream, stream_prompts, transaction
+from shared.jobs import ApiKey, StreamPrompt, StreamRow, StreamState, check_key, get_stream, told_prompts, transaction
 from shared.streams.control import ControlQueue
 from shared.streams.frames import HEADER, LAST
 from shared.streams.redis import FrameStream, Gap, StoredFrame
@@ -55,7 +55,7 @@ class Visit:
 
     key: ApiKey
     row: StreamRow
-    prompts: Sequence[tuple[int, str]]
+    prompts: Sequence[StreamPrompt]
     made: Made
     first: int
     pauses: bool
@@ -190,13 +190,13 @@ class Session:
             await self._wire.tell(StreamMessage(stream=self._detail()))
             self._told = self._standing()
 
-    def _stand(self) -> tuple[StreamRow, Sequence[tuple[int, str]]]:
+    def _stand(self) -> tuple[StreamRow, Sequence[StreamPrompt]]:
         """The row, and the prompts where there may be new ones: frames carry a number that is not on record here."""
         with transaction(self._shared.engine) as conn:
             check_key(conn, self._visit.key.id)  # revoked, expired or suspended since
             row = get_stream(conn, self._row.tenant, self._row.id)
             known = self._prompt < len(self._prompts) and not is_over(row)
-            return row, self._prompts if known else stream_prompts(conn, row.id)
+            return row, self._prompts if known else told_prompts(conn, row.id)
 
     async def _finish(self) -> None:
         """What is left of a stream that is over."""

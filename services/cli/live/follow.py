@@ -177,8 +177,9 @@ class Follower:
             self._event("state", None if known else text, state=state, position=position, reason=reason)
         prompts = self.stream.get("prompts") or []
         for prompt in prompts[self._prompts :]:
-            text = f"From frame {prompt['frame']} on: {prompt['prompt']}"
-            self._event("prompt", text, **{name: prompt[name] for name in ("number", "frame", "prompt")})
+            text = f"From frame {prompt['frame']} on: {prompt['prompt']}{_read_as(prompt)}"
+            fields = ("number", "frame", "prompt", "rewritten", "not_rewritten")
+            self._event("prompt", text, **{name: prompt[name] for name in fields if name in prompt})
         self._prompts = max(self._prompts, len(prompts))
 
     def _send(self) -> None:
@@ -238,3 +239,11 @@ class Follower:
         if not self._link.connected:
             shown, style = "no connection", "bold red"
         return Text.assemble((shown, style), "  ", "  ".join(parts))
+
+
+def _read_as(prompt: dict[str, Any]) -> str:
+    """What a rewriter made of a prompt, where there is something to tell."""
+    rewritten, reason = prompt.get("rewritten"), prompt.get("not_rewritten")
+    if rewritten is not None and rewritten != prompt["prompt"]:
+        return f" (read as: {rewritten})"
+    return "" if reason is None else f" (read as it is: {reason})"

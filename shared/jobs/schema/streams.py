@@ -49,5 +49,6 @@ stream_chunk = sa.Table(
     sa.Column("first", sa.Integer, primary_key=True, autoincrement=False),  # number of its first frame
     sa.Column("tokens", BYTEA, nullable=False),  # int16, little-endian, a column of V levels a frame
     sa.Column("prompts", JSONB, nullable=False),  # those that came into force in it: [[frame, text], ...]
+    sa.Column("reads", JSONB),  # how each of these was read: [[rewritten, why not], ...]; NULL: not written down
     sa.Column("acts", JSONB),  # those that began in it: [[frame, number in its prompt], ...]; NULL: not written down
 )

@@ -66,6 +66,12 @@
     $("facts").replaceChildren(state, document.createTextNode(facts.map((fact) => ` · ${fact}`).join("")));
   }
 
+  // What a rewriter made of a prompt, where there is something to tell.
+  function readAs({ prompt, rewritten, not_rewritten: reason }) {
+    if (rewritten && rewritten !== prompt) return ` (read as: ${rewritten})`;
+    return reason ? ` (read as it is: ${reason})` : "";
+  }
+
   function listPrompts() {
     const rows = [...session.prompts.values()].sort((a, b) => a.number - b.number);
     const item = (text, from, current) => {
@@ -77,7 +83,7 @@
       return row;
     };
     $("prompts").replaceChildren(
-      ...rows.map(({ number, frame, prompt }) => item(prompt, `from ${frame}`, number === session.inForce)),
+      ...rows.map((row) => item(row.prompt + readAs(row), `from ${row.frame}`, row.number === session.inForce)),
       ...session.pending.map((prompt) => item(prompt, "sent", null)),
     );
     $("prompts").querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });

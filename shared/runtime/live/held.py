@@ -15,6 +15,7 @@ from shared.runtime.live.reading import Reading
 from shared.streams.acts import Begun
 from shared.streams.control import Control, ControlQueue
 from shared.streams.frames import Frame
+from shared.streams.reads import ReadAs
 from shared.streams.redis import FrameStream, Lease
 from shared.streams.watch import Watch
 from shared.text.features import TextFeatures
@@ -33,6 +34,7 @@ class Held:
         acts: those that began, of all prompts; `recorded_acts` of them are written down.
         unwritten: frames that Redis has not got yet.
         delayed: messages to obey when the frames that another worker showed are drawn again.
+        reads: how the prompts were read that are not written down yet.
         shown: how many frames Redis has got, before and now: no token beyond them is written down.
         recorded: how many frames are written down, with `recorded_prompts` of the prompts.
         ending: why it ends; None while it goes on.
@@ -56,6 +58,7 @@ class Held:
     recorded: int
     recorded_prompts: int
     acts: list[Begun]
+    reads: list[ReadAs]
     session: int | None = None
     heard: deque[tuple[str, Control]] = field(default_factory=deque[tuple[str, Control]])
     reading: Reading | None = None
@@ -100,6 +103,7 @@ class Held:
         """A prompt is in force from the next frame on."""
         with self.lock:
             self.prompts.append((len(self.tokens), prompt))
+            self.reads.append(ReadAs(text.rewritten, text.not_rewritten))
             self.text, self.obeyed = text, control
 
     def chunk(self) -> StreamChunk | None:
@@ -117,7 +121,8 @@ class Held:
             waits = len(self.prompts) > self.recorded_prompts + len(prompts)
             control = self.recorded_control if waits else self.obeyed
             state = self.state if changed else None
-            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, acts)
+            reads = self.reads[: len(prompts)]
+            return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, acts, reads)
 
     def wrote(self, chunk: StreamChunk) -> None:
         """A chunk is written down."""
@@ -125,5 +130,6 @@ class Held:
             self.recorded_control = chunk.control
             self.recorded += chunk.frames
             self.recorded_prompts += len(chunk.prompts)
+            del self.reads[: len(chunk.prompts)]
             self.recorded_acts += len(chunk.acts)
             self.recorded_state = chunk.state or self.recorded_state

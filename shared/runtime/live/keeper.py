@@ -38,6 +38,7 @@ from shared.runtime.live.reading import Opening, Reading
 from shared.runtime.logs import logger
 from shared.streams.bell import Bell
 from shared.streams.control import Control, ControlQueue
+from shared.streams.reads import ReadAs
 from shared.streams.recording import Recording
 from shared.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
 from shared.streams.watch import Watch
@@ -225,6 +226,7 @@ class Keeper(threading.Thread):
             recorded=len(tokens),
             recorded_prompts=len(past.prompts),
             acts=list(past.acts),
+            reads=[] if past.prompts else [ReadAs(features[0].rewritten, features[0].not_rewritten)],
         )
         self._held[str(row.id)] = held
         self._loop.join(held)

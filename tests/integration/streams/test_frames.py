@@ -14,6 +14,7 @@ from shared.jobs import StreamState
 from shared.motion.skeleton import HUMANML3D
 from shared.settings import Settings
 from shared.streams.control import Control
+from shared.streams.reads import ReadAs
 from shared.streams.watch import Watch
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import Hand, watching
@@ -157,13 +158,19 @@ def test_a_client_is_told_when_a_worker_takes_the_stream_and_of_each_new_prompt(
         hand.show(20)
         hand.note((0, WALK["prompt"]))
         hand.show(10, prompt=1)
-        hand.note((20, "a person jumps"))
+        hand.note((20, "a person jumps"), reads=[ReadAs("a person leaps")])
         told = viewer.until("stream").of("stream")[-1]["stream"]
         while len(told["prompts"]) < 2:
             told = viewer.until("stream").of("stream")[-1]["stream"]
     assert told["prompts"] == [
-        {"number": 0, "frame": 0, "prompt": "a person walks"},
-        {"number": 1, "frame": 20, "prompt": "a person jumps"},
+        {"number": 0, "frame": 0, "prompt": "a person walks", "rewritten": None, "not_rewritten": None},
+        {
+            "number": 1,
+            "frame": 20,
+            "prompt": "a person jumps",
+            "rewritten": "a person leaps",
+            "not_rewritten": None,
+        },
     ]
     assert told["skeleton"]["names"][0] == HUMANML3D.joint_names[0]
 

@@ -13,30 +13,42 @@ import sqlalchemy as sa
 
 from shared.errors import Conflict, NotFound
 from shared.jobs import (
+    DEFAULT_TENANT,
     KEPT,
     AssetDigest,
     GarbageReport,
     ItemFailure,
     JobState,
     NewMotion,
+    NewStream,
     Problem,
+    StreamChunk,
+    add_chunk,
     asset_key,
     begin_assets,
+    cancel,
     collect_garbage,
     commit_motions,
+    create_key,
+    create_stream,
     delete_expired,
+    end_stream,
     erase,
     fail_items,
     get_job,
+    get_stream,
     list_items,
     retry,
     rewrite_files,
     submit,
+    take_stream,
+    told_prompts,
     transaction,
 )
 from shared.jobs.types import NewJob
 from shared.motion.clip import parse_npz, without_prompt
 from shared.storage import FolderStore
+from shared.streams.reads import ReadAs
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 from tests.support.command import Command
@@ -125,6 +137,24 @@ def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_s
     assert collect_garbage(engine, folder_store) == GarbageReport(0, 0, ())
     with pytest.raises(Conflict, match="prompts were erased"), transaction(engine) as conn:
         retry(conn, "default", job)
+
+
+def test_what_was_said_to_a_stream_is_erased_with_its_clip(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        key = create_key(conn, "live", ["submit"]).key.id
+        stream = create_stream(conn, NewStream(DEFAULT_TENANT, key, PROMPT, "mogo", "m@0", 1, 9), limit=1)
+        take_stream(conn, stream, 1, "worker")
+        read = ReadAs(f"{PROMPT} now", f"it leaves out {SECRET}")
+        add_chunk(conn, stream, 1, StreamChunk(0, 2, b"0" * 8, [(0, PROMPT)], "1-0", reads=[read]))
+        clip = new_item(0, PROMPT, model="mogo", text_key="stream-1")
+        end_stream(conn, stream, 1, "stopped", clip=(clip, PROMPT.encode()))
+        job = get_stream(conn, DEFAULT_TENANT, stream).job
+        assert job is not None
+        cancel(conn, DEFAULT_TENANT, job)
+    with transaction(engine) as conn:
+        assert told_prompts(conn, stream)[0].read == read
+        erase(conn, DEFAULT_TENANT, job, by="ann")
+    assert SECRET not in dump(engine)
 
 
 def test_features_that_another_job_counts_on_stay_and_a_submit_under_way_is_waited_for(

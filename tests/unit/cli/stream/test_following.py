@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from shared.motion.bvh import read_bvh
 from tests.support.stream_server import FILES, JOB, STREAM
@@ -50,6 +51,21 @@ def test_only_what_is_asked_for_is_sent(serve: Any) -> None:
     server = serve(frames=2)
     run(server).ok()
     assert server.begun == [{"prompt": PROMPT}]
+
+
+@pytest.mark.parametrize(
+    ("read", "words"),
+    [
+        ({"rewritten": PROMPT, "not_rewritten": None}, ""),
+        ({"rewritten": "A person strolls.", "not_rewritten": None}, " (read as: A person strolls.)"),
+        ({"rewritten": PROMPT, "not_rewritten": "no answer"}, " (read as it is: no answer)"),
+    ],
+)
+def test_what_a_rewriter_made_of_a_prompt_is_told(serve: Any, read: dict[str, str | None], words: str) -> None:
+    ran = run(serve(frames=4, read={0: read}), "--json").ok()
+    assert f"From frame 0 on: {PROMPT}{words}" in ran.err.splitlines()
+    (event,) = [line for line in ran.lines if line["type"] == "prompt"]
+    assert {name: event[name] for name in read} == read
 
 
 def test_without_json_stdout_has_one_line_and_stderr_the_words(serve: Any) -> None:

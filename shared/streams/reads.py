@@ -1,0 +1,14 @@
+"""How the prompts of a stream were read."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class ReadAs(NamedTuple):
+    """What the model was told for a prompt."""
+
+    rewritten: str
+    """The prompt itself where no rewriter changed it."""
+    not_rewritten: str | None = None
+    """Why what a rewriter made of it was not used."""
