@@ -7,111 +7,94 @@ see stays one act, said by the whole prompt.
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from dataclasses import replace
 
+from shared.text.clauses import LIMBS, LISTS, SIDES, SUBJECTS, Clause
 from shared.text.graph import SemanticGraph
+from shared.text.telling import noun_of, told
 
 MOST = 6
 """Acts of a prompt; what comes behind them stays in the last."""
-NOBODY = "a person"
 
-_LISTS: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("acts.toml").read_text("utf-8"))
-_JOINS = [tuple(phrase.split()) for phrase in _LISTS["joins"]]
-_EDGES = [phrase.split() for phrase in _LISTS["edges"]]
-_FRONTED = [phrase.split() for phrase in _LISTS["fronted"]]
-_ADVERBS, _SUBJECTS, _SIDES, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKED, _NOUNS = (
-    frozenset(_LISTS[name])
-    for name in ("adverbs", "subjects", "sides", "pauses", "still", "referring", "small", "asking", "asked", "nouns")
+
+def _whose(phrase: str) -> tuple[str, ...]:
+    return ("he", "she", "they") if "~" in phrase else ("",)
+
+
+_JOINS = [tuple(phrase.replace("~", who).split()) for phrase in LISTS["joins"] for who in _whose(phrase)]
+_EDGES = [phrase.split() for phrase in LISTS["edges"]]
+_FRONTED = [phrase.split() for phrase in LISTS["fronted"]]
+_ADVERBS, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKED, _NOUNS = (
+    frozenset(LISTS[name]) for name in ("adverbs", "pauses", "still", "referring", "small", "asking", "asked", "nouns")
 )
 _RESTORING, _UPWARD, _DOWNWARD, _ONWARD = (
-    frozenset(_LISTS[name]) for name in ("restoring", "upward", "downward", "onward")
+    frozenset(LISTS[name]) for name in ("restoring", "upward", "downward", "onward")
 )
-_ENDS, _CONTINUING = (tuple(_LISTS[name]) for name in ("ends", "continuing"))
-_UNDOING, _LIFTING, _SWINGING = (tuple(_LISTS[name]) for name in ("undoing", "lifting", "swinging"))
+_ENDS, _CONTINUING = (tuple(LISTS[name]) for name in ("ends", "continuing"))
+_UNDOING, _LIFTING, _SWINGING = (tuple(LISTS[name]) for name in ("undoing", "lifting", "swinging"))
 _TRAVELS, _TURNS, _KEEPING, _BOWING, _LASTING = (
-    tuple(_LISTS[name]) for name in ("travels", "turns", "keeping", "bowing", "lasting")
+    tuple(LISTS[name]) for name in ("travels", "turns", "keeping", "bowing", "lasting")
 )
-_LIMBS = frozenset({"hand", "hands", "arm", "arms"})
-_BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
-_STOPS = ",;:."
-
-
-@dataclass(frozen=True)
-class _Words:
-    """A run of the prompt's words, the verbs among them by number."""
-
-    words: tuple[str, ...]
-    verbs: frozenset[int]
-
-    def __len__(self) -> int:
-        return len(self.words)
-
-    def bare(self, index: int) -> str:
-        return self.bares[index] if 0 <= index < len(self.words) else ""
-
-    def stopped(self, index: int, stops: str = _STOPS) -> bool:
-        """Whether a stop stands behind the word; before the first one there is one."""
-        return index < 0 or self.words[index][-1:] in stops
-
-    def cut(self, start: int, stop: int | None = None) -> _Words:
-        stop = len(self) if stop is None else stop
-        return _Words(self.words[start:stop], frozenset(v - start for v in self.verbs if start <= v < stop))
-
-    def is_verb(self, index: int) -> bool:
-        return index in self.verbs
-
-    @cached_property
-    def bares(self) -> list[str]:
-        """Each word in small letters without what stands at its ends: asked for at every word and connective."""
-        return [word.strip(".,;:!?\"'()").lower() for word in self.words]
 
 
 def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
     """Each act as a sentence of its own, at least one; the prompt itself where there is only one."""
-    verbs = frozenset(word for node in graph.level("action") for word in node.words)
-    clauses = [_trimmed(clause) for part in _by_connective(_Words(graph.words, verbs)) for clause in _by_verb(part)]
+    text = _with_all_verbs(Clause(graph.words, frozenset(w for node in graph.level("action") for w in node.words)))
+    clauses = [_trimmed(clause) for part in _by_connective(text) for clause in _by_verb(part)]
     merged = _merged([clause for clause in clauses if len(clause)])
     kept = [clause for clause in merged if not _pauses(clause)] or merged
     if len(kept) < 2:
         return (graph.text,)
-    sentences = [_sentence(clause) for clause in kept]
+    sentences = [told(clause) for clause in kept]
     return (*sentences[: MOST - 1], *filter(None, [" then ".join(sentences[MOST - 1 :])]))
 
 
-def told_in_order(acts: tuple[str, ...]) -> str:
-    """One sentence that says them one after the other."""
-    return ", and then ".join([acts[0], *(act[:1].lower() + act[1:] for act in acts[1:])]) + "."
+def _with_all_verbs(text: Clause) -> Clause:
+    """With what a labeller takes for a noun: "walk ahead, slow to a stop, and bow", "halts, right hand wave"."""
+    bidden = bool(text.verbs) and not _form(text.bare(min(text.verbs)))
+    found = {k for k in range(len(text)) if (bidden and _bidden(text, k)) or _noted(text, k)}
+    return replace(text, verbs=text.verbs | found)
 
 
-def _by_connective(text: _Words) -> Iterator[_Words]:
+def _bidden(text: Clause, at: int) -> bool:
+    """ "and bow", "and slowly bow"."""
+    before = at - 2 if text.bare(at - 1).endswith("ly") else at - 1
+    return text.bare(at) in _NOUNS and text.bare(before) == "and"
+
+
+def _noted(text: Clause, at: int) -> bool:
+    """ "right hand wave" behind a way on foot."""
+    walked = any(text.bare(v).startswith(_TRAVELS) for v in text.verbs if v < at - 2)
+    begins = text.stopped(at - 3, ",;") or text.bare(at - 3) == "and"
+    named = text.bare(at).startswith("wav") and text.bare(at - 1) in LIMBS and text.bare(at - 2) in SIDES
+    return walked and begins and named
+
+
+def _by_connective(text: Clause) -> Iterator[Clause]:
     """Clauses that connectives part, in the order of time."""
     opening = _opening(text)
     edge = _edge(text) if opening else None
     if edge is not None:
         said, rest = text.cut(len(opening), edge), list(_by_connective(text.cut(edge)))
-        yield from [*rest, said] if " ".join(opening) in _LISTS["fronted_last"] else [said, *rest]
+        yield from [*rest, said] if " ".join(opening) in LISTS["fronted_last"] else [said, *rest]
         return
     for at in range(1, len(text)):
         join = next((j for j in _JOINS if _joins(text, at, j)), None)
         if join is not None:
             before, after = text.cut(0, at), list(_by_connective(text.cut(at + len(join))))
-            yield from [*after, before] if " ".join(join) in _LISTS["backward"] else [before, *after]
+            yield from [*after, before] if " ".join(join) in LISTS["backward"] else [before, *after]
             return
     yield text
 
 
-def _opening(text: _Words) -> list[str]:
+def _opening(text: Clause) -> list[str]:
     """The words that say that a clause of its own comes first; "when the music starts" is none."""
     found: list[str] = next((words for words in _FRONTED if text.bares[: len(words)] == words), list[str]())
     return [] if found == ["when"] and text.bare(1) not in {"done", "finished"} else found
 
 
-def _edge(text: _Words) -> int | None:
+def _edge(text: Clause) -> int | None:
     """Where the clause that is said first ends: behind its comma, or before "she"; None where it says no act."""
     comma = next((k + 1 for k in range(1, len(text) - 1) if text.stopped(k, ",")), None)
     who = next((k for k in range(2, len(text) - 1) if text.bare(k) in {"he", "she", "they"}), None)
@@ -123,22 +106,22 @@ def _edge(text: _Words) -> int | None:
     return edge if acts else None
 
 
-def _joins(text: _Words, at: int, join: tuple[str, ...]) -> bool:
+def _joins(text: Clause, at: int, join: tuple[str, ...]) -> bool:
     """Whether two clauses are joined there by these words."""
     end = at + len(join)
     if end >= len(text) or any(text.bare(at + k) != word for k, word in enumerate(join)):
         return False
-    if " ".join(join) in _LISTS["clausal"]:  # not "bows before the king"
+    if " ".join(join) in LISTS["clausal"]:  # not "bows before the king"
         if text.bare(at - 1) == "and":  # "walks on and, once there, bows": the order of the words
             return False
-        follows = text.bare(end) in _SUBJECTS and (text.is_verb(end + 1) or text.bare(end + 1) in {"has", "have", "is"})
+        follows = text.bare(end) in SUBJECTS and (text.is_verb(end + 1) or text.bare(end + 1) in {"has", "have", "is"})
         return text.bare(end).endswith("ing") or follows
     if join[0] in _ADVERBS:
         return text.stopped(at - 1)
     return not (len(join) == 2 and join[1] == "next" and text.bare(end) == "to")
 
 
-def _by_verb(text: _Words) -> Iterator[_Words]:
+def _by_verb(text: Clause) -> Iterator[Clause]:
     """Clauses of a list of verbs: "runs, stops and bows"."""
     start = 0
     for at in range(1, len(text)):
@@ -148,15 +131,17 @@ def _by_verb(text: _Words) -> Iterator[_Words]:
     yield text.cut(start)
 
 
-def _lists(text: _Words, at: int) -> bool:
+def _lists(text: Clause, at: int) -> bool:
     """Whether a further verb of a list begins at a word, behind "and" or a comma."""
     follows = text.bare(at) == "and" or text.stopped(at - 1, ",;")
-    if not follows or not text.verbs & set(range(at)):
+    if not follows or not text.verbs & set(range(at)) or text.stopped(at - 1, "."):
         return False
     verb = at + (text.bare(at) == "and")
-    if not text.is_verb(verb) or text.stopped(at - 1, "."):
-        return False
-    if _form(text.bare(verb)) != _form(text.bare(min(text.verbs))):
+    if text.bare(verb) in SIDES:
+        return _noted(text, verb + 2)
+    while text.bare(verb).endswith("ly"):
+        verb += 1
+    if not text.is_verb(verb) or _form(text.bare(verb)) != _form(text.bare(min(text.verbs))):
         return False  # "lets the arm go up and come down", "walks, keeping the trunk upright"
     return not text.bare(verb).endswith("ing") or text.bare(at) == "and"
 
@@ -166,7 +151,7 @@ def _form(verb: str) -> str:
     return "ing" if verb.endswith("ing") else "s" if verb.endswith("s") else ""
 
 
-def _trimmed(clause: _Words) -> _Words:
+def _trimmed(clause: Clause) -> Clause:
     """Without the words at its edges that say when it comes."""
     changed = True
     while changed and len(clause):
@@ -183,7 +168,7 @@ def _trimmed(clause: _Words) -> _Words:
     return clause
 
 
-def _asked(clause: _Words) -> int:
+def _asked(clause: Clause) -> int:
     """Words before what is asked for: of "have the character bow" three; 0 where nobody is asked."""
     if clause.bare(0) == "please":
         return 1
@@ -193,9 +178,9 @@ def _asked(clause: _Words) -> int:
     return verb if verb and not any(clause.stopped(k) for k in range(verb)) else 0
 
 
-def _merged(clauses: list[_Words]) -> list[_Words]:
+def _merged(clauses: list[Clause]) -> list[Clause]:
     """What is no act of its own goes to the clause before it; another side of the same act is said in full."""
-    found: list[_Words] = []
+    found: list[Clause] = []
     for clause in clauses:
         if not found:
             found.append(clause)
@@ -203,18 +188,20 @@ def _merged(clauses: list[_Words]) -> list[_Words]:
             found[-1] = _joined(found[-1], clause)  # "stands with the feet together": how, not what
         elif any(goes(found[-1], clause) for goes in (_refers, _lasts, _undoes, _restores, _swings, _turns, _goes_on)):
             found[-1] = _joined(found[-1], clause)
-        elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in _SUBJECTS | _SIDES):
+        elif "same" in clause.bares and (other := _other_side(found[-1], clause)) is not None:
+            found.append(other)  # "does the same with the right"
+        elif clause.verbs or (_form(clause.bare(0)) and clause.bare(0) not in SUBJECTS | SIDES):
             found.append(clause)
         elif (other := _other_side(found[-1], clause)) is not None:
             found.append(other)
-        elif found[-1].verbs:
+        elif found[-1].verbs and noun_of(clause) not in _NOUNS - {"turn"}:
             found[-1] = _joined(found[-1], clause)  # "walks forward, then left"
         else:
             found.append(clause)  # "straight steps and then a left turn"
     return found
 
 
-def _refers(_: _Words, clause: _Words) -> bool:
+def _refers(_: Clause, clause: Clause) -> bool:
     """ "lowers it again", "comes up": part of what was said before."""
     verbs = {clause.bare(v) for v in clause.verbs}
     small = set(clause.bares) - verbs
@@ -224,14 +211,14 @@ def _refers(_: _Words, clause: _Words) -> bool:
     )
 
 
-def _lasts(_: _Words, clause: _Words) -> bool:
+def _lasts(_: Clause, clause: Clause) -> bool:
     """ "holds two seconds", "keeps it there for a moment": how long what was said before takes."""
     first = min(clause.verbs, default=-1)
-    short = first >= 0 and len(clause) - first <= 6 and not (_LIMBS | {"left", "right"}) & set(clause.bares)
+    short = first >= 0 and len(clause) - first <= 6 and not (LIMBS | {"left", "right"}) & set(clause.bares)
     return short and clause.bare(first).startswith(_LASTING) and not any(w.endswith("ing") for w in clause.bares)
 
 
-def _undoes(before: _Words, clause: _Words) -> bool:
+def _undoes(before: Clause, clause: Clause) -> bool:
     """ "lowers the arm", "and lowers", "straightens": the end of the act before, which was no way on foot."""
     if any(before.bare(v).startswith(_TRAVELS) for v in _done(before)) or {"walk", "run", "jog"} & set(before.bares):
         return False
@@ -241,10 +228,10 @@ def _undoes(before: _Words, clause: _Words) -> bool:
     return clause.bare(0).startswith(_UNDOING) and len(clause) < 4
 
 
-def _restores(before: _Words, clause: _Words) -> bool:
+def _restores(before: Clause, clause: Clause) -> bool:
     """ "comes back up" of who bowed, "lets both arms fall to the sides" of who raised them."""
     first = min(clause.verbs, default=0)
-    who = 0 if _LIMBS & set(clause.bares[:first]) else first
+    who = 0 if LIMBS & set(clause.bares[:first]) else first
     said = {word for word in clause.bares[who:] if not word.endswith("ly")}
     if not said <= _RESTORING:
         return False
@@ -254,21 +241,21 @@ def _restores(before: _Words, clause: _Words) -> bool:
     return lifted and bool(said & _DOWNWARD)
 
 
-def _swings(before: _Words, clause: _Words) -> bool:
+def _swings(before: Clause, clause: Clause) -> bool:
     """ "lifts both arms" and "waves to them": one wave."""
     lifted = any(before.bare(v).startswith(_LIFTING) for v in before.verbs)
-    if not lifted or not clause.verbs or len(clause) > 4 or _SIDES & set(clause.bares):
+    if not lifted or not clause.verbs or len(clause) > 4 or SIDES & set(clause.bares):
         return False
     return clause.bare(min(clause.verbs)).startswith(_SWINGING)
 
 
-def _turns(before: _Words, clause: _Words) -> bool:
+def _turns(before: Clause, clause: Clause) -> bool:
     """ "walks" and "turns left", or "turns left" and "walks on": who turns walks."""
     bares = clause.bares
     travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in _done(before))
-    if not travels or not clause.verbs or _LIMBS & {*bares, *before.bares}:
+    if not travels or not clause.verbs or LIMBS & {*bares, *before.bares}:
         return False
-    if " ".join(bares[clause.bare(0) in _SUBJECTS :]).startswith(_CONTINUING) and {"left", "right"} & set(before.bares):
+    if " ".join(bares[clause.bare(0) in SUBJECTS :]).startswith(_CONTINUING) and {"left", "right"} & set(before.bares):
         return not any(clause.bare(v).startswith(("run", "jog", "sprint")) for v in clause.verbs)
     sided = bool({"left", "right"} & set(bares))
     turned = any(clause.bare(v).startswith(_TURNS) for v in clause.verbs) or any(
@@ -279,7 +266,7 @@ def _turns(before: _Words, clause: _Words) -> bool:
     return bares[-1] == "on" and len(bares) == 2 and bares[0].startswith(_TRAVELS)
 
 
-def _goes_on(before: _Words, clause: _Words) -> bool:
+def _goes_on(before: Clause, clause: Clause) -> bool:
     """ "breaks into a run" and "keeps running"; "turns left" and "walks off": the same way."""
     first = min(clause.verbs, default=-1)
     if first < 0 or {"left", "right"} & set(clause.bares):
@@ -293,14 +280,14 @@ def _goes_on(before: _Words, clause: _Words) -> bool:
     return bool(turned) and verb.startswith("walk") and behind in _ONWARD
 
 
-def _done(clause: _Words) -> frozenset[int]:
+def _done(clause: Clause) -> frozenset[int]:
     """Where it says what is done: its verbs, or the first word where that is a verb in all but name ("walking on")."""
     return clause.verbs or frozenset({0} if clause.bare(0).endswith("ing") else ())
 
 
-def _other_side(clause: _Words, side: _Words) -> _Words | None:
+def _other_side(clause: Clause, side: Clause) -> Clause | None:
     """ "raises the left hand" and "the right one" to "raises the right hand"."""
-    before, after = (_SIDES & set(part.bares) for part in (clause, side))
+    before, after = (SIDES & set(part.bares) for part in (clause, side))
     if len(before) != 1 or len(after) != 1 or before == after:
         return None
     (old,), (new,) = before, after
@@ -311,22 +298,14 @@ def _other_side(clause: _Words, side: _Words) -> _Words | None:
     return replace(clause, words=words)
 
 
-def _joined(first: _Words, second: _Words) -> _Words:
+def _joined(first: Clause, second: Clause) -> Clause:
     words = (*first.words, "then", *second.words)
-    return _Words(words, first.verbs | {v + len(first) + 1 for v in second.verbs})
+    return Clause(words, first.verbs | {v + len(first) + 1 for v in second.verbs})
 
 
-def _pauses(clause: _Words) -> bool:
+def _pauses(clause: Clause) -> bool:
     """ "stops", "stands still", "comes to a halt at the door", "speeds up": what comes next says it too."""
     if not clause.verbs:
         return False
     said = clause.bares[min(clause.verbs) :]
     return set(said) <= _PAUSES or " ".join(said).startswith(_ENDS)
-
-
-def _sentence(clause: _Words) -> str:
-    """With somebody who does it."""
-    said = _BY.sub("", " ".join(clause.words)).strip(" ,;:.")
-    if clause.bare(0) in _SUBJECTS:
-        return said
-    return f"{NOBODY} {'is ' if clause.bare(0).endswith('ing') else ''}{said[:1].lower()}{said[1:]}"

@@ -9,7 +9,7 @@ from shared.bundles import TextSpec, find_bundle
 from shared.errors import InvalidBundle
 from shared.settings import Settings, settings
 
-PIPELINE_VERSION = 4
+PIPELINE_VERSION = 5
 """Raise it when the graph, the acts or the features of the same prompt change for any reason but weights."""
 REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
-from shared.text.acts import acts_of, told_in_order
+from shared.text.acts import acts_of
 from shared.text.encoders import Encoding, TextEncoder, load_encoder
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
@@ -24,6 +24,7 @@ from shared.text.labellers import OneAtATime, load_labeller
 from shared.text.prompts import check_prompt
 from shared.text.rewriters import NotRewritten, PromptRewriter, load_rewriter
 from shared.text.roles import RoleLabeller
+from shared.text.telling import told_in_order
 
 if TYPE_CHECKING:
     from shared.text.spelling import Speller

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 from shared.errors import InvalidBundle, MareyError
 from shared.settings import settings
 from shared.text.roles import Frame, RoleLabeller
-from shared.text.words import SINGULAR, UNITS, bare, is_past, lemma, third_person
+from shared.text.words import SINGULAR, UNITS, bare, inflected, is_past, lemma
 
 if TYPE_CHECKING:
     from shared.text.spelling import Speller
@@ -89,7 +89,7 @@ class RulesRewriter:
         frames = self._frames(words)
         if first in ("i", "you", "i'm", "you're"):
             base_forms = _subjectless(words, frames, subject=first)
-            words = [_inflected(word) if i in base_forms else word for i, word in enumerate(words)]
+            words = [inflected(word) if i in base_forms else word for i, word in enumerate(words)]
             return " ".join(FIRST_SECOND.get(bare(word), word) for word in words).split()
         if not frames or frames[0].predicate != 0:
             return words
@@ -99,7 +99,7 @@ class RulesRewriter:
         if lemma(first) != first:
             return words
         base_forms = _subjectless(words, frames, subject=None)
-        words = [_inflected(word) if i in base_forms else word for i, word in enumerate(words)]
+        words = [inflected(word) if i in base_forms else word for i, word in enumerate(words)]
         return ["a", "person", *(FIRST_SECOND.get(bare(word), word) for word in words)]
 
     def _present_tense(self, words: list[str]) -> list[str]:
@@ -111,7 +111,7 @@ class RulesRewriter:
             subject = [a for a in frame.arguments if a.stop <= index and a.role in ("ARG0", "ARG1")]
             plural = subject and bare(words[subject[0].stop - 1]).endswith("s")
             if is_past(words[index]) and not AUXILIARIES.intersection(before) and subject and not plural:
-                result[index] = _inflected(words[index])
+                result[index] = inflected(words[index])
         return result
 
     def _frames(self, words: Sequence[str]) -> tuple[Frame, ...]:
@@ -129,12 +129,6 @@ def _subjectless(words: Sequence[str], frames: Sequence[Frame], subject: str | N
         if not other and not infinitive and lemma(words[index]) == bare(words[index]):
             found.add(index)
     return found
-
-
-def _inflected(word: str) -> str:
-    """Third person singular, its punctuation kept."""
-    core = bare(word)
-    return word.lower().replace(core, third_person(lemma(core)), 1)
 
 
 def expand_units(words: Sequence[str]) -> list[str]:

@@ -35,7 +35,7 @@ IRREGULAR = {  # base: (past, participle)
     "take": ("took", "taken"),
     "throw": ("threw", "thrown"),
 }
-_PRESENT = {"is": "be", "are": "be", "am": "be", "being": "be", "has": "have"}
+_PRESENT = {"is": "be", "are": "be", "am": "be", "being": "be", "has": "have", "going": "go", "doing": "do"}
 _BASE = {form: base for base, forms in IRREGULAR.items() for form in forms} | _PRESENT
 KEEPS_DOUBLE = ("kiss", "cross", "pass", "press", "toss", "roll", "pull", "call", "fall", "kneel", "add", "spell")
 """Verbs whose doubled last letter is their own."""
@@ -120,7 +120,7 @@ def lemma(word: str) -> str:
     if word in _BASE:
         return _BASE[word]
     for ending in ("ing", "ed"):
-        if word.endswith(ending) and len(word) > len(ending) + 2:
+        if word.endswith(ending) and not word.endswith("eed") and len(word) > len(ending) + 2:
             return _restore(word.removesuffix(ending))
     if word.endswith("ies") and len(word) > 4:
         return word[:-3] + "y"
@@ -150,10 +150,18 @@ def third_person(base: str) -> str:
     return base + ("es" if base.endswith(("ch", "sh", "s", "x", "z", "o")) else "s")
 
 
+def inflected(word: str) -> str:
+    """A verb of any form in the third person singular, its punctuation kept: "walk," → "walks,"."""
+    core = bare(word)
+    return word.lower().replace(core, third_person(lemma(core)), 1)
+
+
 def is_past(word: str) -> bool:
     """Whether the word is a past form: -ed or an irregular one."""
     word = bare(word)
-    return any(word == past for past, _ in IRREGULAR.values()) or (word.endswith("ed") and len(word) > 4)
+    return any(word == past for past, _ in IRREGULAR.values()) or (
+        word.endswith("ed") and not word.endswith("eed") and len(word) > 4
+    )
 
 
 def one_slip(wrong: str, right: str) -> bool:

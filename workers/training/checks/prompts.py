@@ -1,8 +1,9 @@
-"""Prompts that training never saw and what each motion must do, in three sets by three authors.
+"""Prompts that training never saw and what each motion must do, in four sets by four authors.
 
 `prompts.toml` are the 200 that bars are set on; `prompts_blind.toml` was written by somebody who knew neither the
 training captions nor those, and nothing is ever chosen by it; `prompts_development.toml` by a third one in the same
-way: settings, weights and data are chosen by it."""
+way: settings, weights and data are chosen by it. `prompts_fresh.toml`, by a fourth, asks for two acts in two thirds of
+its prompts; nothing is chosen by it either."""
 
 from __future__ import annotations
 
@@ -37,11 +38,16 @@ class EvaluationPrompt:
         return len(self.expected) == 1 and self.expected[0].side != ""
 
 
-PromptSet = Literal["evaluation", "blind", "development"]
-_FILES = {"evaluation": "prompts", "blind": "prompts_blind", "development": "prompts_development"}
+PromptSet = Literal["evaluation", "blind", "development", "fresh"]
+_FILES = {
+    "evaluation": "prompts",
+    "blind": "prompts_blind",
+    "development": "prompts_development",
+    "fresh": "prompts_fresh",
+}
 
 
-@lru_cache(maxsize=3)
+@lru_cache(maxsize=4)
 def evaluation_prompts(which: PromptSet = "evaluation") -> tuple[EvaluationPrompt, ...]:
     """One of the sets, in the order of its file."""
     name = f"{_FILES[which]}.toml"

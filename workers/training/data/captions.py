@@ -17,6 +17,8 @@ from workers.training.data.told import told_caption, told_sequence
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
 TOLD_SHARE = 0.5
+APART_SHARE = 0.4  # of the captions of several acts
+APART_WORDS = 18
 NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35
 
 
@@ -133,6 +135,26 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     return _loosen(f"{_spoken(text, voice)} {after}", rng)
 
 
+def apart_caption(parts: Sequence[Facts], rng: random.Random) -> str:
+    """Each act by a caption of its own: whatever people say of one act they say of one of several, too."""
+    first, *others = (_act_alone(facts, rng) for facts in parts)
+    join = rng.choice(_THEN)
+    return _loosen("".join([first, *(join + text for text in others)]), rng)
+
+
+def _act_alone(facts: Facts, rng: random.Random) -> str:
+    """A caption of one short sentence, without its full stop."""
+    for _ in range(20):
+        text = (rng.random() < TOLD_SHARE and told_caption(facts, rng)) or short_caption(facts, rng)
+        text = text.removesuffix(".")
+        if "." not in text and len(text.split()) <= APART_WORDS:
+            return text if text.startswith("I ") else text[:1].lower() + text[1:]
+    return short_caption(facts, rng).removesuffix(".")
+
+
+_THEN = (", then ", ", and then ", " and then ", ". Then ", ". After that, ", ", after that ", ", and afterwards ")
+
+
 def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
     """The words that two acts have together ("slows to a walk"); None where they have none."""
     joins, (first, second) = grammar().joins, parts
@@ -190,11 +212,13 @@ def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
     """How many captions a clip gets: as many as keep each from being drawn over and over."""
     if len(parts) == 1 and parts[0].act in PHRASINGS:
         return PHRASINGS[parts[0].act]
-    return 2 if spliced and len(parts) == 1 else 3
+    return 2 if spliced and len(parts) == 1 else 3 if len(parts) == 1 else 4
 
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:
     """One caption: by the grammar, or as other people tell it."""
+    if len(parts) > 1 and rng.random() < APART_SHARE:
+        return apart_caption(parts, rng)
     if rng.random() < TOLD_SHARE:
         text = told_caption(parts[0], rng) if len(parts) == 1 else told_sequence(parts, rng)
         if text is not None:

@@ -1,0 +1,130 @@
+"""How an act is told: in the words and forms that captions have (ours, after MOGO's TCA, which asks a language model).
+
+A prompt's clause may be a command ("raise its left arm, bring it down"), a note ("right arm up and down") or a noun ("a
+short walk"). A model whose captions say "a person raises the left arm" obeys that, and of such clauses half: sentence
+encoders that read alike for people lie far apart for it. So who does it, the third person and the present tense are
+put in, and an arm that is put down is lowered; nothing that is done is added or left out.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from shared.text.clauses import DOING, LIMBS, LISTS, SIDES, SUBJECTS, Clause
+from shared.text.words import inflected, is_past, lemma
+
+NOBODY = "a person"
+
+_BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
+_LOWERED = re.compile(
+    r"\b(?:(?:put|bring|take)s (?P<what>it|them|that)(?: back| all the way)? down"
+    r"|drops (?P<dropped>it|them|that)"
+    r"|lets (?P<left>it|them) (?:fall|drop|sink|go|come)(?: back| down)*)(?: too| again)?\b"
+)
+_ASIDE, _LETTING, _OF_WHAT, _PEOPLE = (frozenset(LISTS[name]) for name in ("aside", "letting", "of_what", "people"))
+_PERSONS = SUBJECTS - {"his", "her", "their", "this", "that"}
+
+
+def told_in_order(acts: tuple[str, ...]) -> str:
+    """One sentence that says them one after the other."""
+    return ", and then ".join([acts[0], *(act[:1].lower() + act[1:] for act in acts[1:])]) + "."
+
+
+def told(clause: Clause) -> str:
+    """A clause as a sentence, with somebody who does it."""
+    clause = _present(_without_aside(clause))
+    said = _BY.sub("", " ".join(clause.words)).strip(" ,;:.")
+    return _LOWERED.sub(_lowered, _with_somebody(clause, said))
+
+
+def noun_of(clause: Clause) -> str:
+    """The noun that says what is done: "bow" of "a slow bow"; empty where it is a verb, or there is none."""
+    for k in range(min(4, len(clause))):
+        if clause.bare(k) in _OF_WHAT:
+            return ""
+        if clause.bare(k) in DOING and k > 0:
+            taken = k == 1 and clause.verbs == frozenset({k}) and clause.bare(0) in {"a", "an", "the"}  # a labeller's "a bow"
+            return clause.bare(k) if taken or not clause.verbs else ""
+    return ""
+
+
+def _with_somebody(clause: Clause, said: str) -> str:
+    first, second = clause.bare(0), clause.bare(1)
+    small = said[:1].lower() + said[1:]
+    if first in SIDES and second in LIMBS:
+        return _of_a_limb(clause, small)
+    noun = noun_of(clause)
+    if noun:
+        return f"{NOBODY} {DOING[noun]} {small}"
+    if first in _PEOPLE:
+        return f"a {small}"
+    if first in SUBJECTS or _somebody_later(clause):
+        return said
+    doing = first.endswith("ing") or (second.endswith("ing") and (first.endswith("ly") or first in {"just", "still"}))
+    return f"{NOBODY} {'is ' if doing else ''}{small}"
+
+
+def _of_a_limb(clause: Clause, said: str) -> str:
+    """ "right arm waves", "left hand up and down", "both hands go up": who has the arm."""
+    side, limb, rest = clause.bare(0), clause.bare(1), " ".join(clause.words[2:]).strip(" ,;:.")
+    own = f"{side} {limb}" if side in {"both", "two"} else f"the {side} {limb}"
+    if clause.bare(2).startswith("wav"):
+        return " ".join([NOBODY, "waves", own, *rest.split()[1:]])
+    if clause.verbs & set(range(2, len(clause))):
+        return said if side in {"both", "two"} else f"{NOBODY}'s {said}"
+    return f"{NOBODY} puts {own} {rest}".strip()
+
+
+def _somebody_later(clause: Clause) -> bool:
+    """Whether who does it is named behind a comma: "after some more steps, he jogs off"."""
+    return any(
+        clause.stopped(k, ",") and clause.bare(k + 1) in _PERSONS and clause.verbs & {k + 2, k + 3, k + 4}
+        for k in range(len(clause) - 2)
+    )
+
+
+def _without_aside(clause: Clause) -> Clause:
+    """Without the words before its comma that say only when: "when the show is over, she bows"."""
+    if clause.bare(0) not in _ASIDE:
+        return clause
+    for k in range(len(clause) - 2):
+        if clause.stopped(k, ","):
+            return clause.cut(k + 1) if clause.bare(k + 1) in _PERSONS or clause.is_verb(k + 1) else clause
+    return clause
+
+
+def _present(clause: Clause) -> Clause:
+    """Commands and what was done as what is done: "raise its arm, drop it", "raises the arm, drops it"."""
+    start = 0
+    while clause.bare(start).endswith("ly"):
+        start += 1
+    first = clause.bare(start)
+    if first in SUBJECTS | SIDES or first.endswith("ing") or not (clause.is_verb(start) or first in DOING):
+        return clause
+    if lemma(first) != first and not is_past(first):
+        return clause  # "walks": told already
+    bidden = not is_past(first)
+    words, letting = list(clause.words), False
+    for verb in sorted({start, *clause.verbs, *(_listed(clause) if bidden else ())}):
+        said = clause.bare(verb)
+        if (is_past(said) or lemma(said) == said) and not letting and clause.bare(verb - 1) not in LISTS["unfinite"]:
+            words[verb] = inflected(words[verb])
+        letting |= said in _LETTING
+    if bidden:  # "its" is of whom the command is about
+        words = ["the" if word == "its" else word for word in words]
+    return replace(clause, words=tuple(words))
+
+
+def _listed(clause: Clause) -> set[int]:
+    """Words behind a comma in front of "it": "raise the arm, bring it down", whatever the labeller made of them."""
+    return {
+        k + 1
+        for k in range(len(clause) - 2)
+        if clause.stopped(k, ",") and clause.bare(k + 2) in {"it", "them"} and clause.bare(k + 1) not in SUBJECTS
+    }
+
+
+def _lowered(match: re.Match[str]) -> str:
+    what = match["what"] or match["dropped"] or match["left"]
+    return f"lowers {'it' if what == 'that' else what}"
