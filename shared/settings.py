@@ -192,6 +192,8 @@ class Settings(BaseSettings):
     """Open live streams of one API key."""
     stream_idle_seconds: Seconds = 60.0
     """A live stream that nobody watches ends after this long."""
+    stream_paused_seconds: Seconds = 600.0
+    """So does one that is paused for this long, watched or not: it holds a slot."""
 
     audit_days: float = Field(default=400.0, gt=0, le=36_525)
     """The audit log is kept this long."""

@@ -44,7 +44,8 @@ def noun_of(clause: Clause) -> str:
         if clause.bare(k) in _OF_WHAT:
             return ""
         if clause.bare(k) in DOING and k > 0:
-            taken = k == 1 and clause.verbs == frozenset({k}) and clause.bare(0) in {"a", "an", "the"}  # a labeller's "a bow"
+            # A labeller takes "bow" of "a bow" for a verb.
+            taken = k == 1 and clause.verbs == frozenset({k}) and clause.bare(0) in {"a", "an", "the"}
             return clause.bare(k) if taken or not clause.verbs else ""
     return ""
 

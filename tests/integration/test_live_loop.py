@@ -309,6 +309,22 @@ def test_a_stream_that_nobody_watches_ends(studio: Studio, start: Start) -> None
     assert studio.row(watched).state is StreamState.LIVE
 
 
+def test_a_stream_that_is_paused_for_too_long_ends_although_it_is_watched(studio: Studio, start: Start) -> None:
+    paused, playing = studio.begin(), studio.begin(seed=2)
+    start(paused_seconds=0.5)
+    studio.until(lambda: studio.shown(paused) > 0 and studio.shown(playing) > 0, "frames of both")
+    studio.send(paused, Control("pause"))
+
+    def is_over() -> bool:
+        for stream in (paused, playing):
+            studio.watch(stream)
+        return studio.row(paused).state is StreamState.ENDED
+
+    studio.until(is_over, "the end")
+    assert "paused for 0.5 seconds" in str(studio.row(paused).reason)
+    assert studio.row(playing).state is StreamState.LIVE
+
+
 def test_a_queue_that_forgets_everything_costs_no_stream(studio: Studio, start: Start, client: redis.Redis) -> None:
     stream = studio.begin()
     start()

@@ -58,12 +58,16 @@ class LiveWorker:
         open_room: Callable[[], Room],
         *,
         idle_seconds: float = 600.0,
+        paused_seconds: float = 600.0,
         parse: Parse = parse,
     ) -> None:
         self._stopping = threading.Event()
         self.loop = LiveLoop(open_room, lambda over: self.keeper.over(over))
         beat = WorkerBeat(f"live-{id(self)}", QUEUE, "test", os.getpid(), "cpu", self.loop.room.bundle)
-        self.keeper = Keeper(engine, client, beat, parse, idle_seconds=idle_seconds, stopping=self._stopping)
+        self.keeper = Keeper(
+            engine, client, beat, parse, stopping=self._stopping,
+            idle_seconds=idle_seconds, paused_seconds=paused_seconds,
+        )  # fmt: skip
         self._thread = threading.Thread(target=self.loop.run, args=(self._stopping,), daemon=True)
         self.keeper.serve(self.loop)
         self._thread.start()

@@ -38,7 +38,7 @@ class Held:
         shown: how many frames Redis has got, before and now: no token beyond them is written down.
         recorded: how many frames are written down, with `recorded_prompts` of the prompts.
         ending: why it ends; None while it goes on.
-        seen: when somebody last watched, by the monotonic clock.
+        seen: when somebody last watched, by the monotonic clock; `moved` when it was last not paused.
         lost: another worker has it.
     """
 
@@ -52,6 +52,7 @@ class Held:
     tokens: list[Tokens]
     prompts: list[tuple[int, str]]
     seen: float
+    moved: float
     read: str
     obeyed: str
     shown: int

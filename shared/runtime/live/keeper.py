@@ -63,7 +63,7 @@ class Keeper(threading.Thread):
         engine, client: Postgres and Redis.
         worker: this worker's row, renewed every second.
         parse: reads prompts, on several threads.
-        idle_seconds: a stream that nobody watched for so long ends.
+        idle_seconds: a stream that nobody watched for so long ends; `paused_seconds`, one that was paused for so long.
     """
 
     def __init__(
@@ -74,12 +74,13 @@ class Keeper(threading.Thread):
         parse: Parse,
         *,
         idle_seconds: float,
+        paused_seconds: float,
         stopping: threading.Event,
     ) -> None:
         super().__init__(name="keeper", daemon=True)
         self._engine, self._redis = engine, client
         self._worker, self._parse = worker, parse
-        self._idle_seconds = idle_seconds
+        self._idle_seconds, self._paused_seconds = idle_seconds, paused_seconds
         self._stopping = stopping
         self._over: queue.SimpleQueue[Over] = queue.SimpleQueue()
         self._bell = Bell(client)
@@ -220,6 +221,7 @@ class Keeper(threading.Thread):
             tokens=list(tokens),
             prompts=opening.prompts,
             seen=time.monotonic(),
+            moved=time.monotonic(),
             read=row.control,
             obeyed=row.control,
             shown=len(tokens),
@@ -275,11 +277,22 @@ class Keeper(threading.Thread):
             beat(conn, self._worker)
         now = time.monotonic()
         for held in list(self._held.values()):
-            if held.watch.seen():
-                held.seen = now
-            elif now - held.seen > self._idle_seconds and held.ending is None:
-                self._loop.end(held, f"nobody watched for {self._idle_seconds:g} seconds")
+            reason = self._idles(held, now)
+            if reason and held.ending is None:
+                self._loop.end(held, reason)
             self._write(held)
+
+    def _idles(self, held: Held, now: float) -> str:
+        """Why a stream should give its slot to another; empty where it should not."""
+        if held.watch.seen():
+            held.seen = now
+        if held.state is not StreamState.PAUSED:
+            held.moved = now
+        if now - held.seen > self._idle_seconds:
+            return f"nobody watched for {self._idle_seconds:g} seconds"
+        if now - held.moved > self._paused_seconds:
+            return f"paused for {self._paused_seconds:g} seconds"
+        return ""
 
     def _write(self, held: Held) -> None:
         chunk = held.chunk()

@@ -60,7 +60,10 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     keeper: Keeper
     loop = LiveLoop(lambda: show.open_room(chosen.live_slots), lambda over: keeper.over(over))
     worker = WorkerBeat(name, QUEUE, socket.gethostname(), os.getpid(), show.device, loop.room.bundle)
-    keeper = Keeper(engine, client, worker, show.parse, idle_seconds=chosen.stream_idle_seconds, stopping=stopping)
+    keeper = Keeper(
+        engine, client, worker, show.parse, stopping=stopping,
+        idle_seconds=chosen.stream_idle_seconds, paused_seconds=chosen.stream_paused_seconds,
+    )  # fmt: skip
     keeper.serve(loop)
     teller = Teller(chosen.home, name, lambda: time.monotonic() - loop.ticked, stopping)
     if alone:
