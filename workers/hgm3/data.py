@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from workers.hgm3.conditions import LEVELS, GraphBatch
 from workers.hgm3.config import ConditionConfig
-from workers.hgm3.model import LEVELS, GraphBatch
 from workers.training.sentences import SentenceData, sentence_fields, text_statistics
 from workers.training.texts import CaptionTexts
 

@@ -15,8 +15,9 @@ from torch import Tensor
 from shared.nn.convolution import frame_mask
 from shared.nn.masking import remaining_masks
 from shared.nn.sampling import sample_top_k, uniform
+from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from workers.hgm3.config import InferenceConfig
-from workers.hgm3.model import ACTION, MOTION, SPECIFIC, MaskedTransformer, ResidualTransformer
+from workers.hgm3.model import MaskedTransformer, ResidualTransformer
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
 """What random numbers are drawn for; see `shared.nn.sampling.uniform`."""

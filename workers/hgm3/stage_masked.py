@@ -15,9 +15,10 @@ from shared.nn.convolution import frame_mask
 from shared.nn.ema import update_average, warm_momentum
 from shared.nn.losses import ranking_loss, token_losses
 from shared.nn.masking import easy_to_hard_mask, mask_counts
+from workers.hgm3.conditions import LEVELS, GraphBatch
 from workers.hgm3.config import HGM3Config
 from workers.hgm3.data import CaptionData
-from workers.hgm3.model import LEVELS, GraphBatch, LossPredictor, MaskedTransformer
+from workers.hgm3.model import LossPredictor, MaskedTransformer
 from workers.training.data.manifest import Clip
 from workers.training.loop import StepContext
 from workers.training.motions import TokenData

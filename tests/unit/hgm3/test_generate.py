@@ -15,10 +15,10 @@ from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
 from workers.generating.port import Request
 from workers.hgm3.bundle import random_bundle
+from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC
 from workers.hgm3.config import InferenceConfig
 from workers.hgm3.decoding import condition_level
 from workers.hgm3.generate import Generated, Generator, Settings
-from workers.hgm3.model import ACTION, MOTION, SPECIFIC
 
 COUNT = 32
 FLAT = Settings(motion_steps=0, action_steps=0)

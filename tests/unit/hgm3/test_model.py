@@ -12,19 +12,10 @@ from shared.motion.features import HUMANML3D_263
 from shared.nn.motion_tokenizer import biased_std
 from shared.nn.sampling import guide
 from tests.support.prepared import graph, made_up_texts, swinging, text_features
-from workers.hgm3.conditions import graph_batch
+from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
 from workers.hgm3.config import PAPER, STARTER, TINY, named_config
 from workers.hgm3.data import CaptionData
-from workers.hgm3.model import (
-    ACTION,
-    MOTION,
-    SPECIFIC,
-    Condition,
-    GraphAttention,
-    LossPredictor,
-    MaskedTransformer,
-    ResidualTransformer,
-)
+from workers.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
 from workers.hgm3.tokenizer import Tokenizer
 from workers.training.joints import heading_joints, world_joints
 from workers.training.tokenizing import tokenizer_loss
