@@ -20,9 +20,10 @@ from shared.jobs.evaluation_types import (
     ScoreRows,
 )
 from shared.jobs.evaluations import get_evaluation, load_prompts, lock_evaluation, move_evaluation
+from shared.jobs.held import Held, document, drop_empty_lease, end_items, hold
 from shared.jobs.journal import NewEvent, record
 from shared.jobs.lease_types import AssetDigest, Committed
-from shared.jobs.results import Held, document, drop_empty_lease, end_items, hold, store_assets
+from shared.jobs.results import store_assets
 from shared.jobs.states import Cause, EvaluationState, ItemState
 from shared.jobs.types import Problem
 

@@ -10,11 +10,11 @@ import sqlalchemy as sa
 from shared.jobs import schema
 from shared.jobs.database import transaction
 from shared.jobs.deliveries import forget_events
+from shared.jobs.held import drop_empty_lease, end_dead, give_back, held_items
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
 from shared.jobs.lease_types import SweepReport
 from shared.jobs.operate import cancel_if_failing
 from shared.jobs.policy import Policy, policy
-from shared.jobs.results import drop_empty_lease, end_dead, give_back, held_items
 from shared.jobs.states import Cause, ItemState
 from shared.jobs.types import Problem
 

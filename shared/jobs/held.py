@@ -1,0 +1,117 @@
+"""What a lease still holds: locked, ended, given back. The fence of every write under one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from shared.jobs import schema
+from shared.jobs.journal import CLOCK, LockedJob, NewEvent, among, change_lanes, lock_job, returned
+from shared.jobs.lease_types import Committed
+from shared.jobs.states import Cause, ItemState
+from shared.jobs.types import Problem
+
+LEASED_JOB = sa.text("SELECT job_id FROM lease WHERE token = :token")
+
+HELD_ITEMS = sa.text("""
+    SELECT id, queue, batch_key, solo, attempts, text_key, position FROM item
+    WHERE lease_token = :token AND (CAST(:items AS uuid[]) IS NULL OR id = ANY(CAST(:items AS uuid[])))
+    ORDER BY position
+    FOR UPDATE
+""")
+
+DROP_EMPTY_LEASE = sa.text("""
+    DELETE FROM lease WHERE token = :token AND NOT EXISTS (SELECT FROM item WHERE lease_token = :token)
+""")
+
+
+@dataclass(frozen=True)
+class HeldItem:
+    """An item under a lease, its row locked."""
+
+    id: UUID
+    queue: str
+    batch_key: str
+    solo: bool
+    attempts: int
+    text_key: str
+    position: int
+
+
+def held_items(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None = None) -> list[HeldItem]:
+    """The items that a lease holds (of these, if given), in input order, locked. The job's lock must be held."""
+    wanted = None if items is None else list(items)
+    return [HeldItem(*row) for row in conn.execute(HELD_ITEMS, {"token": lease_token, "items": wanted})]
+
+
+def give_back(
+    conn: sa.Connection,
+    job: LockedJob,
+    items: Sequence[HeldItem],
+    cause: Cause,
+    reason: str,
+    *,
+    solo: bool = False,
+    attempts: int = 0,
+) -> None:
+    """Leased items become ready, in their lanes; `solo` marks them, `attempts` are added. Counters are the caller's."""
+    table = schema.item
+    values: dict[str, object] = {
+        "state": ItemState.READY,
+        "lease_token": None,
+        "reason": f"{cause}: {reason}",
+        "attempts": table.c.attempts + attempts,
+    }
+    if solo:
+        values["solo"] = True
+    conn.execute(sa.update(table).where(among(table.c.id, [item.id for item in items])).values(values))
+    change_lanes(conn, job.id, returned((item.queue, item.batch_key, item.solo or solo) for item in items))
+
+
+def end_dead(conn: sa.Connection, item: HeldItem, problem: Problem) -> NewEvent:
+    """A leased item has used up its attempts."""
+    attempts = item.attempts + 1
+    end_items(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=document(problem), attempts=attempts)
+    return NewEvent("item_dead", problem.message, item.id, {"attempts": attempts, "problem": document(problem)})
+
+
+def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
+    """A lease ends with its last item."""
+    conn.execute(DROP_EMPTY_LEASE, {"token": lease_token})
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a lease still holds: its job and these items, all locked."""
+
+    job: LockedJob
+    items: Mapping[UUID, HeldItem]
+
+    def committed(self, asked: Iterable[UUID]) -> Committed:
+        """Which of these were written, and which were not ours any more."""
+        asked = tuple(dict.fromkeys(asked))
+        ours = tuple(item for item in asked if item in self.items)
+        return Committed(ours, tuple(item for item in asked if item not in self.items))
+
+
+def hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> Held | None:
+    """Lock the job, then those of the items that this lease still holds. The fence of every write."""
+    job_id = conn.execute(LEASED_JOB, {"token": lease_token}).scalar_one_or_none()
+    job = None if job_id is None else lock_job(conn, job_id)
+    if job is None:
+        return None
+    return Held(job, {item.id: item for item in held_items(conn, lease_token, items)})
+
+
+def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
+    """Leased items come to a last state. Counters are the caller's."""
+    values = {"state": state, "lease_token": None, "reason": str(cause), "finished_at": CLOCK} | more
+    conn.execute(sa.update(schema.item).where(among(schema.item.c.id, items)).values(values))
+
+
+def document(problem: Problem) -> dict[str, object]:
+    """A problem as it stands in a row."""
+    return asdict(problem)
