@@ -12,9 +12,10 @@ from pathlib import Path
 from shared.errors import InvalidInput
 from shared.settings import Settings
 from shared.storage.folder import FolderStore
-from shared.storage.port import PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
+from shared.storage.port import CHUNK, PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
 
 __all__ = [
+    "CHUNK",
     "PRESIGN_SECONDS",
     "AssetStore",
     "Digest",
