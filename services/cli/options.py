@@ -51,6 +51,9 @@ Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first vari
 Variants = Annotated[
     int | None, typer.Option("--variants", help="Motions of each prompt; a row's own number comes first.")
 ]
+Tags = Annotated[
+    list[str] | None, typer.Option("--tag", help="A tag of every motion, beside a row's own; may be repeated.")
+]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; none given = the model's.")]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]

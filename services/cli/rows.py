@@ -44,8 +44,9 @@ def defaults_of(
     seed: int | None = None,
     variants: int | None = None,
     fps: float | None = None,
+    tags: Sequence[str] | None = None,
 ) -> Mapping[str, object]:
-    """The fields of a row where it says nothing itself, from the options of the command.
+    """The fields of a row where it says nothing itself, from the options of the command; tags come beside its own.
 
     Raises:
         InvalidInput: one cannot be; by the name of its option.
@@ -57,6 +58,7 @@ def defaults_of(
         ("--seed", "seed", seed),
         ("--variants", "variants", variants),
         ("--fps", "settings", None if fps is None else {OUTPUT_FPS: fps}),
+        ("--tag", "tags", tags or None),
     )
     found: dict[str, object] = {}
     for option, field, value in given:
@@ -117,7 +119,7 @@ def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence
 
 
 def _completed(raw: object, defaults: Mapping[str, object]) -> object:
-    """A row with the defaults for what it does not say; settings are told one by one."""
+    """A row with the defaults for what it does not say; settings are told one by one, tags put together."""
     if not defaults or not isinstance(raw, Mapping):
         return raw
     row = cast("Mapping[object, object]", raw)
@@ -125,6 +127,10 @@ def _completed(raw: object, defaults: Mapping[str, object]) -> object:
     ours, theirs = defaults.get("settings"), row.get("settings")
     if isinstance(ours, Mapping) and isinstance(theirs, Mapping):
         whole["settings"] = {**ours, **theirs}
+    more, own = defaults.get("tags"), row.get("tags")
+    if isinstance(more, tuple) and isinstance(own, list):
+        its = cast("list[object]", own)
+        whole["tags"] = [*its, *(tag for tag in cast("tuple[object, ...]", more) if tag not in its)]
     return whole
 
 

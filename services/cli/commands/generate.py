@@ -42,6 +42,7 @@ def generate(
     seed: options.Seed = None,
     variants: options.Variants = None,
     fps: options.Fps = None,
+    tags: options.Tags = None,
     formats: options.Formats = None,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
@@ -54,7 +55,7 @@ def generate(
     from services.cli.roles.oneshot import OneShot
 
     check_template(name_template)
-    defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
     items = list(read_prompts(prompts, file, input_format, defaults))
     try:
         from shared.bundles import choose_bundle

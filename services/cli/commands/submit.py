@@ -34,6 +34,7 @@ def submit(
     seed: options.Seed = None,
     variants: options.Variants = None,
     fps: options.Fps = None,
+    tags: options.Tags = None,
     watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
     fetch: Annotated[
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
@@ -51,7 +52,9 @@ def submit(
         from services.cli.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
-    defaults = rows.defaults_of(model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps)
+    defaults = rows.defaults_of(
+        model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags
+    )
     items = read_prompts(prompts, file, input_format, defaults)
     with Lines(item.as_json() for item in items) as lines, Client.here() as client:
         job = client.submit(

@@ -133,9 +133,22 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
     assert [item.variants for item in items_from_prompts(["a person bows"], defaults)] == [3]
 
 
+def test_tags_of_the_command_come_beside_those_of_a_line(tmp_path: Path) -> None:
+    defaults = defaults_of(tags=["shot=010", "walk"])
+    table = write(tmp_path, "p.csv", "prompt,tags\na person walks,walk; take 2\na person bows,\n")
+    found = [item.tags for item in items_from_file(table, defaults=defaults)]
+    assert found == [("walk", "take 2", "shot=010"), ("shot=010", "walk")]
+    assert [item.tags for item in items_from_prompts(["a person bows"], defaults)] == [("shot=010", "walk")]
+    for wrong in ("3", "[{}]"):
+        line = f'{{"prompt": "a person bows", "tags": {wrong}}}'
+        with pytest.raises(InvalidItems, match="tags"):
+            list(items_from_file(write(tmp_path, "p.jsonl", line), defaults=defaults))
+
+
 @pytest.mark.parametrize(
     ("option", "given", "said"),
     [
+        ("--tag", {"tags": ["take\n2"]}, "is not a tag"),
         ("--variants", {"variants": 0}, "0 is outside 1 to 100"),
         ("--variants", {"variants": 101}, "101 is outside 1 to 100"),
         ("--seconds", {"seconds": 1000.0}, r"1000 is outside 0\.5 to 60"),
