@@ -59,7 +59,7 @@ def _with_somebody(clause: Clause, said: str) -> str:
     if noun:
         return f"{NOBODY} {DOING[noun]} {small}"
     if first in _PEOPLE:
-        return f"a {small}"
+        return f"{'an' if first[0] in 'aeiou' else 'a'} {small}"
     if first in SUBJECTS or _somebody_later(clause):
         return said
     doing = first.endswith("ing") or (second.endswith("ing") and (first.endswith("ly") or first in {"just", "still"}))
@@ -80,9 +80,14 @@ def _of_a_limb(clause: Clause, said: str) -> str:
 def _somebody_later(clause: Clause) -> bool:
     """Whether who does it is named behind a comma: "after some more steps, he jogs off"."""
     return any(
-        clause.stopped(k, ",") and clause.bare(k + 1) in _PERSONS and clause.verbs & {k + 2, k + 3, k + 4}
+        clause.stopped(k, ",") and clause.bare(k + 1) in _PERSONS and _done_within(clause, k + 2)
         for k in range(len(clause) - 2)
     )
+
+
+def _done_within(clause: Clause, start: int) -> bool:
+    """Whether a verb stands there or two words on; "the other arm hanging" does nothing."""
+    return any(clause.is_verb(k) and not clause.bare(k).endswith("ing") for k in range(start, start + 3))
 
 
 def _without_aside(clause: Clause) -> Clause:

@@ -37,6 +37,11 @@ def clause(marked: str) -> Clause:
         ("both hands *go* up", "both hands go up"),
         ("just *walking*", "a person is just walking"),
         ("person *bows*", "a person bows"),
+        ("actor *bows*", "an actor bows"),
+        (
+            "*wave* with the right arm, the other arm *hanging*",
+            "a person waves with the right arm, the other arm hanging",
+        ),
         ("after some more steps, he *jogs* off", "he jogs off"),
         ("when the show is over, the actor *bends* forward", "the actor bends forward"),
         ("once upright, *wave* its two arms", "a person waves the two arms"),
