@@ -22,7 +22,9 @@ _LOWERED = re.compile(
     r"|drops (?P<dropped>it|them|that)"
     r"|lets (?P<left>it|them) (?:fall|drop|sink|go|come)(?: back| down)*)(?: too| again)?\b"
 )
-_ASIDE, _LETTING, _OF_WHAT, _PEOPLE = (frozenset(LISTS[name]) for name in ("aside", "letting", "of_what", "people"))
+_ASIDE, _LETTING, _OF_WHAT, _PEOPLE, _UNFINITE = (
+    frozenset(LISTS[name]) for name in ("aside", "letting", "of_what", "people", "unfinite")
+)
 _PERSONS = SUBJECTS - {"his", "her", "their", "this", "that"}
 
 
@@ -69,11 +71,12 @@ def _with_somebody(clause: Clause, said: str) -> str:
 def _of_a_limb(clause: Clause, said: str) -> str:
     """ "right arm waves", "left hand up and down", "both hands go up": who has the arm."""
     side, limb, rest = clause.bare(0), clause.bare(1), " ".join(clause.words[2:]).strip(" ,;:.")
-    own = f"{side} {limb}" if side in {"both", "two"} else f"the {side} {limb}"
+    both = side in {"both", "two"}
+    own = f"{side} {limb}" if both else f"the {side} {limb}"
     if clause.bare(2).startswith("wav"):
         return " ".join([NOBODY, "waves", own, *rest.split()[1:]])
     if clause.verbs & set(range(2, len(clause))):
-        return said if side in {"both", "two"} else f"{NOBODY}'s {said}"
+        return said if both else f"{NOBODY}'s {said}"
     return f"{NOBODY} puts {own} {rest}".strip()
 
 
@@ -114,7 +117,7 @@ def _present(clause: Clause) -> Clause:
     words, letting = list(clause.words), False
     for verb in sorted({start, *clause.verbs, *(_listed(clause) if bidden else ())}):
         said = clause.bare(verb)
-        if (is_past(said) or lemma(said) == said) and not letting and clause.bare(verb - 1) not in LISTS["unfinite"]:
+        if (is_past(said) or lemma(said) == said) and not letting and clause.bare(verb - 1) not in _UNFINITE:
             words[verb] = inflected(words[verb])
         letting |= said in _LETTING
     if bidden:  # "its" is of whom the command is about

@@ -210,9 +210,9 @@ drawn 50 times in an hour of training: known captions were obeyed at 98 %, words
 
 def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
     """How many captions a clip gets: as many as keep each from being drawn over and over."""
-    if len(parts) == 1 and parts[0].act in PHRASINGS:
-        return PHRASINGS[parts[0].act]
-    return 2 if spliced and len(parts) == 1 else 3 if len(parts) == 1 else 4
+    if len(parts) > 1:
+        return 4
+    return PHRASINGS.get(parts[0].act, 2 if spliced else 3)
 
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:
