@@ -1,0 +1,156 @@
+"""A TCP proxy that can fall silent: connections stay open, and nothing is forwarded any more.
+
+The fault of a firewall that drops a flow, a hung load balancer or a stopped server: the client's kernel sees a living
+peer that acknowledges every byte, so neither keepalives nor `tcp_user_timeout` find it. Only a deadline does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import threading
+from collections.abc import Coroutine
+from concurrent.futures import Future
+from typing import TypeVar
+
+T = TypeVar("T")
+
+CHUNK = 64 * 1024
+
+
+class _Link:
+    """One client connection and its connection to the server."""
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader = reader
+        self.writer = writer
+        self.flowing = asyncio.Event()
+        self.flowing.set()
+
+
+class StallingProxy:
+    """Forward TCP connections on 127.0.0.1 to a server until the end of the `with` block.
+
+    Args:
+        target: path of a Unix socket, or (host, port).
+        port: to listen on; 0 = any free one.
+    """
+
+    def __init__(self, target: str | tuple[str, int], *, port: int = 0) -> None:
+        self._target = target
+        self._wanted_port = port
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, name="stalling proxy", daemon=True)
+        self._links: set[_Link] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._stall_new = False
+        self.port = 0
+
+    def __enter__(self) -> StallingProxy:
+        self._thread.start()
+        self._call(self._start())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._call(self._stop())
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(10)
+        self._loop.close()
+
+    @property
+    def connections(self) -> int:
+        """The number of open client connections, silent ones included."""
+        return len(self._links)
+
+    def stall(self, *, new: bool = False) -> int:
+        """Make every open connection silent, in both directions; return how many.
+
+        Args:
+            new: accept later connections, but make them silent too.
+        """
+        return self._call(self._stall(new))
+
+    def resume(self, *, old: bool = False) -> None:
+        """Forward new connections again.
+
+        Args:
+            old: let silent connections go on, with what was sent meanwhile. By default they stay silent for ever.
+        """
+        self._call(self._resume(old))
+
+    def cut(self) -> None:
+        """Close every open connection."""
+        self._call(self._cut())
+
+    def _call(self, work: Coroutine[object, object, T]) -> T:
+        future: Future[T] = asyncio.run_coroutine_threadsafe(work, self._loop)
+        return future.result(30)
+
+    async def _start(self) -> None:
+        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self._wanted_port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def _stop(self) -> None:
+        self._server.close()
+        for task in list(self._tasks):
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._cut()
+
+    async def _stall(self, new: bool) -> int:
+        self._stall_new = new
+        for link in self._links:
+            link.flowing.clear()
+        return len(self._links)
+
+    async def _resume(self, old: bool) -> None:
+        self._stall_new = False
+        if old:
+            for link in self._links:
+                link.flowing.set()
+
+    async def _cut(self) -> None:
+        for link in list(self._links):
+            link.writer.close()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        link = _Link(reader, writer)
+        if self._stall_new:
+            link.flowing.clear()
+        self._links.add(link)
+        try:
+            # asyncio 3.11 logs a cancelled connection task as an error: end it quietly.
+            with contextlib.suppress(OSError, asyncio.CancelledError):
+                await self._forward(link)
+        finally:
+            self._links.discard(link)
+            self._tasks.discard(task)
+            writer.close()
+
+    async def _forward(self, link: _Link) -> None:
+        await link.flowing.wait()
+        if isinstance(self._target, str):
+            reader, writer = await asyncio.open_unix_connection(self._target)
+        else:
+            reader, writer = await asyncio.open_connection(*self._target)
+        pumps = [
+            asyncio.create_task(_pump(link, link.reader, writer)),
+            asyncio.create_task(_pump(link, reader, link.writer)),
+        ]
+        try:
+            await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for pump in pumps:
+                pump.cancel()
+            await asyncio.gather(*pumps, return_exceptions=True)
+            writer.close()
+
+
+async def _pump(link: _Link, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while data := await reader.read(CHUNK):
+        await link.flowing.wait()
+        writer.write(data)
+        await writer.drain()
