@@ -1,0 +1,238 @@
+"""What HGM³ is trained on and how it decodes, term by term: each test fails when its term is left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from tests.support.prepared import text_features
+from workers.hgm3 import decoding
+from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from workers.hgm3.config import TINY, HGM3Config
+from workers.hgm3.data import CaptionData
+from workers.hgm3.decoding import DecodeOptions, Items
+from workers.hgm3.generate import Generator
+from workers.hgm3.model import MaskedTransformer
+from workers.hgm3.stage_masked import MaskedStage, Sample
+from workers.hgm3.stage_residual import ResidualStage
+from workers.hgm3.tokenizer import Tokenizer
+from workers.training.data.prepared import PreparedData
+from workers.training.loop import StepContext
+from workers.training.motions import MotionData, TokenData
+from workers.training.texts import CaptionTexts
+from workers.training.tokenizing import tokenizer_loss
+
+CPU = torch.device("cpu")
+
+
+def encoded(prepared: PreparedData, config: HGM3Config) -> tuple[Tokenizer, TokenData, CaptionData]:
+    """A random tokenizer, the clips as its tokens, and their captions."""
+    torch.manual_seed(0)
+    tokenizer = Tokenizer(config)
+    tokenizer.quantizer.codebooks.normal_()
+    captions = CaptionData.of(CaptionTexts.load(prepared), prepared.caption_counts, config.condition, CPU)
+    return tokenizer, TokenData.encode(tokenizer, MotionData.load(prepared.path, CPU)), captions
+
+
+def masked_stage(prepared: PreparedData, config: HGM3Config = TINY) -> MaskedStage:
+    _, tokens, captions = encoded(prepared, config)
+    stage = MaskedStage(config, prepared.clips, tokens, captions)
+    for parameter in stage.module.parameters():  # away from the zeros at which training starts
+        parameter.data.add_(0.1 * torch.randn_like(parameter))
+    return stage
+
+
+def drawn_sample(stage: MaskedStage, batch: int = 4) -> Sample:
+    rng = np.random.default_rng(0)
+    return stage.sample(stage.pairs.draw(rng, batch), rng)
+
+
+def test_the_share_of_hard_tokens_rises_linearly_over_the_budget(prepared: PreparedData) -> None:
+    """Eq. 8: alpha goes from its start to its end with the fraction of the budget used."""
+    mining = replace(TINY.mining, mask="hard", alpha_start=0.1, alpha_end=0.7)
+    stage = masked_stage(prepared, replace(TINY, mining=mining))
+    used: list[float] = []
+    masks = stage.masks
+
+    def watched(sample: Sample, nodes: torch.Tensor, alpha: float) -> torch.Tensor:
+        used.append(alpha)
+        return masks(sample, nodes, alpha)
+
+    stage.masks = watched  # type: ignore[method-assign]
+    for fraction, alpha in ((0.0, 0.1), (0.25, 0.25), (1.0, 0.7)):
+        used.clear()
+        stage.loss(StepContext(0, fraction, np.random.default_rng(0)))
+        assert used == pytest.approx([alpha] * len(used))
+        assert used
+
+
+def test_a_step_trains_the_motion_action_and_specific_level(prepared: PreparedData) -> None:
+    """Eq. 7 and 12: F reads one slot level more for each level of mining."""
+    stage = masked_stage(prepared, replace(TINY, mining=replace(TINY.mining, levels_per_step=3)))
+    condition = stage.module.masked.condition
+    lowest = condition.config.max_actions
+    seen: list[tuple[bool, bool]] = []
+    forward = stage.module.masked.forward
+
+    def watched(tokens: torch.Tensor, valid: torch.Tensor, text: torch.Tensor, visible: torch.Tensor, *rest: object):
+        seen.append((bool(visible[:, 1 : 1 + lowest].any()), bool(visible[:, 1 + lowest :].any())))
+        return forward(tokens, valid, text, visible, *rest)  # type: ignore[arg-type]
+
+    stage.module.masked.forward = watched  # type: ignore[method-assign]
+    stage.config = replace(stage.config, condition=replace(stage.config.condition, drop=0.0))
+    stage.loss(StepContext(0, 0.0, np.random.default_rng(0)))
+    assert set(seen) == {(False, False), (True, False), (True, True)}
+
+
+def test_one_level_a_step_is_drawn_evenly(prepared: PreparedData) -> None:
+    levels = drawn_sample(masked_stage(prepared), 600).level
+    counts = torch.bincount(levels, minlength=3).tolist()
+    assert len(counts) == 3
+    assert min(counts) > 150, counts
+
+
+def test_the_predictor_is_dropped_with_the_transformer(prepared: PreparedData) -> None:
+    """A dropped condition hides the graph from G too: its answer is the same for any other prompt."""
+    stage = masked_stage(prepared)
+    stage.module.eval()  # no dropout: equal inputs give equal bits
+    sample = drawn_sample(stage).at_level(SPECIFIC)
+    valid = sample.tokens >= 0
+    one, other = torch.randn(2, 4, TINY.condition.slots, TINY.condition.text_width)
+    for dropped in (True, False):
+        asked = replace(sample, dropped=torch.full((4,), dropped))
+        first = stage._predict(stage.module.predictor, asked, one, valid)
+        second = stage._predict(stage.module.predictor, asked, other, valid)
+        assert torch.equal(first, second) is dropped
+
+
+def test_the_predictor_reads_the_tokens(prepared: PreparedData) -> None:
+    """Eq. 5: G sees the unmasked tokens; other tokens, other difficulties."""
+    stage = masked_stage(prepared)
+    stage.module.eval()  # no dropout: equal inputs give equal bits
+    sample = drawn_sample(stage).at_level(SPECIFIC)
+    valid = sample.tokens >= 0
+    nodes = torch.randn(4, TINY.condition.slots, TINY.condition.text_width)
+    shifted = replace(sample, tokens=torch.where(valid, (sample.tokens + 1) % TINY.tokenizer.codes, sample.tokens))
+    first = stage._predict(stage.module.predictor, sample, nodes, valid)
+    assert not torch.allclose(first, stage._predict(stage.module.predictor, shifted, nodes, valid))
+
+
+def test_the_residual_input_holds_nothing_of_the_level_it_predicts(prepared: PreparedData) -> None:
+    """App. A.2: level v + 1 from the levels up to v; a higher level that changes leaves the input as it is."""
+    tokenizer, tokens, captions = encoded(prepared, TINY)
+    stage = ResidualStage(TINY, prepared.clips, tokens, captions, tokenizer.codebooks)
+    inputs: list[torch.Tensor] = []
+    forward = stage.module.forward
+
+    def watched(total: torch.Tensor, *rest: torch.Tensor) -> torch.Tensor:
+        inputs.append(total)
+        return forward(total, *rest)
+
+    stage.module.forward = watched  # type: ignore[method-assign]
+    codes = torch.randint(TINY.tokenizer.codes, (2, 8, TINY.tokenizer.levels))
+    lengths, dropped = torch.full((2,), 8), torch.zeros(2, dtype=torch.bool)
+    sentences = torch.randn(2, TINY.condition.text_width)
+    for level in range(1, TINY.tokenizer.levels):
+        levels = torch.full((2,), level)
+        above, below = codes.clone(), codes.clone()
+        above[..., level:] = (above[..., level:] + 1) % TINY.tokenizer.codes
+        below[..., level - 1] = (below[..., level - 1] + 1) % TINY.tokenizer.codes
+        inputs.clear()
+        for given in (codes, above, below):
+            stage._piece(given, lengths, sentences, levels, dropped)
+        assert torch.equal(inputs[0], inputs[1])
+        assert not torch.equal(inputs[0], inputs[2])
+
+
+def test_the_commitment_is_part_of_the_tokenizers_objective() -> None:
+    """Eq. 2, second term: beta times the distance to the chosen codes."""
+    torch.manual_seed(0)
+    model = Tokenizer(TINY).eval()
+    model.quantizer.codebooks.normal_()
+    features = torch.randn(2, 16, TINY.features)
+    totals: list[float] = []
+    for beta in (0.0, 2.0):
+        config = replace(TINY, tokenizer=replace(TINY.tokenizer, commitment=beta))
+        loss, quantized = tokenizer_loss(model, config, features)
+        totals.append(float(loss.total.detach()))
+    assert float(quantized.commitment.detach()) > 0
+    assert totals[1] - totals[0] == pytest.approx(2 * float(quantized.commitment.detach()), rel=1e-3)
+    assert TINY.tokenizer.commitment > 0
+
+
+def test_the_commitment_pulls_the_encoder_towards_the_codes() -> None:
+    torch.manual_seed(0)
+    model = Tokenizer(TINY).eval()
+    model.quantizer.codebooks.normal_()
+    _, quantized = model(torch.randn(2, 16, TINY.features))
+    quantized.commitment.backward()
+    grads = [p.grad for p in model.encoder.parameters()]
+    assert any(g is not None and bool(g.any()) for g in grads)
+
+
+# ---- decoding
+
+
+def test_without_guidance_the_null_branch_alone_decides_and_reads_no_prompt(generator: Generator) -> None:
+    """Guidance 0 is the null branch: its tokens are the same whatever was asked for."""
+    from workers.generating.port import Request
+
+    unguided = replace(generator.settings({}), guidance=0.0, residual_guidance=0.0)
+    made = [generator.generate([Request(text_features(k, 2, 3), 7, 40)], unguided)[0] for k in (0, 5)]
+    guided = [generator.generate([Request(text_features(k, 2, 3), 7, 40)])[0] for k in (0, 5)]
+    assert all(each is not None for each in (*made, *guided))
+    assert np.array_equal(made[0].tokens, made[1].tokens)  # type: ignore[union-attr]
+    assert not np.array_equal(guided[0].tokens, guided[1].tokens)  # type: ignore[union-attr]
+
+
+@torch.inference_mode()
+def test_the_null_branch_reads_its_one_slot(monkeypatch: pytest.MonkeyPatch) -> None:
+    torch.manual_seed(0)
+    model = MaskedTransformer(TINY).eval()
+    asked: list[torch.Tensor] = []
+    forward = model.forward
+    monkeypatch.setattr(
+        model, "forward", lambda *inputs, **named: (asked.append(inputs[3]), forward(*inputs, **named))[1]
+    )
+    items = _items(2, 8)
+    base = torch.full((2, 8), model.mask_token)
+    valid = torch.ones(2, 8, dtype=torch.bool)
+    for level in (MOTION, ACTION, SPECIFIC):
+        decoding._base_logits(model, items, base, valid, level, 4.0, DecodeOptions())
+    for visible in asked:
+        assert visible[2:].sum(1).tolist() == [1, 1]
+        assert visible[2:, 0].all()
+    assert [int(visible[:2].sum()) for visible in asked] == [2, 2 * (1 + 8), 2 * (1 + 8 + 16)]
+
+
+@torch.inference_mode()
+def test_a_pass_keeps_the_most_confident_tokens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sec. 3.4: the least confident are masked again."""
+    model = MaskedTransformer(TINY).eval()
+    sure = torch.tensor([5.0, 1.0, 9.0, 3.0, 7.0, 2.0, 8.0, 4.0])
+    logits = torch.zeros(1, 8, TINY.tokenizer.codes)
+    logits[0, :, 3] = sure
+    monkeypatch.setattr(decoding, "_base_logits", lambda *_: logits)
+    config = replace(TINY.inference, temperature=0.0)
+    base = torch.full((1, 8), model.mask_token)
+    filled = decoding._base_pass(model, _items(1, 8), base, torch.tensor([5]), 1, MOTION, config, DecodeOptions())
+    assert (filled[0] == 3).nonzero().flatten().tolist() == [2, 4, 6]
+    assert int((filled == model.mask_token).sum()) == 5
+    kept = decoding._base_pass(model, _items(1, 8), filled, torch.tensor([2]), 2, MOTION, config, DecodeOptions())
+    assert (kept[0] == 3).nonzero().flatten().tolist() == [0, 2, 3, 4, 6, 7]
+
+
+def _items(batch: int, size: int) -> Items:
+    slots = TINY.condition.slots
+    return Items(
+        lengths=torch.full((batch,), size),
+        seeds=torch.arange(batch),
+        condition=torch.randn(batch, slots, TINY.masked.width),
+        present=torch.ones(batch, slots, dtype=torch.bool),
+        sentence=torch.zeros(batch, TINY.residual.width),
+        tokens=torch.full((batch, size, TINY.tokenizer.levels), -1),
+        decided=torch.zeros(batch, 3, dtype=torch.long),
+    )

@@ -1,0 +1,92 @@
+"""What MOGO is trained on, term by term: each test fails when its term is left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from workers.mogo import train
+from workers.mogo.config import TINY, MOGOConfig
+from workers.mogo.losses import LevelSums
+from workers.mogo.stage_transformer import TransformerStage
+from workers.mogo.tokenizer import Tokenizer
+from workers.training.budget import Budget
+from workers.training.data.prepared import PreparedData
+from workers.training.loop import StepContext
+from workers.training.motions import MotionData, TokenData
+from workers.training.sentences import SentenceData
+from workers.training.staging import TrainOptions
+from workers.training.texts import CaptionTexts
+from workers.training.tokenizing import TokenizerStage
+
+CPU = torch.device("cpu")
+
+
+class Stop(Exception):
+    """Ends a training that has shown what it was asked for."""
+
+
+def test_training_the_tokenizer_adds_the_regularizer_of_the_scales(
+    prepared: PreparedData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Eq. 6, last term: gamma times the squares of scale - 1 and bias, in the loss that `marey train` minimises."""
+    totals: list[float] = []
+
+    def watched(stage: TokenizerStage, _options: object) -> dict[str, float]:
+        for scale in stage.module.quantizer.scales:  # type: ignore[union-attr]
+            scale.data.fill_(1.5)
+        torch.manual_seed(1)
+        stage.module.eval()
+        totals.append(float(stage.loss(StepContext(0, 0.0, np.random.default_rng(0)))[0].detach()))
+        raise Stop
+
+    monkeypatch.setattr(type(train.RECIPE), "train", lambda _self, stage, options: watched(stage, options))
+    for gamma in (0.0, 3.0):
+        config = replace(TINY, tokenizer=replace(TINY.tokenizer, regularizer=gamma))
+        options = TrainOptions[MOGOConfig](
+            prepared.path, tmp_path, config, Budget(steps=1), device="cpu", bf16=False, quiet=True
+        )
+        with pytest.raises(Stop):
+            train.train_stage("tokenizer", options)
+    # (1.5 - 1)² a level
+    assert totals[1] - totals[0] == pytest.approx(3.0 * TINY.tokenizer.levels * 0.25, rel=1e-3)
+    assert TINY.tokenizer.regularizer > 0
+
+
+def transformer_stage(prepared: PreparedData, config: MOGOConfig) -> TransformerStage:
+    torch.manual_seed(0)
+    tokenizer = Tokenizer(config).eval()
+    tokenizer.quantizer.codebooks.normal_()
+    tokens = TokenData.encode(tokenizer, MotionData.load(prepared.path, CPU))
+    captions = SentenceData.of_sentences(CaptionTexts.load(prepared), prepared.caption_counts, 384, CPU)
+    return TransformerStage(config, prepared.clips, tokens, captions)
+
+
+def test_the_first_level_weighs_what_the_configuration_says(
+    prepared: PreparedData, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+    loss = LevelSums.loss
+
+    def watched(sums: LevelSums, first_level: float) -> torch.Tensor:
+        asked.append(first_level)
+        return loss(sums, first_level)
+
+    monkeypatch.setattr(LevelSums, "loss", watched)
+    for weight in (1.0, 5.0):
+        stage = transformer_stage(prepared, replace(TINY, first_level=weight))
+        stage.loss(StepContext(0, 0.0, np.random.default_rng(0)))
+        stage.validate()
+    assert asked == [1.0, 1.0, 5.0, 5.0]
+
+
+def test_a_heavier_first_level_moves_the_loss_towards_its_own() -> None:
+    sums = LevelSums(torch.tensor([8.0, 2.0]), torch.tensor([0, 0]), torch.tensor([2, 2]))
+    losses = [float(sums.loss(weight)) for weight in (1.0, 3.0, 1e6)]
+    assert losses[0] == pytest.approx(2.5)
+    assert losses[1] == pytest.approx((3 * 4 + 1) / 4)
+    assert losses[2] == pytest.approx(4.0, rel=1e-3)
