@@ -45,6 +45,7 @@ DATABASES = ("postgresql+psycopg", "postgresql")
 QUEUES = ("redis", "rediss", "redis+socket")
 HOST = re.compile(r"(\[[^\]]*\]|[^:]*)(:[0-9]{1,5})?")
 WEB = re.compile(r"https?://[^/?#\s]")
+ENDPOINT = re.compile(r"(https?://)?(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?/?")
 
 
 def _of_json(value: object) -> object:
@@ -83,6 +84,12 @@ def _web(value: str) -> str:
     return value
 
 
+def _endpoint(value: str) -> str:
+    if ENDPOINT.fullmatch(value) is None:
+        raise ValueError("Write it as https://objects.example.com, http://host:9000 or host:9000, without a path.")
+    return value.rstrip("/")
+
+
 def _level(value: object) -> object:
     return value.upper() if isinstance(value, str) and value.upper() in LEVELS else value
 
@@ -92,6 +99,7 @@ Port = Annotated[int, Field(ge=1, le=65535)]
 Database = Annotated[SecretStr, AfterValidator(_database)]
 Queue = Annotated[SecretStr, AfterValidator(_queue)]
 Web = Annotated[str, AfterValidator(_web)]
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Names = Annotated[list[str], NoDecode, BeforeValidator(_of_json)]
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
 LEVELS: tuple[str, ...] = get_args(Level)
@@ -120,13 +128,19 @@ class Settings(BaseSettings):
     store: str | None = None
     """`s3://bucket` or a folder; unset = `home/assets`."""
 
-    s3_endpoint: str = "objectstore:9000"
-    s3_public_endpoint: str | None = None
-    """Endpoint that stands in presigned URLs, where clients reach the store under another name."""
+    s3_endpoint: Endpoint = "objectstore:9000"
+    """Address of the object store: a URL, or host and port, for which `s3_secure` tells the scheme."""
+    s3_public_endpoint: Endpoint | None = None
+    """The address in presigned URLs, where clients reach the store under another name or scheme."""
     s3_access_key: SecretStr | None = None
     s3_secret_key: SecretStr | None = None
     s3_region: str = "us-east-1"  # set, else the client asks the network for it before every presigned URL
     s3_secure: bool = False
+    """Use https for an endpoint without a scheme."""
+
+    ca_file: Path | None = None
+    """PEM file of certificate authorities that are trusted beside the machine's own, for every connection to a server
+    by https: the API, the object store, webhooks, the language model of a rewriter."""
 
     host: str = "127.0.0.1"
     port: Port = 8400

@@ -40,6 +40,7 @@ from shared.runtime.signals import stop_on_signals
 from shared.runtime.status import Teller
 from shared.settings import Settings
 from shared.storage import open_store
+from shared.tls import trusting_context
 from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
@@ -106,7 +107,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
 
 def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Deliverer]:
     """None without a key: then the API makes no webhooks."""
-    sender = Sender(Allowed.of(chosen.webhook_allow))
+    sender = Sender(Allowed.of(chosen.webhook_allow), tls=trusting_context(chosen.ca_file))
     if chosen.webhook_key is None:
         log.warning("webhooks_off", reason="MAREY_WEBHOOK_KEY is not set")
         return []

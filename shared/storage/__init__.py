@@ -57,5 +57,6 @@ def open_store(chosen: Settings) -> AssetStore:
             region=chosen.s3_region,
             secure=chosen.s3_secure,
             public_endpoint=chosen.s3_public_endpoint,
+            ca_file=chosen.ca_file,
         )
     )

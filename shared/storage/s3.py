@@ -29,6 +29,7 @@ from shared.storage.port import (
     no_such_object,
     range_past_end,
 )
+from shared.tls import UNTRUSTED_HINT, trusting_context, verification_error
 
 # The SDK's own pool waits 300 s and tries 5 times; a worker must know within seconds and release its lease.
 CONNECT_SECONDS = 3.0
@@ -65,7 +66,14 @@ REASONS = {
 
 @dataclass(frozen=True)
 class S3Options:
-    """Where the store is. `public_endpoint` stands in presigned URLs, where clients reach it under another name."""
+    """Where the store is.
+
+    Attributes:
+        endpoint: `http://host:port`, `https://host`, or `host:port`.
+        secure: use https for an endpoint without a scheme.
+        public_endpoint: stands in presigned URLs, where clients reach the store under another name or scheme.
+        ca_file: PEM file of certificate authorities to trust beside the machine's own.
+    """
 
     endpoint: str
     bucket: str
@@ -74,6 +82,12 @@ class S3Options:
     region: str = "us-east-1"
     secure: bool = False
     public_endpoint: str | None = None
+    ca_file: Path | None = None
+
+    def address(self, endpoint: str) -> tuple[str, bool]:
+        """Split an endpoint into host with port, and whether https is used."""
+        scheme, separator, host = endpoint.rpartition("://")
+        return host.rstrip("/"), scheme == "https" if separator else self.secure
 
 
 class S3Store:
@@ -203,7 +217,8 @@ class S3Store:
                 raise Unreachable(f"the connection ended after {read} of {length} bytes", where=self._where(key))
 
     def _where(self, key: str | None = None) -> str:
-        return "/".join(filter(None, (f"s3://{self.options.endpoint}", self.options.bucket, key)))
+        host, _ = self.options.address(self.options.endpoint)
+        return "/".join(filter(None, (f"s3://{host}", self.options.bucket, key)))
 
     @contextmanager
     def _outages(self, key: str | None = None) -> Generator[None]:
@@ -221,6 +236,8 @@ class S3Store:
         except (ServerError, InvalidResponseError, MinioException) as error:
             raise self._unreachable(str(error).splitlines()[0]) from error
         except (urllib3.exceptions.HTTPError, OSError) as error:
+            if (why := verification_error(error)) is not None:
+                raise self._untrusted(why) from error
             cause = getattr(error, "reason", None) or error
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
@@ -246,26 +263,33 @@ class S3Store:
         STORE_ERRORS.labels("s3").inc()
         return Unreachable(f"the object store {what} ({message or code})", where=self._where(), hint=hint)
 
+    def _untrusted(self, why: str) -> Unreachable:
+        STORE_ERRORS.labels("s3").inc()
+        message = f"the certificate of the object store is not trusted ({why})"
+        return Unreachable(message, where=self._where(), hint=UNTRUSTED_HINT)
+
     def _unreachable(self, cause: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()
         return Unreachable(
             f"the object store does not answer as it should ({cause})",
             where=self._where(),
-            hint="Is it running, has it room left, and are MAREY_S3_ENDPOINT and the keys right?",
+            hint="Is it running, has it room left, and are MAREY_S3_ENDPOINT (with its scheme) and the keys right?",
         )
 
 
 def _client(options: S3Options, endpoint: str) -> Minio:
+    host, secure = options.address(endpoint)
     pool = urllib3.PoolManager(
         maxsize=16,
+        ssl_context=trusting_context(options.ca_file) if secure else None,
         timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
         retries=urllib3.Retry(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504)),
     )
     return Minio(
-        endpoint,
+        host,
         access_key=options.access_key,
         secret_key=options.secret_key,
         region=options.region,  # else presigning asks the network for it
-        secure=options.secure,
+        secure=secure,
         http_client=pool,
     )

@@ -14,6 +14,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 
 import httpx2
 from pydantic import SecretStr
@@ -22,6 +23,7 @@ from shared.errors import InvalidInput, MareyError
 from shared.settings import Settings
 from shared.text.prompts import check_prompt
 from shared.text.rewriters import NotRewritten
+from shared.tls import trusting_context
 
 log = logging.getLogger(__name__)
 
@@ -63,12 +65,14 @@ class Endpoint:
     Attributes:
         url: up to and without `/chat/completions`.
         seconds: for one prompt, with all tries.
+        ca_file: PEM file of certificate authorities to trust beside the machine's own.
     """
 
     url: str
     model: str
     key: SecretStr | None = None
     seconds: float = 10.0
+    ca_file: Path | None = None
 
     @classmethod
     def of(cls, config: Settings) -> Endpoint:
@@ -80,7 +84,7 @@ class Endpoint:
         if not config.rewriter_model:
             raise InvalidInput("no language model is named", where="MAREY_REWRITER_MODEL", hint="Name one of yours.")
         url = config.rewriter_url.rstrip("/")
-        return cls(url, config.rewriter_model, config.rewriter_key, config.rewriter_seconds)
+        return cls(url, config.rewriter_model, config.rewriter_key, config.rewriter_seconds, config.ca_file)
 
 
 class OpenAIRewriter:
@@ -91,7 +95,12 @@ class OpenAIRewriter:
     def __init__(self, endpoint: Endpoint) -> None:
         self._endpoint = endpoint
         secret = {} if endpoint.key is None else {"Authorization": f"Bearer {endpoint.key.get_secret_value()}"}
-        self._client = httpx2.Client(headers=secret, timeout=endpoint.seconds, follow_redirects=False)
+        self._client = httpx2.Client(
+            headers=secret,
+            timeout=endpoint.seconds,
+            follow_redirects=False,
+            verify=trusting_context(endpoint.ca_file),
+        )
         self._lock = threading.Lock()
         self._answers: OrderedDict[str, str] = OrderedDict()
         self._failed_ahead: dict[str, NotRewritten] = {}

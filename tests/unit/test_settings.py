@@ -51,6 +51,9 @@ def refusal(monkeypatch: pytest.MonkeyPatch, **variables: str) -> InvalidInput:
         ("rates", "often", "an object in JSON"),
         ("public_url", "marey.example.com", "https://marey.example.com"),
         ("rewriter_url", "file:///etc", "https://"),
+        ("s3_endpoint", "ftp://objects", "without a path"),
+        ("s3_endpoint", "http://objects:9000/bucket", "without a path"),
+        ("s3_public_endpoint", "https://user:password@objects", "without a path"),
     ],
     ids=lambda given: given.replace("/", " ")[:30],
 )
