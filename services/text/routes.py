@@ -59,7 +59,14 @@ class EdgeView(BaseModel):
 class GraphView(BaseModel):
     """The semantic graph of a prompt."""
 
+    prompt: str
+    """The prompt as it was checked and stored."""
     text: str
+    """What the model reads: the prompt, or the prompt rewritten."""
+    rewrite_reason: str | None
+    """Why `text` differs from `prompt`, or why a rewrite was not used."""
+    warnings: list[str]
+    """What the author should know: no action found, or parts over the model's limits."""
     words: list[str]
     nodes: list[NodeView]
     edges: list[EdgeView]
@@ -76,8 +83,8 @@ class GraphsView(BaseModel):
 def parse_texts(body: ParseBody, key: Parser) -> GraphsView:
     """The semantic graph of each prompt."""
     prompts = [check_prompt(prompt, where=f"prompts.{index}") for index, prompt in enumerate(body.prompts)]
-    graphs = pipeline_of(body.model).parse(prompts)
-    return GraphsView(items=[GraphView.model_validate(graph.to_json()) for graph in graphs])
+    parsed = pipeline_of(body.model).explain(prompts)
+    return GraphsView(items=[GraphView.model_validate(each.to_json()) for each in parsed])
 
 
 def pipeline_of(model: str) -> TextPipeline:

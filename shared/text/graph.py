@@ -6,7 +6,6 @@ motion to each action (type `MA`) and from each action to its arguments (type = 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -110,7 +109,7 @@ class SemanticGraph:
         return adjacency
 
     def to_json(self) -> dict[str, Any]:
-        """The line of `marey text parse --json`."""
+        """As `from_json` reads it; stored with the features of a prompt."""
         return {
             "text": self.text,
             "words": list(self.words),
@@ -199,8 +198,3 @@ def build_graph(text: str, frames: Sequence[Frame], *, max_actions: int, max_spe
         edges=cut_edges,
     )
     return SemanticGraph(text, words, tuple(nodes), tuple(edges), cut)
-
-
-def dump_line(graph: SemanticGraph) -> str:
-    """One JSON line, as `marey text parse --json` prints it."""
-    return json.dumps(graph.to_json(), ensure_ascii=False)

@@ -21,10 +21,12 @@ from shared.text.graph import Node, SemanticGraph, build_graph
 from shared.text.guard import changed_meaning
 from shared.text.keys import NO_LABELLER, feature_key
 from shared.text.labellers import OneAtATime, load_labeller
+from shared.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from shared.text.prompts import check_prompt
 from shared.text.rewriters import NotRewritten, PromptRewriter, load_rewriter
 from shared.text.roles import RoleLabeller
 from shared.text.telling import told_in_order
+from shared.text.words import EDGE_PUNCTUATION
 
 if TYPE_CHECKING:
     from shared.text.spelling import Speller
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4 B = 25 MB at most
-EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
 
 
 class TextPipeline:
@@ -89,13 +90,40 @@ class TextPipeline:
         return feature_key(check_prompt(prompt), self.spec)
 
     def parse(self, prompts: Sequence[str]) -> list[SemanticGraph]:
-        """The graph of each prompt, rewritten first.
+        """Parse each prompt into its graph, rewritten first.
 
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        rewritten = self._rewritten([check_prompt(prompt) for prompt in prompts])
-        return [graph for graph, _ in self._read([text for text, _ in rewritten])]
+        return [parsed.graph for parsed in self.explain(prompts)]
+
+    def explain(self, prompts: Sequence[str]) -> list[ParsedPrompt]:
+        """The graph of each prompt, with why its text differs from the prompt, and warnings.
+
+        Raises:
+            InvalidInput: a prompt cannot be used (`check_prompt`).
+        """
+        checked = [check_prompt(prompt) for prompt in prompts]
+        rewritten = self._rewritten(checked)
+        graphs = [graph for graph, _ in self._read([text for text, _ in rewritten])]
+        return [
+            ParsedPrompt(prompt, graph, self._rewrite_reason(prompt, text, graph, reason), self._warnings(graph))
+            for prompt, (text, reason), graph in zip(checked, rewritten, graphs, strict=True)
+        ]
+
+    def _rewrite_reason(self, prompt: str, text: str, graph: SemanticGraph, refused: str | None) -> str | None:
+        """Why `graph.text` is not `prompt`, or why a rewrite of it was not used."""
+        reasons: list[str] = []
+        if text != prompt:
+            reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
+        if refused is not None:
+            reasons.append(f"the rewrite of {self.rewriter.name!r} was not used: {refused}")
+        if graph.text != text:
+            reasons.append("the model reads several actions as one sentence each, in the order of time")
+        return "; ".join(reasons) or None
+
+    def _warnings(self, graph: SemanticGraph) -> tuple[str, ...]:
+        return () if self.spec.labeller == NO_LABELLER else warnings_of(graph)
 
     def prefetch(self, prompts: Sequence[str]) -> None:
         """Get ready to read these prompts one by one."""
@@ -165,7 +193,7 @@ class TextPipeline:
             rows = self.pooled([node.text for node in graph.nodes])
         else:
             with self._lock:
-                sentence = self.encoder.encode(_strip(graph.text))
+                sentence = self.encoder.encode(without_punctuation(graph.text))
             starts = _word_starts(graph)
             rows = [self._span(sentence, graph, starts, node) for node in graph.nodes]
         return np.stack(rows).astype(np.float16)
@@ -173,7 +201,7 @@ class TextPipeline:
     def pooled(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """Pooled encodings (W,) of texts without the punctuation at their ends; the latest few thousand are kept."""
         with self._lock:
-            return self._pooled_of([_strip(text) for text in texts])
+            return self._pooled_of([without_punctuation(text) for text in texts])
 
     def _pooled_of(self, stripped: Sequence[str]) -> list[NDArray[np.float32]]:
         found = {text: self._pooled[text] for text in stripped if text in self._pooled}
@@ -208,11 +236,6 @@ def _word_starts(graph: SemanticGraph) -> list[int]:
         starts.append(offset)
         offset += len(word) + 1
     return starts
-
-
-def _strip(text: str) -> str:
-    """Without punctuation at the ends: "left." and "left" are one word (and a text of dots stays what it is)."""
-    return text.strip(EDGE_PUNCTUATION + " ") or text
 
 
 def refuse_mismatch(what: str, name: str, sha256: str | None, found_name: str, found_sha256: str) -> None:

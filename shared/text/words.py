@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
+"""What is stripped from the ends of words and of nodes' texts."""
 IRREGULAR = {  # base: (past, participle)
     "be": ("was", "been"),
     "begin": ("began", "begun"),
@@ -111,7 +113,7 @@ SINGULAR = {
 
 def bare(word: str) -> str:
     """Lower case, without punctuation at the ends."""
-    return word.lower().strip(".,;:!?\"'()[]…")
+    return word.lower().strip(EDGE_PUNCTUATION)
 
 
 def lemma(word: str) -> str:

@@ -34,7 +34,7 @@ def parse(
             if as_json:
                 console.result_json(graph)
             else:
-                _draw(graph)
+                draw(graph)
     except ImportError as error:
         raise needs_extra("worker", error) from error
 
@@ -63,16 +63,23 @@ def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
         raise InvalidInput(f"{model!r} does not read prompts", hint="Name a generator.")
     pipeline = TextPipeline.load(as_served(spec))
     for start in range(0, len(texts), BATCH):
-        for graph in pipeline.parse(texts[start : start + BATCH]):
-            yield graph.to_json()
+        for parsed in pipeline.explain(texts[start : start + BATCH]):
+            yield parsed.to_json()
 
 
-def _draw(graph: dict[str, Any]) -> None:
+def draw(graph: dict[str, Any]) -> None:
+    """Print a parsed prompt as indented text."""
     names = {node["id"]: node["text"] for node in graph["nodes"]}
-    console.result(graph["text"])
+    console.result(f"prompt: {graph['prompt']}")
+    if graph["text"] != graph["prompt"]:
+        console.result(f"read as: {graph['text']}")
+    if graph["rewrite_reason"] is not None:
+        console.result(f"why: {graph['rewrite_reason']}")
     for node in graph["nodes"]:
         if node["level"] == "action":
             console.result(f"  {node['text']}")
             for edge in graph["edges"]:
                 if edge["from"] == node["id"]:
                     console.result(f"    {edge['role'] or edge['type']}: {names[edge['to']]}")
+    for warning in graph["warnings"]:
+        console.result(f"warning: {warning}")

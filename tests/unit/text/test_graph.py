@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.text.graph import EDGE_TYPES, MA, OTHERS, SemanticGraph, build_graph, dump_line, edge_type
+from shared.text.graph import EDGE_TYPES, MA, OTHERS, SemanticGraph, build_graph, edge_type
 from shared.text.roles import Argument, Frame, spans_to_arguments
 
 TEXT = "a person walks forward and waves"
@@ -88,7 +88,7 @@ def test_a_prompt_without_verbs_is_its_motion_node() -> None:
 
 
 def test_json_line_follows_the_contract() -> None:
-    line = json.loads(dump_line(graph()))
+    line = json.loads(json.dumps(graph().to_json()))
     assert list(line) == ["text", "words", "nodes", "edges", "cut"]
     assert line["nodes"][1] == {"id": 1, "level": "action", "text": "walks", "words": [2]}
     assert line["edges"][0] == {"from": 0, "to": 1, "type": "MA", "role": "MA"}
@@ -119,7 +119,7 @@ def test_any_frames_give_a_valid_graph_that_survives_json(
     text, found = sample
     made = build_graph(text, found, max_actions=actions, max_specifics=specifics)
     made.validate()
-    assert SemanticGraph.from_json(json.loads(dump_line(made))) == made
+    assert SemanticGraph.from_json(json.loads(json.dumps(made.to_json()))) == made
     assert len(made.level("action")) <= actions
     assert len(made.level("specific")) <= specifics
     kept = sum(1 + len(f.arguments) for f in found)
