@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from shared.characters import WHITESPACE, check_text
 from shared.errors import InvalidInput, TooLarge
 from shared.expected import read_expected
 from shared.items import CHECKS, Problem, checked, read_fields
@@ -81,7 +82,7 @@ def _read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[
 def _expected(value: object) -> str:
     if not isinstance(value, str):
         raise InvalidInput('is not a text: write "walk then wave left"')
-    read_expected(value)
+    read_expected(check_text(value, allowed=WHITESPACE))
     return " ".join(value.lower().split())
 
 

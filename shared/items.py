@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
 
+from shared.characters import check_text, is_printable
 from shared.errors import InvalidInput, TooLarge
 from shared.text.prompts import check_prompt
 
@@ -271,11 +272,14 @@ def _tags(value: object) -> tuple[str, ...]:
     given = cast("Sequence[object]", value)
     if len(given) > MAX_TAGS:
         raise InvalidInput(f"{len(given)} tags are over the limit of {MAX_TAGS}")
-    tags = tuple(_text(tag) for tag in given)
-    for tag in tags:
-        if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not tag.isprintable():
-            raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
-    return tags
+    return tuple(_tag(tag) for tag in given)
+
+
+def _tag(value: object) -> str:
+    tag = check_text(_text(value), subject="a tag")
+    if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not is_printable(tag):
+        raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
+    return tag
 
 
 def _settings(value: object) -> dict[str, float]:
@@ -298,10 +302,6 @@ def _settings(value: object) -> dict[str, float]:
 def _text(value: object) -> str:
     if not isinstance(value, str):
         raise InvalidInput(f"is {_kind(value)}, not a text")
-    try:
-        value.encode("utf-8")
-    except UnicodeEncodeError:
-        raise InvalidInput("holds a lone surrogate: it is not valid Unicode") from None
     return value
 
 

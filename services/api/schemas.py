@@ -2,12 +2,48 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Generic, TypeVar
+from dataclasses import dataclass
+from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi import Header, Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from shared.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text, normalize_newlines
+from shared.errors import InvalidInput
 
 Row = TypeVar("Row")
+
+MAX_NAME, MAX_COMMENT, MAX_REASON = 200, 2000, 500
+
+
+@dataclass(frozen=True)
+class FreeText:
+    """Marks free text of a request in `Annotated`: `shared.characters` says what it may hold.
+
+    Attributes:
+        lines: it may hold newlines and tabs.
+    """
+
+    lines: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {**handler(schema), "pattern": TEXT_PATTERN if self.lines else LINE_PATTERN}
+
+    def _check(self, text: str) -> str:
+        try:
+            return check_text(normalize_newlines(text), allowed=LINES) if self.lines else check_text(text)
+        except InvalidInput as error:
+            raise PydanticCustomError("text", "{message}", {"message": error.message}) from error
+
+
+Name = Annotated[str, Field(max_length=MAX_NAME), FreeText()]
+"""Of a job, evaluation, schedule or webhook."""
+Comment = Annotated[str, Field(max_length=MAX_COMMENT), FreeText(lines=True)]
+Reason = Annotated[str, Field(max_length=MAX_REASON), FreeText(lines=True)]
 
 Limit = Annotated[int, Query(ge=1, le=1000, description="Elements of a page, at most.")]
 Cursor = Annotated[str | None, Query(max_length=500, description="`next` of the page before.")]

@@ -8,10 +8,11 @@ import sys
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
+from shared.characters import escape, escape_json, escaping, unescaped
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -31,24 +32,53 @@ PAGE = 1000
 
 def stderr() -> Console:
     """The console of words for people."""
-    from rich.console import Console
+    return drawing(sys.stderr, soft_wrap=True)
 
-    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+def drawing(stream: TextIO, **options: Any) -> Console:
+    """A console that draws on a stream: its own colours and cursor movements pass, those in the text are escaped."""
+    from rich.console import Console
+    from rich.segment import Segment
+
+    class EscapingConsole(Console):
+        def render(self, renderable: Any, options: Any = None) -> Iterable[Segment]:
+            for segment in super().render(renderable, options):
+                yield segment if segment.control else segment._replace(text=escape(segment.text))
+
+    return EscapingConsole(file=unescaped(stream), markup=False, emoji=False, highlight=False, **options)
+
+
+def escape_output() -> None:
+    """From here on nothing that is written to stdout or stderr holds control characters, whatever writes it: usage
+    errors that quote an argument, warnings, tracebacks."""
+    sys.stdout, sys.stderr = escaping(sys.stdout), escaping(sys.stderr)
+
+
+@contextmanager
+def escaped_output() -> Generator[None]:
+    """`escape_output` until the end of the block."""
+    before = sys.stdout, sys.stderr
+    escape_output()
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
 
 
 def say(text: str) -> None:
-    """A line for people, on stderr, verbatim."""
-    print(text, file=sys.stderr, flush=True)  # noqa: T201
+    """A line for people, on stderr."""
+    print(escape(text), file=sys.stderr, flush=True)  # noqa: T201
 
 
 def result(text: str) -> None:
     """A result, on stdout."""
-    print(text, flush=True)  # noqa: T201
+    print(escape(text), flush=True)  # noqa: T201
 
 
 def result_json(value: Any) -> None:
-    """A result as one line of JSON, on stdout."""
-    result(json.dumps(value, ensure_ascii=False, separators=(", ", ": ")))
+    """A result as one line of JSON, on stdout; characters that a terminal would obey are `\\u` escapes."""
+    utf8 = (getattr(sys.stdout, "encoding", None) or "").lower().replace("-", "") == "utf8"
+    result(escape_json(json.dumps(value, ensure_ascii=not utf8, separators=(", ", ": "))))
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -67,7 +97,6 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
 
 
 def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -76,7 +105,7 @@ def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
         drawn.add_column(column, overflow="fold")
     for row in rows:
         drawn.add_row(*(Text(_cell(value)) for value in row))
-    Console(highlight=False).print(drawn)
+    drawing(sys.stdout).print(drawn)
 
 
 def listing(
@@ -113,7 +142,11 @@ def bar() -> Progress:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     return Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=stderr()
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=stderr(),
     )
 
 
@@ -171,4 +204,7 @@ def size(count: int) -> str:
 
 
 def _cell(value: object) -> str:
-    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value).replace("\n", " ")
+    if value is None:
+        return ""
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return escape(text.replace("\n", " ").replace("\t", " "))

@@ -146,7 +146,6 @@ def _draw(lines: list[dict[str, Any]]) -> None:
 
 
 def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     title = f"{lines[0]['bundle']}, {lines[0]['licence']}"
@@ -161,7 +160,7 @@ def _show(lines: list[dict[str, Any]], *, random: bool) -> None:
         files = f"{line['name']}.*" if line["files"] else ""
         weights = "random" if random else "trained"
         table.add_row(line["prompt"], weights, line["state"], length, str(line["seed"]), took, files)
-    Console().print(table)
+    console.drawing(sys.stdout).print(table)
 
 
 if __name__ == "__main__":

@@ -44,6 +44,11 @@ answered with no."""
 class Commands(TyperGroup):
     """Expected errors are printed verbatim and set the exit code; anything else is a bug and shows its traceback."""
 
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Parse the arguments and run; usage errors quote them."""
+        with console.escaped_output():
+            return super().main(*args, **options)
+
     def invoke(self, ctx: Any) -> Any:
         """Run the chosen command."""
         try:
@@ -127,4 +132,5 @@ app.add_typer(admin.app, name="admin")
 
 def run() -> None:
     """The console script."""
+    console.escape_output()  # also of the traceback of a bug, which is written when all else has ended
     app()

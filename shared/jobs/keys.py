@@ -13,6 +13,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
+from shared.characters import check_text
 from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
 from shared.jobs import schema
 from shared.jobs.ids import new_id
@@ -51,9 +52,23 @@ def create_key(
         rates: its own rate limits, by class of request (`shared.rates`), before those of the server.
 
     Raises:
-        InvalidInput: an unknown scope, or none; a lifetime or rate that cannot be.
+        InvalidInput: control characters in the name; an unknown scope, or none; a lifetime or rate that cannot be.
         NotFound: no such tenant.
     """
+    check_text(name, where="name")
+    return _make_key(conn, name, scopes, tenant=tenant, lifetime=lifetime, rates=rates)
+
+
+def _make_key(
+    conn: sa.Connection,
+    name: str,
+    scopes: Collection[str],
+    *,
+    tenant: str,
+    lifetime: float | None,
+    rates: Mapping[str, str] | None,
+) -> NewApiKey:
+    """`create_key`, with the name of a stored key as it is."""
     unknown = set(scopes) - SCOPES
     if unknown or not scopes:
         what = f"unknown scopes: {', '.join(sorted(unknown))}" if unknown else "a key needs a scope"
@@ -154,7 +169,7 @@ def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = 
         if wrong:
             raise Conflict(f"this key {what}", where=f"key {key}", hint=NEW)
     lifetime = None if old.expires is None else (old.expires - old.created).total_seconds()
-    new = create_key(conn, old.name, old.scopes, tenant=tenant, lifetime=lifetime, rates=old.rates)
+    new = _make_key(conn, old.name, old.scopes, tenant=tenant, lifetime=lifetime, rates=old.rates)
     ends = sa.func.least(table.expires_at, CLOCK + interval(overlap))  # least() leaves out what is null
     conn.execute(sa.update(schema.api_key).where(ours).values(expires_at=ends, replaced_by=new.key.id))
     return new

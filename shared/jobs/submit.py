@@ -13,6 +13,7 @@ import psycopg
 import sqlalchemy as sa
 from psycopg import sql
 
+from shared import characters
 from shared.errors import InvalidInput
 from shared.jobs import schema
 from shared.jobs.idempotency import take_key
@@ -165,16 +166,10 @@ def check_share(share: float | None) -> None:
 
 
 def check_text(text: str | None, where: str) -> None:
-    """Nothing, if Postgres can hold a text: any but NUL and half surrogate pairs.
+    """Check that Postgres can hold a text; what may come in is checked at the edge (`shared.characters`).
 
     Raises:
-        InvalidInput: it cannot.
+        InvalidInput: it holds NUL or a lone surrogate.
     """
-    if text is None or (text.isascii() and "\0" not in text):
-        return
-    if "\0" in text:
-        raise InvalidInput("there is a NUL character in it", where=where, hint="Remove it.")
-    try:
-        text.encode()
-    except UnicodeEncodeError as error:
-        raise InvalidInput("it is not valid Unicode", where=where, hint="Save the file as UTF-8.") from error
+    if text is not None:
+        characters.check_text(text, allowed=characters.STORED, where=where)

@@ -14,6 +14,7 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 
+from shared.characters import escape
 from shared.motion.body import Body
 from shared.motion.skeleton import Skeleton
 
@@ -54,7 +55,7 @@ def whole_page(body: str, *, title: str, styles: Sequence[str], theme: str = "au
         asset("page.html"),
         {
             "%THEME%": theme,
-            "%TITLE%": html.escape(title),
+            "%TITLE%": html.escape(escape(title, lines=False)),
             "%STYLE%": "".join([asset("page.css"), *styles]),
             "%BODY%": body,
         },

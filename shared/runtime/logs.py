@@ -16,6 +16,7 @@ from structlog.stdlib import BoundLogger
 from structlog.typing import EventDict, ExcInfo, Processor, WrappedLogger
 
 from shared import tracing
+from shared.characters import escape, unescaped
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
 """Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""
@@ -48,7 +49,12 @@ def _brief_traceback(exc_info: ExcInfo) -> str:
 
 
 def _write_traceback(stream: TextIO, exc_info: ExcInfo) -> None:
-    stream.write("\n" + _brief_traceback(exc_info))
+    stream.write("\n" + escape(_brief_traceback(exc_info)))
+
+
+def _escape_values(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
+    """Values as a terminal may show them; the renderer writes texts as they are, and everything else by `repr`."""
+    return {name: escape(value, lines=False) if isinstance(value, str) else value for name, value in event.items()}
 
 
 def _add_trace(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
@@ -69,7 +75,8 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
         _drop_forbidden,
     ]
     renderer: list[Processor] = [
-        structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=_write_traceback)
+        _escape_values,
+        structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty(), exception_formatter=_write_traceback),
     ]
     if json:
         renderer = [structlog.processors.ExceptionRenderer(_brief_traceback), structlog.processors.JSONRenderer()]
@@ -79,7 +86,7 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
         wrapper_class=structlog.stdlib.BoundLogger,
         cache_logger_on_first_use=True,
     )
-    handler = logging.StreamHandler(sys.stderr)
+    handler = logging.StreamHandler(unescaped(sys.stderr))  # the renderer colours lines
     handler.setFormatter(
         structlog.stdlib.ProcessorFormatter(
             foreign_pre_chain=shared,

@@ -23,6 +23,7 @@ import torch
 from safetensors.torch import save_file  # pyright: ignore[reportUnknownVariableType]
 
 from shared.bundles import Bundle, BundleWriter, DataSource
+from shared.characters import escape
 from shared.errors import InvalidFile, MareyError
 from shared.text.bert_srl import PREFIX, PROJECTION
 from shared.text.pretrained import read_config
@@ -146,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
         else:
             made = convert_encoder(options.folder)
     except MareyError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{escape(str(error))}\n")
         return error.exit_code
     sys.stdout.write(f"{made}\n")
     return 0

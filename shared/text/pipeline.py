@@ -87,7 +87,7 @@ class TextPipeline:
 
     def key(self, prompt: str) -> str:
         """Key of the prompt's features: sha256 over the prompt and all that its features depend on."""
-        return feature_key(check_prompt(prompt), self.spec)
+        return feature_key(check_prompt(prompt, stored=True), self.spec)
 
     def parse(self, prompts: Sequence[str]) -> list[SemanticGraph]:
         """Parse each prompt into its graph, rewritten first.
@@ -103,7 +103,7 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        checked = [check_prompt(prompt) for prompt in prompts]
+        checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
         graphs = [graph for graph, _ in self._read([text for text, _ in rewritten])]
         return [
@@ -161,7 +161,7 @@ class TextPipeline:
         Raises:
             InvalidInput: a prompt cannot be used (`check_prompt`).
         """
-        checked = [check_prompt(prompt) for prompt in prompts]
+        checked = [check_prompt(prompt, stored=True) for prompt in prompts]
         rewritten = self._rewritten(checked)
         read = self._read([text for text, _ in rewritten])
         return [

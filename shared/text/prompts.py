@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
+from shared.characters import STORED, WHITESPACE, check_text
 from shared.errors import InvalidInput
 
 MAX_WORDS = 200
@@ -14,30 +15,23 @@ MIN_LATIN_SHARE = 0.5
 """The encoders and the labeller read English: text mostly in another script would give an arbitrary motion."""
 
 
-def check_prompt(prompt: str, *, where: str | None = None) -> str:
+def check_prompt(prompt: str, *, where: str | None = None, stored: bool = False) -> str:
     """The prompt as it is stored and parsed: Unicode NFC, runs of whitespace made one space, ends trimmed.
 
     Args:
         prompt: what the user wrote.
         where: line or field, for the error (`line 7`, `items.3.prompt`).
+        stored: a server has accepted it, perhaps an earlier release, which let text direction controls pass.
 
     Raises:
         InvalidInput: empty, too long, with control characters, or without English words.
     """
-    if "\x00" in prompt:
-        raise InvalidInput("the prompt holds a NUL byte", where=where, hint="Is the file plain UTF-8 text?")
     if len(prompt) > MAX_CHARACTERS * 100:  # normalising megabytes first would be work for nothing
         raise _too_long(f"{len(prompt):,} characters", where)
-    if not prompt.isascii() and any("\ud800" <= c <= "\udfff" for c in prompt):
-        raise InvalidInput("the prompt holds broken Unicode (a lone surrogate)", where=where, hint="Save it as UTF-8.")
+    check_text(prompt, allowed=STORED if stored else WHITESPACE, subject="the prompt", where=where)
     text = " ".join(unicodedata.normalize("NFC", prompt).split())
     if not text:
         raise InvalidInput("the prompt is empty", where=where, hint="Describe a motion: 'a person waves'.")
-    control = None if text.isprintable() else next((c for c in text if unicodedata.category(c) == "Cc"), None)
-    if control is not None:
-        raise InvalidInput(
-            f"the prompt holds the control character U+{ord(control):04X}", where=where, hint="Remove it."
-        )
     _check_size(text, where)
     _check_script(text, where)
     return text

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from shared.bundles import Bundle, BundleWriter, DataSource
+from shared.characters import escape
 from shared.errors import InvalidFile, MareyError
 from shared.motion.features import layout
 from shared.nn.bundling import stored
@@ -171,7 +172,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         made = import_t2m(options.checkpoints, options.glove, options.output).path
     except MareyError as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"{escape(str(error))}\n")
         return error.exit_code
     sys.stdout.write(f"{made}\n")
     return 0

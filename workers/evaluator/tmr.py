@@ -77,7 +77,7 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
     @torch.inference_mode()
     def embed_text(self, sentences: Sequence[str]) -> Embeddings:
         """See `Evaluator`; any English prompt (`check_prompt`), read as far as the text encoder reads."""
-        checked = [check_prompt(sentence, where=f"sentence {n}") for n, sentence in enumerate(sentences)]
+        checked = [check_prompt(sentence, where=f"sentence {n}", stored=True) for n, sentence in enumerate(sentences)]
         found = np.zeros((len(checked), self.width), np.float32)
         states = token_states(self.encoder, checked)
         for rows in _alike([len(each) for each in states]):

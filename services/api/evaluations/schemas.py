@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.files import FileView
-from services.api.jobs.schemas import MAX_COMMENT, MAX_NAME
-from services.api.schemas import View
+from services.api.schemas import MAX_NAME, Comment, FreeText, Name, View
 from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
 from shared.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
 from shared.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
 from shared.jobs.states import JobState
 
-PLAIN = r"^[^\x00-\x1f]*$"
 BUNDLE = rf"^{MODEL.pattern}$"
 
 
@@ -43,8 +41,8 @@ class EvaluationFields(BaseModel):
     split: Literal["test", "compositional", "test+compositional"] | None = Field(
         None, description="Captions that the evaluator's bundle carries, of a split or of both. Else give `prompts`."
     )
-    source: str | None = Field(
-        None, min_length=1, max_length=MAX_NAME, pattern=PLAIN, description="What the prompts are called in reports."
+    source: Annotated[str, Field(min_length=1, max_length=MAX_NAME), FreeText()] | None = Field(
+        None, description="What the prompts are called in reports."
     )
     settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
     repeats: int = Field(1, ge=1, le=MAX_VARIANTS, description="Motions of each prompt.")
@@ -63,8 +61,8 @@ class AskedFields(EvaluationFields):
 class NewEvaluationBody(AskedFields):
     """An evaluation as JSON."""
 
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
-    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+    name: Name | None = None
+    comment: Comment | None = None
 
 
 class EvaluationJobView(View):

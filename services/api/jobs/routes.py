@@ -10,6 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from fastapi.sse import EventSourceResponse
 
+from services.api import schemas
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.bodies import kept_body
@@ -46,9 +47,7 @@ JSON = "application/json"
 SSE = "text/event-stream"
 
 
-Reason = Annotated[
-    str | None, Query(max_length=500, pattern=r"^[^\x00]*$", description="Why; it stands in the job's events.")
-]
+Reason = Annotated[schemas.Reason | None, Query(description="Why; it stands in the job's events.")]
 
 
 @router.post(
@@ -70,8 +69,8 @@ async def submit_job(
     request: Request,
     shared: Shared,
     key: Submitter,
-    name: Annotated[str | None, Query(max_length=200)] = None,
-    comment: Annotated[str | None, Query(max_length=2000)] = None,
+    name: Annotated[schemas.Name | None, Query()] = None,
+    comment: Annotated[schemas.Comment | None, Query()] = None,
     priority: Annotated[int, Query(ge=-1000, le=1000)] = 0,
     fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
     keep_days: Annotated[int | None, Query(ge=1, le=jobs.MAX_KEEP_DAYS)] = None,

@@ -11,11 +11,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
 from services.api.problems import QuotaBody
-from services.api.schemas import View
+from services.api.schemas import Comment, Name, View
 from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
-MAX_NAME, MAX_COMMENT, MAX_PRIORITY = 200, 2000, 1000
+MAX_PRIORITY = 1000
 
 
 class NewItemBody(BaseModel):
@@ -38,8 +38,8 @@ class JobFields(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=r"^[^\x00-\x1f]*$")
-    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+    name: Name | None = None
+    comment: Comment | None = None
     priority: int = Field(0, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
     fail_early: float | None = Field(
         None, ge=0, le=1, description="Share of failed items above which the rest is cancelled."
@@ -61,7 +61,7 @@ class JobPatch(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     priority: int | None = Field(None, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
-    comment: str | None = Field(None, max_length=MAX_COMMENT, pattern=r"^[^\x00]*$")
+    comment: Comment | None = None
     fail_early: float | None = Field(
         None, ge=0, le=1, description="Share of failed items above which the rest is cancelled; null = none."
     )

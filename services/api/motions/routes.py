@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from typing import Annotated
 from uuid import UUID
 
@@ -23,23 +24,26 @@ from services.api.motions.schemas import (
 )
 from services.api.motions.service import made_again
 from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, Limit, PageView
+from services.api.schemas import Cursor, FreeText, Limit, PageView
 from shared import jobs
 from shared.errors import NotFound
-from shared.items import MAX_TAG_LENGTH, MAX_TAGS
+from shared.items import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 
 
 def motion_filter(
     tag: Annotated[
-        list[Annotated[str, Field(min_length=1, max_length=MAX_TAG_LENGTH)]] | None,
+        list[Annotated[str, Field(min_length=1, max_length=MAX_TAG_LENGTH), FreeText()]] | None,
         Query(max_length=MAX_TAGS, description="A tag as it was given, such as `shot=010`; several: all of them."),
     ] = None,
-    name: Annotated[str | None, Query(min_length=1, max_length=100, description="How the name begins.")] = None,
+    name: Annotated[
+        Annotated[str, Field(min_length=1, max_length=MAX_NAME), FreeText()] | None,
+        Query(description="How the name begins."),
+    ] = None,
     text: Annotated[
-        str | None,
-        Query(min_length=1, max_length=500, description='Words of the prompt in any form; `"a phrase"`, `or`, `-not`.'),
+        Annotated[str, Field(min_length=1, max_length=500), FreeText(lines=True)] | None,
+        Query(description='Words of the prompt in any form; `"a phrase"`, `or`, `-not`.'),
     ] = None,
     review: Annotated[list[ReviewFilter] | None, Query(description="One of these was said of it.")] = None,
 ) -> jobs.MotionFilter:
@@ -47,8 +51,8 @@ def motion_filter(
     said = review or []
     return jobs.MotionFilter(
         tags=tag or (),
-        name=name,
-        text=text,
+        name=name and unicodedata.normalize("NFC", name),  # as names and prompts are stored
+        text=text and unicodedata.normalize("NFC", text),
         reviews=[jobs.Review(each) for each in said if each is not ReviewFilter.NEW],
         unreviewed=ReviewFilter.NEW in said,
     )

@@ -10,7 +10,7 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.files import FileView
-from services.api.schemas import View
+from services.api.schemas import Comment, View
 from shared.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
 
 
@@ -30,7 +30,6 @@ class Verdict(StrEnum):
     REJECTED = "rejected"
 
 
-Comment = Annotated[str | None, Field(max_length=2000, pattern=r"^[^\x00]*$")]
 Motions = Annotated[list[UUID], Field(min_length=1, max_length=MAX_REVIEWED)]
 
 
@@ -41,7 +40,7 @@ class NewReviewBody(BaseModel):
 
     motions: Motions
     verdict: Verdict | None = Field(description="Null takes back what was said.")
-    comment: Comment = None
+    comment: Comment | None = None
 
 
 class NewRerollBody(BaseModel):
@@ -50,7 +49,7 @@ class NewRerollBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     motions: Motions
-    comment: Comment = None
+    comment: Comment | None = None
 
 
 class RerollView(View):

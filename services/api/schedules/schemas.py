@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Annotated
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.evaluations.schemas import PLAIN, AskedFields, RequestView
-from services.api.jobs.schemas import MAX_NAME
-from services.api.schemas import View
+from services.api.evaluations.schemas import AskedFields, RequestView
+from services.api.schemas import FreeText, Name, View
 from shared.jobs import EvaluationState, ScheduleRow
 
 CRON = "Minute, hour, day of the month, month, day of the week: `0 3 * * 1` is every Monday at 03:00."
 ZONE = "Of the tz database, such as `Europe/Berlin`."
-MAX_CRON, MAX_ZONE = 200, 100
+CronLine = Annotated[str, Field(min_length=1, max_length=200), FreeText()]
+Zone = Annotated[str, Field(min_length=1, max_length=100), FreeText()]
 
 
 class NewScheduleBody(AskedFields):
     """A schedule as JSON: what is measured, and when."""
 
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
-    cron: str = Field(min_length=1, max_length=MAX_CRON, description=CRON)
-    time_zone: str = Field("UTC", min_length=1, max_length=MAX_ZONE, description=ZONE)
+    name: Name | None = None
+    cron: CronLine = Field(description=CRON)
+    time_zone: Zone = Field("UTC", description=ZONE)
 
 
 class ScheduleFields(BaseModel):
@@ -30,9 +31,9 @@ class ScheduleFields(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
-    cron: str | None = Field(None, min_length=1, max_length=MAX_CRON, description=CRON)
-    time_zone: str | None = Field(None, min_length=1, max_length=MAX_ZONE, description=ZONE)
+    name: Name | None = None
+    cron: CronLine | None = Field(None, description=CRON)
+    time_zone: Zone | None = Field(None, description=ZONE)
     paused: bool | None = Field(None, description="What it misses while it is paused is not made up for.")
 
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.jobs.schemas import MAX_NAME
-from services.api.schemas import View
+from services.api.schemas import FreeText, Name, View
 from shared.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
 from shared.webhooks.addresses import MAX_URL
 
-PLAIN = r"^[^\x00-\x1f]*$"
 URL = "Where messages are sent: https, at an address that MAREY_WEBHOOK_ALLOW permits."
 PAUSED = "While it is paused its messages wait."
+Url = Annotated[str, Field(min_length=1, max_length=MAX_URL), FreeText()]
 
 
 class NewWebhookBody(BaseModel):
@@ -23,11 +22,11 @@ class NewWebhookBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    url: str = Field(min_length=1, max_length=MAX_URL, pattern=PLAIN, description=URL)
+    url: Url = Field(description=URL)
     events: list[EventKind] = Field(
         default_factory=lambda: list(EventKind), min_length=1, description="What it is told of; none given = all."
     )
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    name: Name | None = None
 
 
 class WebhookPatch(BaseModel):
@@ -35,9 +34,9 @@ class WebhookPatch(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    url: str | None = Field(None, min_length=1, max_length=MAX_URL, pattern=PLAIN, description=URL)
+    url: Url | None = Field(None, description=URL)
     events: list[EventKind] | None = Field(None, min_length=1)
-    name: str | None = Field(None, max_length=MAX_NAME, pattern=PLAIN)
+    name: Name | None = None
     paused: bool | None = Field(None, description=PAUSED)
 
 

@@ -10,6 +10,7 @@ import time
 from typing import TYPE_CHECKING
 
 from services.cli import console
+from shared.characters import escape
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -44,7 +45,7 @@ class Screen:
             return
         rows = 0 if typed is None else 1 + len(typed) // max(1, self._console.width)
         self._erase(rows)
-        self._write(f"{text}\n")
+        self._write(f"{escape(text)}\n")
         if self._line is not None:
             self._write(f"{self._line}\n")
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import pytest
 import structlog
 
+from shared.characters import LINES, find_forbidden
 from shared.runtime.logs import configure_logging, logger
 
 
@@ -66,3 +67,21 @@ def test_prompts_and_secrets_are_withheld_whoever_logs_them(capsys: pytest.Captu
     logger("test").info("submitted", prompt="a secret scene", password="hunter2", url="redis://:pw@host")
     (line,) = lines(capsys)
     assert not {"a secret scene", "hunter2", "redis://:pw@host"} & set(map(str, line.values()))
+
+
+@pytest.mark.parametrize("json_lines", [True, False])
+def test_no_line_makes_a_terminal_do_anything(capsys: pytest.CaptureFixture[str], json_lines: bool) -> None:
+    configure_logging("worker-hgm3", json=json_lines)
+    attack = "a\x1b[2J\x9b31m\x7f\u202e\ud800\nfaked line"
+    log = logger("test")
+    log.info("claimed", name=attack, several=[attack])
+    logging.getLogger("celery").warning(attack)
+    try:
+        raise ValueError(attack)
+    except ValueError:
+        log.exception("failed")
+    written = capsys.readouterr().err
+    assert find_forbidden(written, LINES) is None
+    assert not any(line.startswith("faked") for line in written.splitlines())
+    if json_lines:
+        assert json.loads(written.splitlines()[0])["name"] == attack

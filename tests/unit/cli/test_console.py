@@ -1,0 +1,114 @@
+"""Whatever a text holds, nothing that the command line prints makes a terminal do anything."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from services.cli import console
+from services.cli.live.screen import Screen
+from services.cli.main import app
+from shared.characters import LINES, find_forbidden
+
+TEXT = st.text(st.characters(), max_size=40)
+ATTACK = "a\x1b[2J\x1b]8;;http://evil\x07b\x9b31m\x7f\u202egnp.\u2066x\udc80\r"
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    encoding = "utf-8"  # type: ignore[assignment]
+
+    def isatty(self) -> bool:
+        return True
+
+
+def printed(act: Callable[[], None], *, terminal: bool) -> str:
+    out, err = (Terminal(), Terminal()) if terminal else (io.StringIO(), io.StringIO())
+    before = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = out, err
+    try:
+        with console.escaped_output():
+            act()
+    finally:
+        sys.stdout, sys.stderr = before
+    return out.getvalue() + err.getvalue()
+
+
+def harmless(text: str) -> bool:
+    """No control character is left; colours and cursor movements of our own are taken out first."""
+    return find_forbidden(re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\r", "", text), LINES) is None
+
+
+@given(TEXT)
+def test_any_text_is_printed_without_control_characters(text: str) -> None:
+    def act() -> None:
+        console.say(text)
+        console.result(text)
+        console.result_json({"text": text})
+        console.table(("text",), [(text,)])
+        print(text, file=sys.stderr)
+        sys.stdout.writelines([text])
+
+    assert find_forbidden(printed(act, terminal=False), LINES) is None
+
+
+@given(TEXT)
+def test_json_is_lossless(text: str) -> None:
+    assert json.loads(printed(lambda: console.result_json([text]), terminal=False)) == [text]
+
+
+def test_tables_bars_and_screens_of_a_terminal_escape_what_is_foreign(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def act() -> None:
+        console.table(("name",), [(ATTACK,), ("[bold]x[/bold] :smile:",)])
+        with console.bar() as bar:
+            bar.add_task("[link=http://evil]y[/link]", total=2)
+            bar.add_task(ATTACK, total=2)
+            bar.console.print(ATTACK)
+        Screen().say(ATTACK)
+
+    shown = printed(act, terminal=True)
+    assert harmless(shown)
+    assert r"a\x1b[2J" in shown
+    assert "[bold]x[/bold] :smile:" in shown
+    assert "[link=http://evil]y[/link]" in shown
+    assert "\x1b]" not in shown
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [f"jobs{ATTACK}"],
+        ["submit", f"--{ATTACK}", "a person waves"],
+        ["submit", "--priority", ATTACK, "a person waves"],
+        ["submit", "-f", ATTACK.replace("/", "") + ".csv"],
+        ["generate", "a person waves", "--name-template", ATTACK],
+    ],
+)
+def test_errors_that_quote_an_argument_escape_it(arguments: list[str]) -> None:
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code in (2, 3)
+    assert find_forbidden(done.output, LINES) is None
+
+
+def test_the_traceback_of_a_bug_is_escaped() -> None:
+    code = (
+        "import sys; from services.cli import main; main.app.command('bug')(lambda: 1 / len('') if 0 else "
+        "(_ for _ in ()).throw(RuntimeError('a\\x1b[2Jb'))); sys.argv = ['marey', 'bug']; main.run()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "RuntimeError" in done.stderr
+    assert r"a\x1b[2Jb" in done.stderr
+    assert "\x1b" not in done.stderr
