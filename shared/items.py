@@ -276,7 +276,8 @@ def _tags(value: object) -> tuple[str, ...]:
 
 
 def _tag(value: object) -> str:
-    tag = check_text(_text(value), subject="a tag")
+    tag = _text(value)
+    check_text(tag, subject=f"{tag[:80]!r} is not a tag: it")
     if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not is_printable(tag):
         raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
     return tag
