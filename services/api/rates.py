@@ -12,8 +12,6 @@ from limits import RateLimitItemPerSecond
 from limits.errors import StorageError
 from limits.storage import RedisStorage
 from limits.strategies import SlidingWindowCounterRateLimiter
-from redis.backoff import NoBackoff
-from redis.retry import Retry
 
 from shared.errors import Busy
 from shared.jobs import ApiKey
@@ -21,7 +19,7 @@ from shared.rates import Rate, read_rate
 from shared.runtime.queue import redis_client
 from shared.settings import Settings
 
-OPTIONS = "socket_timeout=0.5&socket_connect_timeout=0.5"
+TIMEOUT = 0.5
 """A counter is worth less than the request it counts: who waits longer for Redis goes without."""
 AWAY_SECONDS = 5.0
 """After Redis did not answer nobody asks it for so long: requests shall not wait for it one after the other."""
@@ -42,8 +40,7 @@ class Rates:
         self._client = self._limiter = None
         if config.queue_url is not None:
             url = config.queue_url.get_secret_value()
-            client = self._client = redis_client(f"{url}{'&' if '?' in url else '?'}{OPTIONS}")
-            client.set_retry(Retry(NoBackoff(), 1))  # once more, at once, for a connection that went stale
+            client = self._client = redis_client(url, timeout=TIMEOUT, connect_timeout=TIMEOUT)
             pool = client.connection_pool
             storage = RedisStorage("redis://", connection_pool=pool, key_prefix=PREFIX, wrap_exceptions=True)
             self._limiter = SlidingWindowCounterRateLimiter(storage)

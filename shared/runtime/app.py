@@ -10,6 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from celery import Celery
+from celery.app.amqp import AMQP
+from kombu.connection import Connection
 
 DRAIN = "marey.drain"
 """Name of the one task: `drain(queue)` claims, runs and commits until nothing is left or 300 s have passed."""
@@ -21,9 +23,17 @@ VISIBILITY_TIMEOUT = 3600
 """Redis hands an unacknowledged message to another worker after this long, running or not (celery #5935): more than
 twice the time limit, so that it never happens to a living task; the lease makes a duplicate harmless even so."""
 
-SOCKET_TIMEOUT = 30
-CONNECT_TIMEOUT = 5
-HEALTH_CHECK_INTERVAL = 25  # below the socket timeout: a dead connection is found before a read hangs on it
+SOCKET_TIMEOUT = 3.0
+"""Seconds until a call that Redis does not answer ends: every one of ours takes milliseconds, or says how long it
+blocks. Without it a connection that stays open and silent would be waited for without end; keepalives do not find it,
+for the peer's kernel goes on acknowledging."""
+CONNECT_TIMEOUT = 3.0
+HEALTH_CHECK_INTERVAL = 2
+"""A worker that waits for a hint asks with a timeout of 1 s at the server. Kombu drops the connection when no answer
+came for this many seconds longer, and looks as often: 5 s after a connection fell silent at the latest."""
+RECONNECT_START, RECONNECT_STEP, RECONNECT_MAX = 0.5, 0.5, 3.0
+"""Seconds between a worker's tries to connect again. Kombu's own grow to 30: that long a worker would stay idle after
+the queue is back."""
 
 PUBLISH_RETRY = {"max_retries": 2, "interval_start": 0.1, "interval_step": 0.2, "interval_max": 0.5}
 """Bounded: the relay must come round again rather than hang on a broker that is down (celery #4296, #6911)."""
@@ -45,9 +55,24 @@ def transport_options() -> dict[str, Any]:
     }
 
 
+class QueueConnection(Connection):
+    """A broker connection with pauses between tries that stay short."""
+
+    def ensure_connection(self, *args: Any, **options: Any) -> Any:
+        """See `kombu.Connection`. Celery's consumer passes no pauses, and has no setting for them."""
+        pauses = {"interval_start": RECONNECT_START, "interval_step": RECONNECT_STEP, "interval_max": RECONNECT_MAX}
+        return super().ensure_connection(*args, **(pauses | options))
+
+
+class QueueAMQP(AMQP):
+    """Celery's way to the broker, by `QueueConnection`."""
+
+    Connection = QueueConnection
+
+
 def create_app(queue_url: str) -> Celery:
     """The app on `queue_url` (`redis://…`, `rediss://…` or `redis+socket:///path`). Connects to nothing yet."""
-    app = Celery("marey", broker=queue_url, include=["shared.runtime.tasks"])
+    app = Celery("marey", broker=queue_url, amqp=f"{__name__}:{QueueAMQP.__name__}", include=["shared.runtime.tasks"])
     app.conf.update(
         broker_transport_options=transport_options(),
         result_backend_transport_options={"visibility_timeout": VISIBILITY_TIMEOUT},

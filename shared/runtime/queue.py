@@ -1,23 +1,82 @@
-"""A plain Redis client on the broker's URL, with the timeouts every client here must have."""
+"""The one place that makes Redis clients: each has a deadline for every call, and drops what fell silent."""
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 from __future__ import annotations
 
+import socket
+import weakref
+from collections.abc import Callable
+from typing import Any
+
 import redis
+from redis.backoff import NoBackoff
+from redis.retry import Retry
 
 from shared.runtime.app import CONNECT_TIMEOUT, HEALTH_CHECK_INTERVAL, SOCKET_TIMEOUT
 
 SOCKET_SCHEME = "redis+socket://"
 
 
-def redis_client(queue_url: str) -> redis.Redis:
-    """A client of `redis://…`, `rediss://…` or `redis+socket:///path` (kombu's spelling; redis-py says `unix://`)."""
-    options = {
-        "socket_timeout": SOCKET_TIMEOUT,
-        "socket_connect_timeout": CONNECT_TIMEOUT,
+class _OneRetry(Retry):
+    """One more try, at once, on a fresh connection; after a missed deadline every idle connection is closed too.
+
+    Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
+    cost its next user a deadline. A longer wait is the caller's to make: it knows whom to tell meanwhile.
+    """
+
+    def __init__(self, pool: redis.ConnectionPool) -> None:
+        super().__init__(NoBackoff(), 1)
+        self._pool = weakref.ref(pool)
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> _OneRetry:
+        return self  # redis-py copies it for each connection; it has no state of one
+
+    def call_with_retry(
+        self,
+        do: Callable[[], Any],
+        fail: Callable[..., Any],
+        is_retryable: Callable[[Exception], bool] | None = None,
+        with_failure_count: bool = False,
+    ) -> Any:
+        """See `redis.retry.Retry`."""
+
+        def failed(error: Exception, *count: int) -> None:
+            fail(error, *count)
+            pool = self._pool()
+            if pool is not None and isinstance(error, redis.TimeoutError | socket.timeout):
+                pool.disconnect(inuse_connections=False)
+
+        return super().call_with_retry(do, failed, is_retryable, with_failure_count)
+
+
+def redis_client(
+    queue_url: str,
+    *,
+    timeout: float = SOCKET_TIMEOUT,
+    connect_timeout: float = CONNECT_TIMEOUT,
+    max_connections: int | None = None,
+) -> redis.Redis:
+    """Make a client of `redis://…`, `rediss://…` or `redis+socket:///path` (kombu's spelling; redis-py says `unix://`).
+
+    A call on a connection that fell silent is answered after one deadline, by a new connection; where that is silent
+    too, redis-py raises its TimeoutError after two. Options in the URL override those given here.
+
+    Args:
+        timeout: deadline of each read and write, in seconds; a command that blocks must block for less.
+        connect_timeout: deadline of a connect.
+        max_connections: of the pool.
+    """
+    options: dict[str, Any] = {
+        "socket_timeout": timeout,
+        "socket_connect_timeout": connect_timeout,
         "health_check_interval": HEALTH_CHECK_INTERVAL,
     }
+    if max_connections is not None:
+        options["max_connections"] = max_connections
     if queue_url.startswith(SOCKET_SCHEME):
-        return redis.Redis.from_url("unix://" + queue_url.removeprefix(SOCKET_SCHEME), **options)
-    # redis-py raises TypeError for keepalive on a Unix socket, hence here alone.
-    return redis.Redis.from_url(queue_url, socket_keepalive=True, **options)
+        client = redis.Redis.from_url("unix://" + queue_url.removeprefix(SOCKET_SCHEME), **options)
+    else:
+        # redis-py raises TypeError for keepalive on a Unix socket, hence here alone.
+        client = redis.Redis.from_url(queue_url, socket_keepalive=True, **options)
+    client.set_retry(_OneRetry(client.connection_pool))
+    return client

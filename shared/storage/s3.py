@@ -17,6 +17,7 @@ from minio.error import InvalidResponseError, MinioException, S3Error, ServerErr
 
 from shared.errors import Unreachable
 from shared.metrics import STORE_ERRORS
+from shared.storage.deadlines import Silence, open_pool
 from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
@@ -31,13 +32,9 @@ from shared.storage.port import (
 )
 from shared.tls import UNTRUSTED_HINT, trusting_context, verification_error
 
-# The SDK's own pool waits 300 s and tries 5 times; a worker must know within seconds and release its lease.
-CONNECT_SECONDS = 3.0
-READ_SECONDS = 15.0
-RETRIES = 2
 PROBE = "doctor/none"
 """A key without an object."""
-PUTS_AT_ONCE = 8  # of one batch; the pool of connections holds 16
+PUTS_AT_ONCE = 8  # of one batch; half of the pool's connections
 MISSING = frozenset({"NoSuchKey", "404"})
 WORDLESS = frozenset({"AccessDenied", "BadRequest"})
 """Codes that the SDK makes up where an answer has no body, as that to a HEAD."""
@@ -95,10 +92,11 @@ class S3Store:
 
     def __init__(self, options: S3Options) -> None:
         self.options = options
-        self._client = _client(options, options.endpoint)
+        self._silence = Silence()
+        self._client = _client(options, options.endpoint, self._silence)
         self._puts = ThreadPoolExecutor(PUTS_AT_ONCE, thread_name_prefix="put")
-        public = options.public_endpoint
-        self._public = _client(options, public) if public and public != options.endpoint else self._client
+        public = options.public_endpoint or options.endpoint
+        self._public = self._client if public == options.endpoint else _client(options, public, self._silence)
 
     def prepare(self) -> None:
         """See `AssetStore.prepare`. Unfinished multipart uploads are the business of the bucket's lifecycle rules."""
@@ -238,6 +236,7 @@ class S3Store:
         except (urllib3.exceptions.HTTPError, OSError) as error:
             if (why := verification_error(error)) is not None:
                 raise self._untrusted(why) from error
+            self._silence.note(error)  # in the midst of an object, where no retry sees it
             cause = getattr(error, "reason", None) or error
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
@@ -277,19 +276,13 @@ class S3Store:
         )
 
 
-def _client(options: S3Options, endpoint: str) -> Minio:
+def _client(options: S3Options, endpoint: str, silence: Silence) -> Minio:
     host, secure = options.address(endpoint)
-    pool = urllib3.PoolManager(
-        maxsize=16,
-        ssl_context=trusting_context(options.ca_file) if secure else None,
-        timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
-        retries=urllib3.Retry(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504)),
-    )
     return Minio(
         host,
         access_key=options.access_key,
         secret_key=options.secret_key,
         region=options.region,  # else presigning asks the network for it
         secure=secure,
-        http_client=pool,
+        http_client=open_pool(silence, trusting_context(options.ca_file) if secure else None),
     )

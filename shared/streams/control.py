@@ -89,7 +89,7 @@ class ControlQueue:
 
         Args:
             after: id of the last message that was obeyed.
-            block_ms: how long to wait when there is none, at most 5 s; 0 does not wait.
+            block_ms: how long to wait when there is none, at most 1 s; 0 does not wait.
         """
         block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
         with reached(self.stream):

@@ -33,7 +33,7 @@ LEASE_MS = 1500
 RENEW_SECONDS = 0.4  # three renewals may fail before the lease is lost
 KEPT_FRAMES = 1200
 KEEP_MS = 3600 * 1000
-BLOCK_MS = 5000  # a read waits no longer: well under the socket timeout, and a stopping process must look up
+BLOCK_MS = 1000  # a read waits no longer: well under the deadline of a call, and a stopping process must look up
 FIELD = b"f"
 STREAM_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -246,7 +246,7 @@ class FrameReader:
 
         Args:
             count: at most so many frames.
-            block_ms: how long to wait when there is none, at most 5 s; 0 does not wait.
+            block_ms: how long to wait when there is none, at most 1 s; 0 does not wait.
         """
         block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
         with reached(self._stream.stream):

@@ -18,8 +18,7 @@ import urllib3
 from shared.errors import InvalidInput, NotFound, Unreachable
 from shared.jobs import asset_key
 from shared.settings import Settings
-from shared.storage import AssetStore, FolderStore, NewObject, open_store
-from shared.storage import s3 as s3_module
+from shared.storage import AssetStore, FolderStore, NewObject, deadlines, open_store
 from shared.storage.s3 import S3Store
 from tests.servers.swift import Swift
 
@@ -319,7 +318,7 @@ def test_a_store_that_is_set_up_wrongly_says_by_every_call_which_setting_it_is(
 
 
 def test_an_outage_is_told_and_passes(swift: Swift, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(s3_module, "RETRIES", 1)
+    monkeypatch.setattr(deadlines, "RETRIES", 1)
     store = swift.new_store()
     store.put(key_of(b"walk"), b"walk")
     swift.stop()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 import threading
 from collections.abc import Coroutine
 from concurrent.futures import Future
@@ -34,10 +35,12 @@ class StallingProxy:
     Args:
         target: path of a Unix socket, or (host, port).
         port: to listen on; 0 = any free one.
+        pace: bytes per second of one connection in one direction; None = as fast as it can.
     """
 
-    def __init__(self, target: str | tuple[str, int], *, port: int = 0) -> None:
+    def __init__(self, target: str | tuple[str, int], *, port: int = 0, pace: float | None = None) -> None:
         self._target = target
+        self._pace = pace
         self._wanted_port = port
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="stalling proxy", daemon=True)
@@ -61,6 +64,11 @@ class StallingProxy:
     def connections(self) -> int:
         """The number of open client connections, silent ones included."""
         return len(self._links)
+
+    @property
+    def silent(self) -> int:
+        """The number of open client connections that are silent."""
+        return sum(not link.flowing.is_set() for link in list(self._links))
 
     def stall(self, *, new: bool = False) -> int:
         """Make every open connection silent, in both directions; return how many.
@@ -87,8 +95,11 @@ class StallingProxy:
         return future.result(30)
 
     async def _start(self) -> None:
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self._wanted_port)
-        self.port = self._server.sockets[0].getsockname()[1]
+        listening = socket.create_server(("127.0.0.1", self._wanted_port), backlog=128)
+        if self._pace is not None:  # connections inherit it: else the kernel would take megabytes at once
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, CHUNK)
+        self._server = await asyncio.start_server(self._serve, sock=listening)
+        self.port = listening.getsockname()[1]
 
     async def _stop(self) -> None:
         self._server.close()
@@ -137,8 +148,8 @@ class StallingProxy:
         else:
             reader, writer = await asyncio.open_connection(*self._target)
         pumps = [
-            asyncio.create_task(_pump(link, link.reader, writer)),
-            asyncio.create_task(_pump(link, reader, link.writer)),
+            asyncio.create_task(_pump(link, link.reader, writer, self._pace)),
+            asyncio.create_task(_pump(link, reader, link.writer, self._pace)),
         ]
         try:
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
@@ -149,8 +160,10 @@ class StallingProxy:
             writer.close()
 
 
-async def _pump(link: _Link, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+async def _pump(link: _Link, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, pace: float | None) -> None:
     while data := await reader.read(CHUNK):
         await link.flowing.wait()
         writer.write(data)
         await writer.drain()
+        if pace is not None:
+            await asyncio.sleep(len(data) / pace)

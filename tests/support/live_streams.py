@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import socket
+import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ import sqlalchemy as sa
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from shared.errors import InvalidInput
 from shared.jobs import StreamChunk, StreamState, add_chunk, end_stream, take_stream, transaction
 from shared.settings import REPOSITORY, Settings
 from shared.streams.control import START, Control, ControlQueue
@@ -78,7 +80,10 @@ class Hand:
 
     def heard(self) -> list[Control]:
         """What was asked since the last call, or, if nothing was, what comes next."""
-        found = self._queue.read(self._read, block_ms=5000)
+        found: list[tuple[str, Control | InvalidInput]] = []
+        until = time.monotonic() + 5.0
+        while not found and time.monotonic() < until:
+            found = self._queue.read(self._read, block_ms=1000)
         self._read = found[-1][0] if found else self._read
         return [control for _, control in found if isinstance(control, Control)]
 

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from anyio import CapacityLimiter, to_thread
-from redis.backoff import NoBackoff
-from redis.retry import Retry
 
 from shared.errors import Busy
 from shared.metrics import SOCKETS as SOCKETS_OPEN
@@ -22,9 +20,6 @@ SOCKETS = 200
 CALLS = 16
 """Threads for all that answers at once; the database's pool holds 20, and the routes want some."""
 RETRY_SECONDS = 5
-# Of redis-py's own 100 connections the sockets would use twice as many; no read here waits over a second, so that
-# silence for five means that Redis is away. What stands in the URL of an operator comes first, and wins.
-OPTIONS = f"max_connections={2 * SOCKETS}&socket_timeout=5"
 
 
 class Hub:
@@ -35,10 +30,8 @@ class Hub:
     """
 
     def __init__(self, url: str) -> None:
-        self.redis = redis_client(f"{url}{'&' if '?' in url else '?'}{OPTIONS}")
-        # One more try, at once, for a connection that went stale. A longer wait is the caller's to make: it has
-        # somebody to tell meanwhile.
-        self.redis.set_retry(Retry(NoBackoff(), 1))
+        # The sockets would use twice as many as redis-py's own 100 connections.
+        self.redis = redis_client(url, max_connections=2 * SOCKETS)
         self._reads = CapacityLimiter(SOCKETS)
         self._calls = CapacityLimiter(CALLS)
         self._places = SOCKETS

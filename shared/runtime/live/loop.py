@@ -63,6 +63,8 @@ class LiveLoop:
         self._held: dict[int, Held] = {}
         self.room = open_room()
         self.ticked = clock()
+        self._away: Unreachable | None = None
+        """Why Redis did not take the frames of this tick: the other streams do not wait for it again."""
         self.finished = threading.Event()
         """Set when `run` has returned: nobody will show a frame any more."""
 
@@ -82,6 +84,7 @@ class LiveLoop:
     def tick(self) -> None:
         """Obey what was asked, then make one frame of every stream that plays."""
         self.ticked = self._clock()
+        self._away = None
         while not self._calls.empty():
             self._calls.get()()
         for held in list(self._held.values()):
@@ -201,16 +204,19 @@ class LiveLoop:
 
     def _write(self, held: Held) -> None:
         try:
-            held.frames.write(held.lease, held.unwritten)
+            if self._away is None:
+                held.frames.write(held.lease, held.unwritten)
         except Unreachable as error:
-            if len(held.unwritten) > MOST_UNWRITTEN:
-                self._close(held, "Redis did not answer", error)
-            return
+            self._away = error
         except LeaseLost:
             log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
             held.lost = True
             metrics.LIVE_LOST.inc()
             self._close(held, "another worker has it")
+            return
+        if self._away is not None:
+            if len(held.unwritten) > MOST_UNWRITTEN:
+                self._close(held, "Redis did not answer", self._away)
             return
         metrics.LIVE_FRAMES.inc(len(held.unwritten))
         held.unwritten.clear()

@@ -25,6 +25,8 @@ from shared.settings import Settings
 log = logger(__name__)
 
 STOP_SECONDS = 10.0
+REDIS_SECONDS = 1.0
+"""Deadline of a call: frames stand still for so long when a connection falls silent, and a lease lasts 1.5 s."""
 
 
 def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | None = None) -> int:
@@ -55,7 +57,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     module, _, attribute = factory.partition(":")
     show = cast("ShowFactory", getattr(importlib.import_module(module), attribute))()
     engine = create_engine(chosen.database_url.get_secret_value())
-    client = redis_client(queue_url.get_secret_value())
+    client = redis_client(queue_url.get_secret_value(), timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS)
     name = f"live-{socket.gethostname()}-{os.getpid()}"
     keeper: Keeper
     loop = LiveLoop(lambda: show.open_room(chosen.live_slots), lambda over: keeper.over(over))

@@ -1,0 +1,117 @@
+"""HTTP connections to an object store: a deadline for each read and write, and none of the pool that fell silent.
+
+A deadline counts one operation on the socket, never a whole object: one that moves slowly but steadily takes as long
+as it takes.
+"""
+
+# pyright: reportAttributeAccessIssue=false, reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+from __future__ import annotations
+
+import math
+import socket
+import ssl
+import time
+from collections.abc import Iterable
+from typing import Any
+
+import urllib3
+from urllib3.connection import HTTPConnection, HTTPSConnection
+
+# The SDK's own pool waits 300 s and tries 5 times; a worker must know within seconds and release its lease.
+CONNECT_SECONDS = 3.0
+"""Deadline of a connect, and of each write."""
+READ_SECONDS = 6.0
+"""Deadline of each read; the first waits until the store has put an object on its disks."""
+RETRIES = 2
+CONNECTIONS = 16
+WRITE_BYTES = 1 << 16
+"""Bytes of one write: Python's `sendall` has one deadline for all that it is given."""
+UNSENT_BYTES = 1 << 17
+"""Bytes that the kernel takes ahead of the network. Megabytes, as by default, would drain while the deadline of the
+answer runs already."""
+
+
+class Silence:
+    """When a connection last missed a deadline; what was opened earlier is not used again.
+
+    Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
+    cost its next user a deadline.
+    """
+
+    def __init__(self) -> None:
+        self.last = -math.inf
+
+    def note(self, error: BaseException | None) -> None:
+        """Note an error, if it is a missed deadline."""
+        while error is not None:
+            if isinstance(error, TimeoutError | urllib3.exceptions.TimeoutError):
+                self.last = time.monotonic()
+                return
+            error = error.__cause__ or error.__context__
+
+
+def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolManager:
+    """Make the connections of one client.
+
+    Args:
+        silence: shared by the clients of one store.
+        trust: for https; None = the default of urllib3.
+    """
+
+    class Deadlines:
+        """Mixed into urllib3's connections."""
+
+        opened = -math.inf
+        sock: socket.socket | None
+
+        def connect(self) -> None:
+            super().connect()
+            self.opened = time.monotonic()
+
+        @property
+        def is_connected(self) -> bool:
+            """Asked by the pool before it uses a connection again."""
+            return super().is_connected and self.opened > silence.last
+
+        def send(self, data: Any) -> None:
+            """Send in pieces, each with a deadline of its own."""
+            pieces: Iterable[Any] = (data,)
+            if isinstance(data, bytes | bytearray | memoryview):
+                view = memoryview(data)
+                pieces = (view[first : first + WRITE_BYTES] for first in range(0, len(view), WRITE_BYTES))
+            for piece in pieces:
+                super().send(piece)
+
+    class Connection(Deadlines, HTTPConnection):
+        pass
+
+    class TlsConnection(Deadlines, HTTPSConnection):
+        pass
+
+    class Pool(urllib3.HTTPConnectionPool):
+        ConnectionCls = Connection  # pyright: ignore[reportAssignmentType]
+
+    class TlsPool(urllib3.HTTPSConnectionPool):
+        ConnectionCls = TlsConnection  # pyright: ignore[reportAssignmentType]
+
+    class Retries(urllib3.Retry):
+        def increment(self, *args: Any, **options: Any) -> urllib3.Retry:
+            silence.note(options.get("error"))
+            return super().increment(*args, **options)
+
+    manager = urllib3.PoolManager(
+        maxsize=CONNECTIONS,
+        ssl_context=trust,
+        timeout=urllib3.Timeout(connect=CONNECT_SECONDS, read=READ_SECONDS),
+        retries=Retries(total=RETRIES, backoff_factor=0.2, status_forcelist=(500, 502, 503, 504)),
+        socket_options=_socket_options(),
+    )
+    manager.pool_classes_by_scheme = {"http": Pool, "https": TlsPool}
+    return manager
+
+
+def _socket_options() -> list[tuple[int, int, int]]:
+    option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # Linux and macOS have it
+    little_unsent = [] if option is None else [(socket.IPPROTO_TCP, option, UNSENT_BYTES)]
+    return [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1), *little_unsent]
