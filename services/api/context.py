@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import sqlalchemy as sa
 from fastapi import Depends
@@ -14,7 +14,7 @@ from services.api.catalogue import Catalogue
 from services.api.rates import Rates
 from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
-from shared.jobs import transaction
+from shared.jobs import Deadline, transaction
 from shared.settings import Settings
 from shared.storage import AssetStore
 
@@ -51,9 +51,23 @@ connection while it waits for a thread, and its key is looked up on another: if 
 requests at once would wait for each other until the pool's patience is over."""
 
 
-def connection(shared: Shared) -> Iterator[sa.Connection]:
+DEADLINE = "marey_deadline"
+Route = TypeVar("Route", bound=Callable[..., object])
+
+
+def deadline(kind: Deadline) -> Callable[[Route], Route]:
+    """Decorate a route whose `Connection` makes calls of this kind (`shared.jobs.deadlines`)."""
+
+    def mark(route: Route) -> Route:
+        setattr(route, DEADLINE, kind)
+        return route
+
+    return mark
+
+
+def connection(shared: Shared, asked: HTTPConnection) -> Iterator[sa.Connection]:
     """A transaction that lasts as long as the route's function, and commits before the answer is sent."""
-    with transaction(shared.engine) as conn:
+    with transaction(shared.engine, getattr(asked.scope.get("endpoint"), DEADLINE, None)) as conn:
         yield conn
 
 

@@ -20,7 +20,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationErro
 
 from shared.errors import Conflict, InvalidFile, InvalidInput, NotFound
 from shared.hashing import sha256_of
-from shared.jobs import asset_key, get_tenant, transaction
+from shared.jobs import BACKUP, asset_key, get_tenant, transaction
 from shared.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
 from shared.motion.files import write_atomically
 from shared.storage import AssetStore
@@ -65,7 +65,7 @@ def export_tenant(
         Conflict: a job changed meanwhile.
         NotFound: no such tenant; or the store lacks a file: data loss, told and not passed over.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, BACKUP) as conn:
         get_tenant(conn, tenant)
         jobs, running = ended_jobs(conn, tenant)
     _prepare(folder)
@@ -73,7 +73,7 @@ def export_tenant(
     items = 0
     files: dict[str, int] = {}
     for job in jobs:
-        with transaction(engine) as conn:
+        with transaction(engine, BACKUP) as conn:
             conn.execute(sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
             backup = back_up(conn, tenant, job)
         data = b"".join(_lines(backup))
@@ -104,7 +104,7 @@ def import_tenant(
         InvalidFile: anything is missing, has another hash, or is none of ours; nothing was written then.
         Conflict: another tenant has a job of it.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, BACKUP) as conn:
         get_tenant(conn, tenant)
     manifest = read_manifest(folder)
     for job, entry in manifest.jobs.items():
@@ -190,14 +190,14 @@ def _save(store: AssetStore, tenant: str, sha256: str, folder: Path) -> None:
 def _restore(engine: sa.Engine, store: AssetStore, tenant: str, folder: Path, backup: JobBackup) -> bool:
     assets = list(backup.assets().values())
     for attempt in range(1, TRIES + 1):
-        with transaction(engine) as conn:
+        with transaction(engine, BACKUP) as conn:
             announce(conn, tenant, assets)
         for asset in assets:
             key = asset_key(tenant, asset.sha256)
             if not store.exists(key):
                 store.put(key, _content(folder, asset.sha256), media_type=asset.media_type)
         try:
-            with transaction(engine) as conn:
+            with transaction(engine, BACKUP) as conn:
                 return restore(conn, tenant, backup)
         except Conflict:
             if attempt == TRIES:

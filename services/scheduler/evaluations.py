@@ -12,6 +12,7 @@ from shared.errors import MareyError, QuotaUsedUp, Unreachable
 from shared.evaluating import plan_evaluation, scoring_job
 from shared.items import InvalidItems
 from shared.jobs import (
+    BULK,
     MAX_MISSING,
     EvaluationJob,
     EvaluationRow,
@@ -77,7 +78,7 @@ class Evaluations:
             log.info("schedule_fired", schedule=str(schedule), evaluation=str(made))
 
     def _step(self, evaluation: UUID) -> None:
-        with transaction(self._engine) as conn:
+        with transaction(self._engine, BULK) as conn:
             row = lock_evaluation(conn, evaluation, skip_locked=True)
             if row is None:
                 return

@@ -13,11 +13,11 @@ from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waitin
 from shared.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
-    Listener,
-    Notification,
     create_engine,
+    outages,
     transaction,
 )
+from shared.jobs.deadlines import BACKUP, BULK, HEARTBEAT, MAINTENANCE, SEARCH, Deadline
 from shared.jobs.deliveries import (
     claim_deliveries,
     delivery_attempts,
@@ -92,6 +92,7 @@ from shared.jobs.lease_types import (
     WorkerBeat,
     WorkerRow,
 )
+from shared.jobs.listener import Listener, Notification
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
@@ -191,12 +192,16 @@ from shared.jobs.webhooks import (
 from shared.jobs.workers import beat, list_workers, live_workers, retire
 
 __all__ = [
+    "BACKUP",
+    "BULK",
     "BUNDLE_SOURCES",
     "COMPOSITIONAL",
     "DEFAULT_TENANT",
     "EVALUATOR_QUEUE",
     "EVENT_CHANNEL",
+    "HEARTBEAT",
     "KEPT",
+    "MAINTENANCE",
     "MAX_KEEP_DAYS",
     "MAX_MISSING",
     "MAX_REVIEWED",
@@ -205,6 +210,7 @@ __all__ = [
     "QUEUE_CHANNEL",
     "REPORT_FORMATS",
     "SCOPES",
+    "SEARCH",
     "SEED_LIMIT",
     "TEST_SPLIT",
     "TEXT_QUEUE",
@@ -217,6 +223,7 @@ __all__ = [
     "Claim",
     "ClaimedItem",
     "Committed",
+    "Deadline",
     "DeliveryRow",
     "DeliveryState",
     "DueDelivery",
@@ -363,6 +370,7 @@ __all__ = [
     "open_evaluations",
     "open_stream_counts",
     "open_streams",
+    "outages",
     "outbox_state",
     "overdue_leases",
     "pause",

@@ -1,66 +1,89 @@
-"""The engine, transactions and notifications. SQLAlchemy Core over psycopg 3, synchronous."""
+"""The engine and transactions. SQLAlchemy Core over psycopg 3, synchronous."""
 
 from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import Any
 
 import psycopg
 import sqlalchemy as sa
-from psycopg import sql
 from sqlalchemy import event, exc
 
 from shared.errors import Unreachable
+from shared.jobs.connections import ConnectionGroup, DeadlineConnection, group_of, milliseconds, open_connection
+from shared.jobs.deadlines import ORDINARY, PING_SECONDS, Deadline
 
 QUEUE_CHANNEL = "marey_queue"
 """NOTIFY channel: items of the queue in the payload became ready."""
 EVENT_CHANNEL = "marey_event"
 """NOTIFY channel: the job in the payload has new events."""
 
-CONNECT_TIMEOUT = 5  # seconds; libpq waits for ever by default
-# Beyond any statement of ours (100,000 items cancelled in one take 3 s), short of a hung process.
-STATEMENT_TIMEOUT = 60_000  # milliseconds
-# A client that was stopped or cut off in the middle must not hold a job's lock for ever.
-IDLE_TIMEOUT = 60_000  # milliseconds
+POOL_SECONDS = 10
+"""A thread waits so long for another to give a connection back."""
+GROUP, DEADLINE = "marey_group", "marey_deadline"
+"""Execution options of an engine: its connection group, and the limits its sessions are set up with."""
+SET_LOCAL = sa.text("""
+    SELECT set_config('statement_timeout', :statement, true),
+        set_config('idle_in_transaction_session_timeout', :idle, true)
+""")
 
 
-def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10) -> sa.Engine:
+def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadline: Deadline = ORDINARY) -> sa.Engine:
     """An engine for `postgresql+psycopg://…` (plain `postgresql://` is taken as the same).
 
-    Connections are checked before use, so a restarted server costs no failed transaction.
+    Connections are checked before use, so a restarted server costs no failed transaction. Every round trip has a
+    deadline (`shared.jobs.deadlines`); `deadline` is that of transactions that name no other.
     """
     parsed = sa.make_url(url).set(drivername="postgresql+psycopg")
+    group = group_of(parsed)
     engine = sa.create_engine(
         parsed,
         pool_size=pool_size,
         max_overflow=max_overflow,
         pool_pre_ping=True,
         hide_parameters=True,  # an error's text goes to logs, and parameters hold prompts
-        pool_timeout=CONNECT_TIMEOUT * 2,
-        connect_args={"connect_timeout": CONNECT_TIMEOUT, "application_name": "marey"},
+        pool_timeout=POOL_SECONDS,
+        connect_args={"application_name": "marey"},
+        execution_options={GROUP: group, DEADLINE: deadline},
     )
 
-    @event.listens_for(engine, "connect")
-    def _set_up(connection: psycopg.Connection[tuple[object, ...]], _record: object) -> None:
-        connection.execute("SELECT set_config('statement_timeout', %s, false)", (str(STATEMENT_TIMEOUT),))
-        connection.execute("SELECT set_config('idle_in_transaction_session_timeout', %s, false)", (str(IDLE_TIMEOUT),))
-        connection.execute("SET timezone = 'UTC'")
-        connection.commit()
+    @event.listens_for(engine, "do_connect")
+    def _connect(_dialect: object, _record: object, arguments: list[Any], options: dict[str, Any]) -> Any:
+        return open_connection(group, deadline, *arguments, **options)
+
+    @event.listens_for(engine, "checkout")
+    def _check_out(connection: DeadlineConnection, _record: object, _fairy: object) -> None:
+        connection.limit = deadline.answer  # after the check before use, which has the limit of a ping
+        group.answered()
+
+    @event.listens_for(engine, "checkin")
+    def _check_in(connection: DeadlineConnection | None, _record: object) -> None:
+        if connection is not None:
+            connection.limit = PING_SECONDS
 
     return engine
 
 
 @contextmanager
-def transaction(engine: sa.Engine) -> Generator[sa.Connection]:
+def transaction(engine: sa.Engine, deadline: Deadline | None = None) -> Generator[sa.Connection]:
     """One transaction: commits at the end, rolls back on an exception.
+
+    Args:
+        deadline: the kind of its calls (`shared.jobs.deadlines`); None = the engine's.
 
     Raises:
         Unreachable: the database does not answer, or went away in the middle (nothing is written then, unless it went
             away exactly during the commit: the caller's idempotency or lease token sorts that out).
     """
+    options = engine.get_execution_options()
+    group: ConnectionGroup = options[GROUP]
+    chosen: Deadline = deadline or options[DEADLINE]
     try:
-        with engine.begin() as connection:
+        with group.turn():
+            connection = engine.connect()
+        with connection, connection.begin():
+            _limit(connection, chosen)
             yield connection
     except (exc.OperationalError, exc.TimeoutError, psycopg.OperationalError) as error:
         raise unreachable(error) from error
@@ -70,66 +93,36 @@ def transaction(engine: sa.Engine) -> Generator[sa.Connection]:
         raise
 
 
+def _limit(connection: sa.Connection, deadline: Deadline) -> None:
+    """Apply the limits of a kind of call to the transaction that begins; costs a round trip if the session has others.
+
+    Behind a pooler always: the session may be any.
+    """
+    driver = connection.connection.driver_connection
+    assert isinstance(driver, DeadlineConnection)
+    driver.limit = deadline.answer
+    if driver.pooled or driver.deadline != deadline:
+        statement, idle = milliseconds(deadline)
+        connection.execute(SET_LOCAL, {"statement": statement, "idle": idle})
+
+
+def outages(engine: sa.Engine) -> int:
+    """How often this process has found the database of `engine` silent: an outage that retries may have hidden."""
+    return engine.get_execution_options()[GROUP].misses
+
+
 def unreachable(error: BaseException) -> Unreachable:
     """The expected error for a database that does not answer, or has no room."""
     cause = getattr(error, "orig", None) or error
     if isinstance(cause, psycopg.errors.DiskFull):  # its text names a file of the server
         hint = "Make room on the disk of Postgres; what waits goes on by itself."
         return Unreachable("the database has no room left", where="database", hint=hint)
+    if isinstance(cause, psycopg.errors.QueryCanceled):
+        hint = "It is overloaded, or another transaction holds a lock for long. Try again."
+        return Unreachable("the database took too long for a statement", where="database", hint=hint)
     first_line = (str(cause).splitlines() or [type(cause).__name__])[0]
     return Unreachable(
         f"the database does not answer ({first_line})",
         where="database",
         hint="Is it running, and is MAREY_DATABASE_URL right? Embedded: `marey serve` starts it.",
     )
-
-
-@dataclass(frozen=True)
-class Notification:
-    """A NOTIFY: `payload` is a queue's name or a job's id, by channel."""
-
-    channel: str
-    payload: str
-
-
-class Listener:
-    """A connection of its own that LISTENs; for the relay and for the API's tailer. Not shared between threads."""
-
-    def __init__(self, url: str, channels: tuple[str, ...]) -> None:
-        """Connect and listen.
-
-        Raises:
-            Unreachable: the database does not answer. Make a new one later, and look at the tables once: what was
-                notified in between is not told again.
-        """
-        dsn = sa.make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)
-        try:
-            self._connection = psycopg.connect(dsn, autocommit=True, connect_timeout=CONNECT_TIMEOUT)
-            for channel in channels:
-                self._connection.execute(sql.SQL("LISTEN {}").format(sql.Identifier(channel)))
-        except psycopg.OperationalError as error:
-            raise unreachable(error) from error
-
-    def wait(self, timeout: float) -> list[Notification]:
-        """The notifications that arrive within `timeout` seconds: returns at once with the first ones, [] if none.
-
-        Raises:
-            Unreachable: the connection is gone.
-        """
-        try:
-            return [
-                Notification(notify.channel, notify.payload)
-                for notify in self._connection.notifies(timeout=timeout, stop_after=1)
-            ]
-        except psycopg.OperationalError as error:
-            raise unreachable(error) from error
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._connection.close()
-
-    def __enter__(self) -> Listener:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

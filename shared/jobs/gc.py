@@ -13,6 +13,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from shared.jobs import schema
 from shared.jobs.database import transaction
+from shared.jobs.deadlines import MAINTENANCE
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, among, interval
 from shared.jobs.policy import Policy, policy
@@ -86,11 +87,11 @@ def _unreferenced() -> sa.ColumnElement[bool]:
 
 def _remove_unreferenced(engine: sa.Engine, store: ObjectStore, condition: sa.ColumnElement[bool]) -> int:
     table = schema.asset.c
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         candidates: Sequence[UUID] = conn.execute(sa.select(table.id).where(condition)).scalars().all()
     removed = 0
     for candidate in candidates:
-        with transaction(engine) as conn:
+        with transaction(engine, MAINTENANCE) as conn:
             # The row first, then the question: whoever announced it meanwhile is seen now, who comes later waits.
             row = conn.execute(
                 sa.select(table.tenant_id, table.sha256).where(table.id == candidate).with_for_update()
@@ -107,7 +108,7 @@ def _remove_unreferenced(engine: sa.Engine, store: ObjectStore, condition: sa.Co
 def _known(engine: sa.Engine, keys: Sequence[str]) -> set[str]:
     table = schema.asset.c
     digests = [key.rpartition("/")[2] for key in keys]
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         rows = conn.execute(sa.select(table.tenant_id, table.sha256).where(among(table.sha256, digests))).all()
     return {asset_key(row.tenant_id, row.sha256) for row in rows}
 
@@ -117,7 +118,7 @@ def _remove_orphan(engine: sa.Engine, store: ObjectStore, key: str) -> bool:
     found = KEY.fullmatch(key)
     assert found is not None
     tenant, sha256 = found.groups()
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         known = conn.execute(sa.select(schema.tenant.c.id).where(schema.tenant.c.id == tenant)).one_or_none()
         if known is None:
             store.delete(key)
@@ -139,7 +140,7 @@ def _remove_orphan(engine: sa.Engine, store: ObjectStore, key: str) -> bool:
 def _missing(engine: sa.Engine, store: ObjectStore, found: set[str]) -> tuple[str, ...]:
     """Keys of stored assets that the listing lacked, and that are stored still."""
     table = schema.asset.c
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         rows = conn.execute(sa.select(table.tenant_id, table.sha256).where(table.state == "stored")).all()
     lacking = {asset_key(row.tenant_id, row.sha256) for row in rows} - found
     if not lacking:

@@ -16,6 +16,7 @@ from alembic.util import CommandError
 
 from shared.errors import Conflict, Unreachable
 from shared.jobs.database import transaction
+from shared.jobs.deadlines import MIGRATION
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
 LOCK_SECONDS = 3.0
@@ -49,7 +50,7 @@ def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: s
     until = time.monotonic() + patience
     while True:
         try:
-            with transaction(engine) as conn:
+            with transaction(engine, MIGRATION) as conn:
                 move(_config(conn), revision)
             return
         except Unreachable as error:
@@ -101,7 +102,6 @@ def _folder() -> Path:
 
 
 def _config(conn: sa.Connection) -> Config:
-    conn.execute(sa.text("SET LOCAL statement_timeout = 0"))
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
     conn.execute(sa.text(f"SET LOCAL lock_timeout = {int(LOCK_SECONDS * 1000)}"))
     config = Config()

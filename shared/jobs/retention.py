@@ -14,6 +14,7 @@ from sqlalchemy.dialects.postgresql import insert
 from shared.errors import Conflict, InvalidFile, NotFound
 from shared.jobs import schema
 from shared.jobs.database import transaction
+from shared.jobs.deadlines import BULK, MAINTENANCE
 from shared.jobs.gc import ObjectStore, asset_key, remove_unused_assets
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, lock_job_of, record
@@ -82,12 +83,12 @@ def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
     Raises:
         Unreachable: the store or the database does not answer.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         late = conn.execute(LATE, {"job": None, "limit": ROUND}).all()
     deleted = 0
     for job, tenant in late:
         try:
-            with transaction(engine) as conn:
+            with transaction(engine, BULK) as conn:
                 refuse_needed(conn, tenant, job)
                 lock_job_of(conn, tenant, job)
                 if conn.execute(LATE, {"job": job, "limit": 1}).one_or_none() is not None:  # not gone on meanwhile
@@ -132,7 +133,7 @@ def rewrite_files(engine: sa.Engine, store: FileStore, scrub: Callable[[bytes], 
     Raises:
         Unreachable: the store or the database does not answer; what was not done is done the next time.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         waiting = _waiting(conn)
     done = sum(_rewrite(engine, store, file, scrub) for file in waiting)
     if waiting:
@@ -199,19 +200,19 @@ def _rewrite(engine: sa.Engine, store: FileStore, file: _File, scrub: Callable[[
     try:
         data = scrub(store.get(asset_key(file.tenant, file.sha256)))
     except (InvalidFile, NotFound):
-        with transaction(engine) as conn:
+        with transaction(engine, MAINTENANCE) as conn:
             conn.execute(sa.delete(schema.motion_file).where(_row_of(file)))
         return True
     sha256 = hashlib.sha256(data).hexdigest()
     values = {"tenant_id": file.tenant, "sha256": sha256, "size": len(data), "media_type": file.media_type}
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         announced = insert(schema.asset).values(id=new_id(), state="writing", announced_at=CLOCK, **values)
         conn.execute(
             announced.on_conflict_do_update(index_elements=["tenant_id", "sha256"], set_={"announced_at": CLOCK})
         )
     store.put(asset_key(file.tenant, sha256), data)
     table = schema.asset.c
-    with transaction(engine) as conn:
+    with transaction(engine, MAINTENANCE) as conn:
         ours = conn.execute(
             sa.update(schema.asset)
             .where(table.tenant_id == file.tenant, table.sha256 == sha256)

@@ -9,6 +9,7 @@ import sqlalchemy as sa
 
 from shared.jobs import schema
 from shared.jobs.database import transaction
+from shared.jobs.deadlines import BULK
 from shared.jobs.deliveries import forget_events
 from shared.jobs.held import drop_empty_lease, end_dead, give_back, held_items
 from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
@@ -39,9 +40,9 @@ def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
         with transaction(engine) as conn:
             total = _added(total, _take_back(conn, job, rules))
     for job in due:
-        with transaction(engine) as conn:
+        with transaction(engine, BULK) as conn:
             total = _added(total, SweepReport(items_due=_make_due_ready(conn, job)))
-    with transaction(engine) as conn:
+    with transaction(engine, BULK) as conn:
         return _added(total, SweepReport(stale_assets=_tidy(conn, rules)))
 
 

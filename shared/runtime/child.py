@@ -15,8 +15,8 @@ from typing import cast
 from uuid import UUID
 
 from shared.errors import InvalidInput, Unreachable
+from shared.jobs import HEARTBEAT, WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
 from shared.jobs import Heartbeat as Answer
-from shared.jobs import WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
 from shared.runtime.committer import Committer
 from shared.runtime.exposition import expose, measure_gpu
 from shared.runtime.faults import patiently
@@ -65,7 +65,8 @@ class Child:
         self._name = name
         self._settings = chosen
         self._engine = create_engine(url, pool_size=4)
-        self._beats = create_engine(url, pool_size=1)  # a heartbeat never waits for a commit's connection
+        # Of its own: a heartbeat never waits for a commit's connection.
+        self._beats = create_engine(url, pool_size=1, deadline=HEARTBEAT)
         self._stopping = threading.Event()
         self._ready = False
         self._ticked = time.monotonic()

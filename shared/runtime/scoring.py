@@ -9,7 +9,16 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from shared.errors import NotFound
-from shared.jobs import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem, asset_key, load_score, transaction
+from shared.jobs import (
+    SEARCH,
+    EarlierRun,
+    EvaluationJob,
+    EvaluationRequest,
+    MadeItem,
+    asset_key,
+    load_score,
+    transaction,
+)
 from shared.storage import AssetStore
 
 
@@ -62,7 +71,7 @@ def score_input(engine: sa.Engine, store: AssetStore, job: UUID) -> ScoreInput:
         NotFound, Conflict: as `load_score`.
         Unreachable: the database does not answer.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, SEARCH) as conn:
         rows = load_score(conn, job)
     evaluation = rows.evaluation
     assert evaluation.prompts is not None  # `load_score` looks

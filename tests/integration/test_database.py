@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from shared.errors import Unreachable
 from shared.jobs import Listener, create_engine, get_job, sweep, transaction, upgrade
 from shared.jobs.database import EVENT_CHANNEL
+from shared.jobs.deadlines import ORDINARY
 from shared.runtime.embedded import start_postgres
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
@@ -65,7 +66,7 @@ def test_a_client_that_stops_in_the_middle_does_not_hold_a_job_for_ever(engine: 
             conn.execute(sa.text(f"SHOW {name}")).scalar_one()
             for name in ("statement_timeout", "idle_in_transaction_session_timeout", "timezone")
         ]
-    assert limits == ["1min", "1min", "UTC"]
+    assert limits == [f"{ORDINARY.statement:g}s", f"{ORDINARY.idle:g}s", "UTC"]
 
 
 def test_an_address_that_nobody_answers_is_unreachable_within_seconds() -> None:

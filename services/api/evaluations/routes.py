@@ -11,7 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.bodies import read_body
-from services.api.context import Connection, Shared
+from services.api.context import Connection, Shared, deadline
 from services.api.evaluations import service
 from services.api.evaluations.comparison import ComparisonView, compare_runs
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
@@ -48,6 +48,7 @@ async def begin_evaluation(
 
 
 @router.get("")
+@deadline(jobs.SEARCH)
 def list_evaluations(
     conn: Connection,
     key: Reader,
@@ -67,6 +68,7 @@ def get_evaluation(evaluation: UUID, conn: Connection, key: Reader) -> Evaluatio
 
 
 @router.delete("/{evaluation}", status_code=202)
+@deadline(jobs.BULK)
 def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> EvaluationDetailView:
     """Cancel an evaluation and the job that runs for it. One that is over stays as it is."""
     note(conn, key, "evaluation.cancel", evaluation)

@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from shared import metrics
 from shared.jobs import (
+    SEARCH,
     Outbox,
     QueueDepth,
     live_workers,
@@ -34,7 +35,7 @@ def render(engine: sa.Engine) -> bytes:
     Raises:
         Unreachable: the database does not answer.
     """
-    with transaction(engine) as conn:
+    with transaction(engine, SEARCH) as conn:
         depths, workers = queue_depths(conn), live_workers(conn)
         streams, outbox = open_stream_counts(conn), outbox_state(conn)
     with _rendering:  # two scrapes at once would clear each other's gauges

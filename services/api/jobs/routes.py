@@ -14,7 +14,7 @@ from services.api import schemas
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
 from services.api.bodies import kept_body
-from services.api.context import Connection, Context, Shared
+from services.api.context import Connection, Context, Shared, deadline
 from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
 from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
@@ -112,7 +112,7 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
 
 def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) -> JSONResponse:
     by_bundle = submission.by_bundle
-    with jobs.transaction(shared.engine) as conn:
+    with jobs.transaction(shared.engine, jobs.SEARCH) as conn:
         rooms = jobs.check_room(conn, key.tenant, submission.count)
         estimate = jobs.estimate(conn, by_bundle)
         waiting = jobs.waiting_items(conn)
@@ -139,7 +139,7 @@ def _write(
         body_sha256=sha256,
         **submission.fields.model_dump(),
     )
-    with tracing.span("submit", tenant=key.tenant) as span, jobs.transaction(shared.engine) as conn:
+    with tracing.span("submit", tenant=key.tenant) as span, jobs.transaction(shared.engine, jobs.BULK) as conn:
         submitted = jobs.submit(conn, new)
         row = jobs.get_job(conn, key.tenant, submitted.id)
         if not submitted.replayed:
@@ -153,6 +153,7 @@ def _write(
 
 
 @router.get("")
+@deadline(jobs.SEARCH)
 def list_jobs(
     conn: Connection,
     key: Reader,
@@ -172,12 +173,14 @@ def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
 
 
 @router.get("/{job}/queue")
+@deadline(jobs.SEARCH)
 def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
     """What comes before the job's items, and when it may be done: from what was measured here, or no number."""
     return QueueView.of(jobs.place_of(conn, key.tenant, job))
 
 
 @router.patch("/{job}")
+@deadline(jobs.BULK)
 def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Change the priority, the comment or the share of failed items that ends the job early.
 
@@ -198,6 +201,7 @@ def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reaso
 
 
 @router.delete("/{job}", status_code=204, response_class=Response)
+@deadline(jobs.BULK)
 def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
     """Delete a job that has ended, with its motions."""
     jobs.delete(conn, key.tenant, job)
@@ -205,6 +209,7 @@ def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
 
 
 @router.post("/{job}/pause")
+@deadline(jobs.BULK)
 def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Give out no more items; those being made are finished."""
     note(conn, key, "job.pause", job, reason=reason)
@@ -212,6 +217,7 @@ def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None)
 
 
 @router.post("/{job}/resume")
+@deadline(jobs.BULK)
 def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Go on with a paused job."""
     note(conn, key, "job.resume", job, reason=reason)
@@ -219,6 +225,7 @@ def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 
 
 @router.post("/{job}/cancel")
+@deadline(jobs.BULK)
 def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Cancel what is not done yet."""
     before = jobs.get_job(conn, key.tenant, job).cancelled
@@ -229,6 +236,7 @@ def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 
 
 @router.post("/{job}/retry")
+@deadline(jobs.BULK)
 def retry_job(
     job: UUID,
     conn: Connection,
@@ -243,6 +251,7 @@ def retry_job(
 
 
 @router.post("/{job}/erase")
+@deadline(jobs.BULK)
 def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
     """Forget the prompts of a job that has ended; motions, names and tags stay.
 
@@ -255,6 +264,7 @@ def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
 
 
 @router.get("/{job}/items")
+@deadline(jobs.SEARCH)
 def list_items(
     job: UUID,
     conn: Connection,
@@ -270,6 +280,7 @@ def list_items(
 
 
 @router.get("/{job}/motions")
+@deadline(jobs.SEARCH)
 def list_job_motions(
     job: UUID, conn: Connection, key: Reader, found: Found, cursor: Cursor = None, limit: Limit = 100
 ) -> PageView[MotionView]:

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from services.api.audit import note
 from services.api.auth import Reader, Submitter
-from services.api.context import Connection, Shared
+from services.api.context import Connection, Shared, deadline
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
 from services.api.motions.schemas import (
     MotionDetailView,
@@ -62,6 +62,7 @@ Found = Annotated[jobs.MotionFilter, Depends(motion_filter)]
 
 
 @router.get("")
+@deadline(jobs.SEARCH)
 def list_motions(
     conn: Connection,
     key: Reader,
@@ -85,6 +86,7 @@ def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> lis
 
 
 @router.post("/reroll", status_code=202)
+@deadline(jobs.BULK)
 def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: Submitter) -> RerollsView:
     """Make motions again with the next seeds, all or none: new items in their jobs, linked to what they replace.
 

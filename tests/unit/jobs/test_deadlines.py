@@ -1,0 +1,45 @@
+"""The table of deadlines: every kind is used, and its limits fit together."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from shared.jobs import deadlines
+from shared.jobs.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
+from shared.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[3]
+BAR = 15.0
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_every_kind_of_call_is_used(kind: Deadline) -> None:
+    (constant,) = [name for name, value in vars(deadlines).items() if value is kind]
+    uses = re.compile(rf"(transaction\([^\n]*, (jobs\.)?|deadline(=|\()(jobs\.)?|: Deadline = ){constant}\b")
+    files = [path for folder in ("shared", "services") for path in (ROOT / folder).rglob("*.py")]
+    assert any(uses.search(path.read_text(encoding="utf-8")) for path in files)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_the_server_ends_a_slow_statement_before_the_client_gives_up(kind: Deadline) -> None:
+    assert 1 <= kind.answer - kind.statement <= 5
+
+
+def test_the_kinds_stand_in_the_order_of_their_limits() -> None:
+    assert all(one.statement <= next_one.statement for one, next_one in pairwise(KINDS))
+
+
+def test_a_silent_connection_is_found_and_its_locks_are_gone_well_within_the_bar() -> None:
+    assert PROBE_EVERY + PING_SECONDS < BAR / 2
+    assert ORDINARY.answer < BAR
+    assert ORDINARY.idle < BAR - PING_SECONDS
+
+
+def test_several_heartbeats_fit_into_a_lease() -> None:
+    config = Settings()
+    assert HEARTBEAT.answer + HEARTBEAT.idle < config.lease_seconds
+    assert config.heartbeat_seconds + HEARTBEAT.answer < config.lease_seconds
