@@ -47,6 +47,13 @@ class TooLarge(InvalidInput):
     problem_type = "too-large"
 
 
+class UpgradeMissing(InvalidInput):
+    """A WebSocket arrived as an ordinary request: a proxy did not pass on its Upgrade."""
+
+    status = 426
+    problem_type = "upgrade-missing"
+
+
 class InvalidFile(InvalidInput):
     """A file is broken, foreign or truncated."""
 

@@ -23,7 +23,7 @@ from services.api.connections import connection_options
 from services.api.context import CONNECTIONS, Context
 from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from services.api.evaluations.routes import router as evaluations_router
-from services.api.guards import HostGuard
+from services.api.guards import HostGuard, UpgradeGuard
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
 from services.api.home.routes import router as home_router
@@ -81,6 +81,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
     problems.install(app)
     for router in routers:
         app.include_router(router)
+    app.add_middleware(UpgradeGuard)
     app.add_middleware(HostGuard, allowed=config.allowed_hosts)
     app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
     app.add_middleware(Trace)

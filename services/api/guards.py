@@ -1,4 +1,4 @@
-"""ASGI middleware: which Host is answered."""
+"""ASGI middleware: which Host is answered, and what a proxy must pass on."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
 from services.api.problems import problem_response
-from shared.errors import MareyError, Refused
+from shared.errors import MareyError, Refused, UpgradeMissing
 
 
 class HostGuard:
@@ -32,7 +32,7 @@ class HostGuard:
         else:
             await _refuse(error, scope, receive, send)
 
-    def _objection(self, scope: Scope) -> Refused | None:
+    def _objection(self, scope: Scope) -> MareyError | None:
         if scope["type"] not in ("http", "websocket") or "*" in self.allowed:
             return None
         headers = Headers(scope=scope)
@@ -43,6 +43,25 @@ class HostGuard:
         if scope["type"] == "websocket" and origin is not None and _host_of(origin) not in self.allowed:
             return _foreign("this server opens no sockets for pages of that host", origin)
         return None
+
+
+class UpgradeGuard:
+    """Refuse WebSocket handshakes that a proxy made ordinary requests: it drops `Upgrade` and `Connection`, which are
+    between it and its client, and passes on the rest."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, or refuse."""
+        if scope["type"] == "http" and "sec-websocket-key" in Headers(scope=scope):
+            error = UpgradeMissing(
+                "the WebSocket arrived as an ordinary request: a proxy does not pass on the upgrade",
+                hint="Let the proxy send HTTP/1.1 with the headers Upgrade and Connection: docs/proxy.md.",
+            )
+            await _refuse(error, scope, receive, send)
+        else:
+            await self.app(scope, receive, send)
 
 
 def _without_port(host: str) -> str:

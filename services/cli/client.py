@@ -12,8 +12,9 @@ from uuid import uuid4
 
 import httpx2
 
+from services.cli.foreign import connection_failure, foreign_answer
 from services.cli.lines import Lines
-from services.cli.place import Server, find_server
+from services.cli.place import Server, ca_file, find_server
 from shared import tracing
 from shared.errors import (
     Busy,
@@ -32,6 +33,7 @@ from shared.errors import (
     Unreachable,
 )
 from shared.items import InvalidItems, Problem
+from shared.tls import trusting_context
 
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
@@ -63,6 +65,7 @@ class Client:
             base_url=server.url,
             headers={"Authorization": f"Bearer {server.key}"},
             timeout=httpx2.Timeout(timeout, connect=5.0),
+            verify=trusting_context(ca_file()),
         )
 
     @classmethod
@@ -78,23 +81,23 @@ class Client:
 
     def get(self, path: str, **params: Any) -> Any:
         """The JSON at `path`."""
-        return self._send("GET", path, params=_given(params)).json()
+        return _json(self._send("GET", path, params=_given(params)))
 
     def post(self, path: str, body: Any = None, **params: Any) -> Any:
         """POST a JSON body, None = none; the answer's JSON. Retried: only for requests that may be repeated."""
-        return self._send("POST", path, params=_given(params), json=body).json()
+        return _json(self._send("POST", path, params=_given(params), json=body))
 
     def post_new(self, path: str, body: Any) -> Any:
         """POST what is made once however often it is sent: with an idempotency key, which goes with every retry."""
-        return self._send("POST", path, json=body, headers={"Idempotency-Key": str(uuid4())}).json()
+        return _json(self._send("POST", path, json=body, headers={"Idempotency-Key": str(uuid4())}))
 
     def post_once(self, path: str, body: Any) -> Any:
         """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
-        return self._send("POST", path, repeatable=False, json=body).json()
+        return _json(self._send("POST", path, repeatable=False, json=body))
 
     def patch(self, path: str, body: Any, **params: Any) -> Any:
         """PATCH with a JSON body; the answer's JSON."""
-        return self._send("PATCH", path, json=body, params=_given(params)).json()
+        return _json(self._send("PATCH", path, json=body, params=_given(params)))
 
     def delete(self, path: str) -> None:
         """DELETE."""
@@ -116,7 +119,7 @@ class Client:
         }
         query = _given({**params, "validate_only": validate_only or None})
         timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
-        return self._send("POST", "/v1/jobs", params=query, content=items, headers=headers, timeout=timeout).json()
+        return _json(self._send("POST", "/v1/jobs", params=query, content=items, headers=headers, timeout=timeout))
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
         """Every element of a listing, page after page."""
@@ -161,6 +164,8 @@ class Client:
             try:
                 response = self._request(method, path, request)
             except httpx2.TransportError as error:
+                if (final := _final(self.server, error)) is not None:
+                    raise final from error
                 never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
                 if (
                     attempt == ATTEMPTS
@@ -171,7 +176,7 @@ class Client:
                 wait = pause
             else:
                 if response.status_code < 400:
-                    return response
+                    return _expected(response)
                 if response.status_code not in RETRIED or attempt == ATTEMPTS or not repeatable or _is_quota(response):
                     raise error_of(response)
                 wait = max(pause, _retry_after(response))
@@ -221,15 +226,32 @@ def _is_quota(response: httpx2.Response) -> bool:
     return response.status_code == Busy.status and f"{TYPE_PREFIX}{QUOTA}" in response.text
 
 
+def _json(response: httpx2.Response) -> Any:
+    """Return what a successful answer holds.
+
+    Raises:
+        InvalidInput: it is not JSON, so not the API's.
+    """
+    try:
+        return response.json()
+    except ValueError:
+        raise _foreign(response) from None
+
+
+def _expected(response: httpx2.Response) -> httpx2.Response:
+    """Return the answer if it may be the API's.
+
+    Raises:
+        InvalidInput: a redirect or a page; a proxy that wants a login answers so, and nothing was done.
+    """
+    if response.is_redirect or response.headers.get("content-type", "").startswith("text/html"):
+        raise _foreign(response)
+    return response
+
+
 def _foreign(response: httpx2.Response) -> MareyError:
-    kind = (
-        Unreachable if response.status_code >= 500 else Refused if response.status_code in (401, 403) else InvalidInput
-    )
-    return kind(
-        f"answered {response.status_code} without saying why",
-        where=str(response.request.url),
-        hint="Is MAREY_SERVER the address of a Marey server?",
-    )
+    where = str(response.request.url.copy_with(query=None))
+    return foreign_answer(response.status_code, response.headers.get, response.text[:2000], where)
 
 
 @contextmanager
@@ -240,8 +262,17 @@ def _as_unreachable(server: Server) -> Iterator[None]:
         raise _unreachable(server, error) from error
 
 
-def _unreachable(server: Server, error: Exception) -> Unreachable:
-    return Unreachable(
+def _final(server: Server, error: httpx2.TransportError) -> MareyError | None:
+    """Return the error for a failure that no further attempt mends: of the server, or of the store it leads to."""
+    try:
+        url = error.request.url.copy_with(path="/", query=None)
+    except RuntimeError:  # there was no request yet
+        return connection_failure(error, server.url)
+    return connection_failure(error, str(url).rstrip("/"))
+
+
+def _unreachable(server: Server, error: httpx2.TransportError) -> MareyError:
+    return _final(server, error) or Unreachable(
         f"the server does not answer ({type(error).__name__}: {error})",
         where=server.url,
         hint="Is it running? `marey serve` starts one here; MAREY_SERVER names another.",

@@ -29,6 +29,12 @@ def home() -> Path:
     return user_data_path("marey", appauthor=False)
 
 
+def ca_file() -> Path | None:
+    """Return the file of `MAREY_CA_FILE`: certificate authorities that are trusted beside the machine's own."""
+    given = os.environ.get("MAREY_CA_FILE")
+    return Path(given).expanduser() if given else None
+
+
 def find_server() -> Server:
     """The server that commands talk to.
 

@@ -187,20 +187,21 @@ class Authority:
         """A client that trusts it and nobody else."""
         return ssl.create_default_context(cafile=self.file)
 
-    def server(self, host: str) -> ssl.SSLContext:
-        """A server whose certificate is for that name and no address; `context.asked` are the names clients named."""
+    def files(self, host: str) -> tuple[Path, Path]:
+        """A new certificate for that name and no address, and its key, as PEM files."""
         key = ec.generate_private_key(ec.SECP256R1())
         names = x509.SubjectAlternativeName([x509.DNSName(host)])
         certificate = _certificate(_name(host), self._certificate.subject, self._key, key.public_key(), names)
         path = self.folder / f"{host}-{time.monotonic_ns()}.pem"
-        path.write_bytes(
-            certificate.public_bytes(serialization.Encoding.PEM)
-            + key.private_bytes(
-                serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-            )
-        )
+        path.write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+        encoding, plain = serialization.Encoding.PEM, serialization.NoEncryption()
+        path.with_suffix(".key").write_bytes(key.private_bytes(encoding, serialization.PrivateFormat.PKCS8, plain))
+        return path, path.with_suffix(".key")
+
+    def server(self, host: str) -> ssl.SSLContext:
+        """A server whose certificate is for that name and no address."""
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        context.load_cert_chain(path)
+        context.load_cert_chain(*self.files(host))
         return context
 
 

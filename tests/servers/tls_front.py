@@ -18,14 +18,15 @@ class TlsFront:
     Args:
         context: of a server (`Authority.server("localhost")`).
         target: host and port of the plain server.
+        port: to listen on; 0 = any free one.
 
     Attributes:
         port: on which it listens, on 127.0.0.1.
         connections: handshakes that succeeded so far.
     """
 
-    def __init__(self, context: ssl.SSLContext, target: tuple[str, int]) -> None:
-        self.port = 0
+    def __init__(self, context: ssl.SSLContext, target: tuple[str, int], *, port: int = 0) -> None:
+        self.port = port
         self.connections = 0
         self._context = context
         self._target = target
@@ -49,7 +50,7 @@ class TlsFront:
 
     async def _start(self) -> None:
         self._loop.set_exception_handler(lambda *_: None)  # failed handshakes are what tests provoke
-        self._server = await asyncio.start_server(self._serve, "127.0.0.1", 0, ssl=self._context)
+        self._server = await asyncio.start_server(self._serve, "127.0.0.1", self.port, ssl=self._context)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def _stop(self) -> None:

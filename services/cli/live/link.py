@@ -9,13 +9,16 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidURI, WebSocketException
+from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidUpgrade, InvalidURI, WebSocketException
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from services.cli.place import Server
+from services.cli.client import TYPE_PREFIX
+from services.cli.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
+from services.cli.place import Server, ca_file
 from services.cli.watching import PATIENCE
 from shared.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from shared.tls import trusting_context
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
@@ -32,6 +35,11 @@ MOST_WAITING = 1200
 _REFUSALS = {401: Unauthenticated, 403: Refused, 404: NotFound, 422: InvalidInput}
 """What the status of an answer that is no socket is told as, and with 4000 added a close code; anything else is tried
 again."""
+
+NO_UPGRADE = frozenset({400, 405, 422, 426})
+"""Statuses of an answer to a handshake that lost its Upgrade on the way; so is a success. The API answers 426, and
+answered 422 before. It refuses parameters of a socket by a close code."""
+TEMPORARY = frozenset({408, 425, 429})
 
 Message = bytes | dict[str, Any]
 
@@ -55,6 +63,7 @@ class Link:
         self.sockets = 0
         self._server = server
         self._address = f"ws{server.url.removeprefix('http')}/v1/streams/{stream}"
+        self._tls = trusting_context(ca_file()) if server.url.startswith("https") else None
         self._slow = slow
         self._patience = patience
         self._socket: ClientConnection | None = None
@@ -125,6 +134,7 @@ class Link:
                     f"{self._address}?{urlencode({'from': self.next, 'slow': self._slow})}",
                     additional_headers={"Authorization": f"Bearer {self._server.key}"},
                     subprotocols=[SUBPROTOCOL],
+                    ssl=self._tls,
                     compression=None,  # 200 bytes of noise a frame: nothing to gain
                     open_timeout=OPEN_SECONDS,
                     close_timeout=CLOSE_SECONDS,
@@ -136,13 +146,35 @@ class Link:
         except InvalidURI as error:
             raise InvalidInput(f"is no address of a server: {error}", where=self._server.url) from error
         except InvalidStatus as error:
-            self._failed(error, error.response.status_code, "")
+            self._answered(error)
+        except InvalidUpgrade as error:
+            raise no_upgrade(101, self._address) from error
         except (OSError, WebSocketException) as error:
+            if (final := connection_failure(error, self._server.url)) is not None:
+                raise final from error
             self._failed(error, None, "")
         else:
             self.sockets += 1
             self._opened = time.monotonic()
         return self._socket is not None
+
+    def _answered(self, error: InvalidStatus) -> None:
+        """Set the time of the next attempt after an answer that is no socket: of the API, or of a proxy before it.
+
+        Raises:
+            MareyError: there is to be none.
+        """
+        answer = error.response
+        status, text = answer.status_code, (answer.body or b"").decode(errors="replace")
+        problem = _problem(text)
+        if HTTP_TO_HTTPS not in text and (status < 300 or status in NO_UPGRADE):
+            raise no_upgrade(status, self._address) from error
+        if problem is not None:
+            self._failed(error, status, problem)
+        elif status < 500 and status not in TEMPORARY:
+            raise foreign_answer(status, answer.headers.get, text, self._address) from error
+        else:
+            self._failed(error, status, "")
 
     def _drop(self, closed: ConnectionClosed) -> None:
         self._socket = None
@@ -172,6 +204,16 @@ class Link:
             ) from error
         self._retry_at = now + self._pause * random.uniform(0.8, 1.2)  # noqa: S311
         self._pause = min(self._pause * 2, LONGEST_PAUSE)
+
+
+def _problem(text: str) -> str | None:
+    """Return the detail of a problem of the API; None for any other text."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return None
+    is_problem = isinstance(found, dict) and str(found.get("type")).startswith(TYPE_PREFIX)
+    return str(found.get("detail")) if is_problem else None
 
 
 def _read(message: str | bytes) -> Message:
