@@ -8,9 +8,10 @@ import secrets
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from shared.bundles import Bundle, TextSpec, list_bundles
+from shared.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
+from shared.bundles.find import log_broken
 from shared.bundles.limits import check_seconds, check_settings, seconds_of
-from shared.errors import InvalidBundle
+from shared.errors import InvalidBundle, MareyError
 from shared.items import MAX_SEED, Item
 from shared.jobs import NewItem
 from shared.settings import Settings
@@ -36,16 +37,35 @@ class Offer:
         check_settings(self.bundle, names)
 
 
-def offers(config: Settings) -> list[Offer]:
-    """Every generator's bundle of this machine, by name."""
-    return [offer_of(bundle, config) for bundle in list_bundles(config=config, kind="generator")]
+@dataclass(frozen=True)
+class Offers:
+    """What this machine can make motions with."""
+
+    found: tuple[Offer, ...]
+    broken: tuple[BrokenBundle, ...]
+    """Bundles that are here and cannot be used; of any kind, since a broken manifest does not tell its kind."""
+
+
+def offers(config: Settings) -> Offers:
+    """Every generator's bundle of this machine, by folder; a broken one is logged and hides no other."""
+    bundles = scan_bundles(config=config, kind="generator")
+    found: list[Offer] = []
+    broken = list(bundles.broken)
+    for bundle in bundles.found:
+        try:
+            found.append(offer_of(bundle, config))
+        except MareyError as error:
+            broken.append(BrokenBundle.of(bundle.path.name, error))
+            log_broken(broken[-1])
+    return Offers(tuple(found), tuple(broken))
 
 
 def offer_of(bundle: Bundle, config: Settings) -> Offer:
     """What a generator's bundle allows.
 
     Raises:
-        InvalidBundle: it is no generator.
+        InvalidBundle: it is no generator, or its manifest does not say what it makes.
+        NotFound: what reads its prompts is not here.
     """
     manifest = bundle.manifest
     if manifest.kind != "generator" or manifest.text is None or not manifest.fps:

@@ -119,23 +119,24 @@ def _server() -> Check:
 
 def models(config: Settings) -> Iterator[Check]:
     """Every bundle that is here: whole, and with what reads its prompts."""
-    from shared.bundles import find_bundle, list_bundles
+    from shared.bundles import find_bundle, scan_bundles
+    from shared.bundles.limits import seconds_of
 
-    try:
-        names = [bundle.manifest.name for bundle in list_bundles(config=config)]
-    except MareyError as error:
-        yield broken("models", error)
-        return
-    if not names:
+    bundles = scan_bundles(config=config)
+    for left_out in bundles.broken:
+        yield broken("models", left_out.error)
+    if not bundles.found and not bundles.broken:
         yield Check("models", "warn", "no bundle here", "Put one into the folder that MAREY_MODELS names.")
-    for name in names:
+    for found in bundles.found:
         try:
-            bundle = find_bundle(name, config=config)
+            bundle = find_bundle(found.path.name, config=config)
+            if bundle.manifest.kind == "generator":
+                seconds_of(bundle)
         except MareyError as error:
             yield broken("models", error)
             continue
         yield Check("models", "ok", f"{bundle.reference}, {bundle.manifest.licence}, every hash right")
-        if bundle.manifest.text is not None and _installed("onnxruntime"):
+        if bundle.manifest.text is not None and _installed("torch"):
             yield _reads(bundle, config)
 
 

@@ -1,14 +1,17 @@
 """Model bundles: a folder with `manifest.json`, safetensors shards and a model card. No pickle, ever."""
 
-from shared.bundles.bundle import Bundle, find_bundle, list_bundles
+from shared.bundles.bundle import Bundle
 from shared.bundles.choose import choose_bundle, choose_evaluator, named_by
+from shared.bundles.find import BrokenBundle, Bundles, find_bundle, list_bundles, scan_bundles
 from shared.bundles.manifest import BundleManifest, DataSource, FileEntry, TextSpec
 from shared.bundles.writer import BundleWriter
 
 __all__ = [
+    "BrokenBundle",
     "Bundle",
     "BundleManifest",
     "BundleWriter",
+    "Bundles",
     "DataSource",
     "FileEntry",
     "TextSpec",
@@ -17,4 +20,5 @@ __all__ = [
     "find_bundle",
     "list_bundles",
     "named_by",
+    "scan_bundles",
 ]

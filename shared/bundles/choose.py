@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from shared.bundles.bundle import Bundle, find_bundle, list_bundles
-from shared.bundles.manifest import MANIFEST_NAME, BundleManifest
+from shared.bundles.bundle import Bundle
+from shared.bundles.find import find_bundle, has_bundle, list_bundles
+from shared.bundles.manifest import BundleManifest
 from shared.errors import InvalidBundle, NotFound, Refused
 from shared.settings import Settings, settings
 
@@ -22,9 +23,9 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
         InvalidBundle, Refused: as `find_bundle`.
     """
     config = config or settings()
-    if "/" in name or name.startswith(".") or "@" in name or _is_there(name, config):
+    if "/" in name or name.startswith(".") or "@" in name or has_bundle(name, config):
         return find_bundle(name, config=config, verify=verify)
-    if _is_there(f"{name}-starter", config):
+    if has_bundle(f"{name}-starter", config):
         return find_bundle(f"{name}-starter", config=config, verify=verify)
     found = [b for b in list_bundles(config=config, kind="generator") if b.manifest.model == name]
     if not found:
@@ -85,7 +86,3 @@ def unlike(generator: BundleManifest, evaluator: BundleManifest) -> tuple[str, o
         if made is not None and measured is not None and made != measured:
             return what, made, measured
     return None
-
-
-def _is_there(name: str, config: Settings) -> bool:
-    return any((folder / name / MANIFEST_NAME).is_file() for folder in (config.models, config.home / "models"))

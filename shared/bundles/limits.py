@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from typing import Any
 
 from shared.bundles.bundle import Bundle
-from shared.errors import InvalidInput
+from shared.errors import InvalidBundle, InvalidInput
 from shared.items import OUTPUT_FPS, SETTINGS
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
-    """The shortest and longest motion a generator makes."""
+    """The shortest and longest motion a generator makes.
+
+    Raises:
+        InvalidBundle: its manifest does not say.
+    """
     manifest = bundle.manifest
     fps = manifest.fps or 20.0
-    return float(manifest.parameters["min_frames"]) / fps, float(manifest.parameters["max_frames"]) / fps
+    low, high = (_frames(bundle, name) / fps for name in ("min_frames", "max_frames"))
+    if not 0 < low <= high < math.inf:
+        raise InvalidBundle(f"makes motions of {low:g} to {high:g} seconds", where=str(bundle.path))
+    return low, high
+
+
+def _frames(bundle: Bundle, name: str) -> float:
+    value = bundle.manifest.parameters.get(name)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise InvalidBundle(f"its parameters give no number as {name!r}", where=str(bundle.path))
+    return float(value)
 
 
 def check_seconds(bundle: Bundle, seconds: float | None) -> None:
@@ -34,7 +50,7 @@ def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
     Raises:
         InvalidInput: it has not.
     """
-    own = bundle.manifest.parameters.get("inference", {})
+    own: dict[str, Any] = bundle.manifest.parameters.get("inference") or {}
     for name in names:
         if name != OUTPUT_FPS and name not in own:
             model = bundle.manifest.name

@@ -5,12 +5,23 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-FORMAT = 1
+from shared.documents import parse_json
+from shared.errors import InvalidBundle
+
+FORMAT = 2
+"""What new bundles are written in. Format 1, whose hash covers the files alone, is read with the same hash as ever."""
 MANIFEST_NAME = "manifest.json"
+DESCRIPTIVE = {"name", "version", "metrics", "training"}
+"""Fields that only describe a bundle: format 2 hashes all others."""
+SHARD_ENDING = ".safetensors"
+RESERVED = frozenset({MANIFEST_NAME, "readme.md"})
+"""The manifest has no hash of itself, and the card may be edited."""
 NON_COMMERCIAL = re.compile(r"(^|[-_ ])NC($|[-_ ])", re.IGNORECASE)
 """Matches SPDX names of non-commercial terms, such as CC-BY-NC-4.0."""
+
+MAX_PROBLEMS = 1000  # characters
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 PlainName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$")]
@@ -60,7 +71,7 @@ class TextSpec(_Frozen):
 class BundleManifest(_Frozen):
     """The manifest of a bundle, validated on loading."""
 
-    format: Literal[1] = FORMAT
+    format: Literal[1, 2] = 1
     name: PlainName
     version: str
     kind: Literal["generator", "labeller", "evaluator"]
@@ -94,7 +105,45 @@ class BundleManifest(_Frozen):
             raise ValueError(f"a bundle holds safetensors, JSON and Markdown only, not {', '.join(foreign)}")
         return files
 
+    @model_validator(mode="after")
+    def _hashed_parts(self) -> BundleManifest:
+        """Every shard is a file with a hash; format 2 leaves no room for two readings of a name."""
+        shards = [shard for part in self.parts.values() for shard in part]
+        missing = sorted({shard for shard in shards if shard not in self.files})
+        if missing:
+            raise ValueError(f"parts name shards that are not in `files`, without a hash: {', '.join(missing[:3])}")
+        if self.format == 1:
+            return self
+        if foreign := [shard for shard in shards if not shard.endswith(SHARD_ENDING)]:
+            raise ValueError(f"parts are safetensors, not {foreign[0]}")
+        if empty := [name for name, part in self.parts.items() if not part]:
+            raise ValueError(f"the part {empty[0]!r} has no shards")
+        if len(set(shards)) < len(shards):
+            raise ValueError("a shard stands in two places")
+        if len({name.casefold() for name in self.files}) < len(self.files):
+            raise ValueError("two files have names that differ in case alone")
+        if reserved := [name for name in self.files if name.casefold() in RESERVED]:
+            raise ValueError(f"{reserved[0]} cannot be a file with a hash")
+        return self
+
     @property
     def commercial(self) -> bool:
         """Whether the terms of the weights allow commercial use."""
         return NON_COMMERCIAL.search(self.licence) is None
+
+
+def parse_manifest(data: bytes, where: str, *, hint: str | None = None) -> BundleManifest:
+    """Read the manifest of a bundle.
+
+    Raises:
+        InvalidBundle: no JSON, or not a manifest that this version reads.
+    """
+    document = parse_json(data, where, error=InvalidBundle, hint=hint)
+    try:
+        return BundleManifest.model_validate(document)
+    except ValidationError as error:
+        found = error.errors(include_input=False, include_url=False)
+        problems = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in found[:5])
+        raise InvalidBundle(
+            f"is not a manifest this version reads: {problems[:MAX_PROBLEMS]}", where=where, hint=hint
+        ) from None

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from safetensors.numpy import save as save_safetensors
 
 from shared.bundles.bundle import STATISTICS, Bundle, Tensors
-from shared.bundles.manifest import MANIFEST_NAME, BundleManifest, FileEntry
+from shared.bundles.manifest import FORMAT, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
 from shared.errors import Conflict, InvalidInput
 
 MAX_SHARD_BYTES = 15 * 2**20
@@ -85,8 +85,11 @@ class BundleWriter:
 
     def finish(self, **fields: Any) -> Bundle:
         """Write the manifest from `fields` (see `BundleManifest`) and move the bundle into place."""
-        manifest = BundleManifest(parts=self._parts, files=self._files, **fields)
-        (self._folder / MANIFEST_NAME).write_text(manifest.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        fields.setdefault("format", FORMAT)
+        made = BundleManifest(parts=self._parts, files=self._files, **fields)
+        text = made.model_dump_json(indent=1) + "\n"
+        manifest = parse_manifest(text.encode(), str(self.path / MANIFEST_NAME))  # its hash is of what is read
+        (self._folder / MANIFEST_NAME).write_text(text, encoding="utf-8")
         self._folder.chmod(0o755)  # mkdtemp makes it private
         if self.path.exists():
             old = self._folder.with_name(f"{self._folder.name}.old")

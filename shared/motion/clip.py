@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidFile, InvalidInput, MareyError, NotFound, TooLarge
+from shared.arrays import check_array
+from shared.arrays import parse_npz as parse_arrays
+from shared.documents import parse_json
+from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from shared.motion.files import write_atomically
 from shared.motion.kinematics import forward_kinematics
 from shared.motion.rotations import Array
@@ -40,6 +42,9 @@ KEYS = (
     "features_fps",
     "manifest",
 )
+
+
+FOREIGN = "It is no motion that Marey wrote, or an old one."
 
 
 def _nothing() -> Float32:
@@ -160,23 +165,19 @@ def load_npz(path: Path | str) -> MotionClip:
 
 def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
     """Read the bytes of a clip's npz file; see `load_npz`."""
-    arrays = _arrays(data, where)
+    arrays = parse_arrays(data, where, KEYS, limit=MAX_UNPACKED, hint=FOREIGN)
 
     def need(key: str, kinds: str, *shape: int | None) -> NDArray[Any]:
-        array = arrays[key]
-        wanted = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
-        if array.dtype.kind not in kinds:
-            raise InvalidFile(f"`{key}` holds {array.dtype}", where=where)
-        if array.ndim != len(shape) or any(s is not None and s != n for s, n in zip(shape, array.shape, strict=True)):
-            raise InvalidFile(f"`{key}` has shape {array.shape}, not {wanted}", where=where)
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise InvalidFile(f"`{key}` holds NaN or infinite numbers", where=where)
-        return array
+        return check_array(arrays[key], key, where, kinds=kinds, shape=shape)
 
-    joints = need("joints", "f", None, None, 3).astype(np.float32, copy=False)
+    def floats(key: str, *shape: int | None) -> Float32:
+        with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite, and is refused
+            array = need(key, "f", *shape).astype(np.float32, copy=False)
+        return check_array(array, key, where, kinds="f", shape=shape)
+
+    joints = floats("joints", None, None, 3)
     frames, count = joints.shape[:2]
-    rotations = need("rotations", "f", frames, count, 4).astype(np.float32, copy=False)
-    names = tuple(str(n) for n in need("names", "U", count).tolist())
+    rotations = floats("rotations", frames, count, 4)
     parents = tuple(int(p) for p in need("parents", "iu", count).tolist())
     fps, features_fps = float(need("fps", "f")), float(need("features_fps", "f"))
     if not frames or not 0 < fps <= 1000:
@@ -184,8 +185,9 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
     if np.abs(np.linalg.norm(rotations, axis=-1) - 1).max(initial=0) > 1e-3:
         raise InvalidFile("`rotations` holds quaternions that are not of unit length", where=where)
     try:
-        manifest = json.loads(str(need("manifest", "U")[()]))
-        skeleton = skeleton_of(names, parents, need("offsets", "f", count, 3))
+        names = tuple(str(n) for n in need("names", "U", count).tolist())
+        manifest = parse_json(str(need("manifest", "U")[()]), f"{where}: manifest", allow_nan=True)
+        skeleton = skeleton_of(names, parents, floats("offsets", count, 3))
     except (ValueError, InvalidInput) as error:
         raise InvalidFile(str(error), where=where) from None
     if not isinstance(manifest, dict):
@@ -193,11 +195,11 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
     return MotionClip(
         skeleton=skeleton,
         rotations=rotations,
-        root=need("root", "f", frames, 3).astype(np.float32, copy=False),
+        root=floats("root", frames, 3),
         joints=joints,
         contacts=need("contacts", "b", frames, 4),
         fps=fps,
-        features=need("features", "f", None, None).astype(np.float32, copy=False),
+        features=floats("features", None, None),
         features_fps=features_fps,
         manifest=cast("dict[str, Any]", manifest),
     )
@@ -212,25 +214,3 @@ def without_prompt(data: bytes, kept: Collection[str], where: str = "npz") -> by
     clip = parse_npz(data, where)
     manifest = {name: value for name, value in clip.manifest.items() if name in kept}
     return replace(clip, manifest={**manifest, "erased": True}).to_npz()
-
-
-def _arrays(data: bytes, where: str) -> dict[str, NDArray[Any]]:
-    """The arrays of an npz by key; the sizes are looked at before anything is unpacked."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-            if size > MAX_UNPACKED:
-                raise TooLarge(f"{size / 2**30:.1f} GiB unpacked, over the limit of 1 GiB", where=where)
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            missing = [key for key in KEYS if key not in file.files]
-            if missing:
-                raise InvalidFile(
-                    f"has no {', '.join(missing)}", where=where, hint="It is no motion that Marey wrote, or an old one."
-                )
-            return {key: file[key] for key in KEYS}
-    except MareyError:
-        raise
-    except Exception as error:  # a crafted zip or header makes zipfile and numpy raise nearly anything
-        pickled = "allow_pickle" in str(error)
-        reason = "holds pickled objects, which are never loaded" if pickled else "is no npz file, or a broken one"
-        raise InvalidFile(reason, where=where) from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx2
 import pytest
@@ -12,10 +13,14 @@ from tests.support.live_api import LiveApi, running_api, settings_of
 
 
 @pytest.fixture(scope="module")
-def api(
-    module_database_url: str, valkey: EmbeddedServer, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[LiveApi]:
-    config = settings_of(tmp_path_factory.mktemp("api"), module_database_url, valkey.url)
+def api_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The home of the API; its bundles lie in `models`."""
+    return tmp_path_factory.mktemp("api")
+
+
+@pytest.fixture(scope="module")
+def api(module_database_url: str, valkey: EmbeddedServer, api_home: Path) -> Iterator[LiveApi]:
+    config = settings_of(api_home, module_database_url, valkey.url)
     with running_api(config, module_database_url) as api:
         yield api
 

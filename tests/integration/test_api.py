@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import shutil
 import tempfile
 import threading
 import time
@@ -372,6 +373,24 @@ def test_models_are_listed_with_their_terms(http: httpx2.Client) -> None:
     assert http.get("/v1/models/hgm3").json() == model
     assert http.get(f"/v1/models/{model['bundle']}").json() == model
     refused(http.get("/v1/models/mogo"), 404, "not-found")
+
+
+def test_a_broken_bundle_is_told_without_a_path_and_hides_no_other(http: httpx2.Client, api_home: Path) -> None:
+    broken = api_home / "models" / "broken"
+    broken.mkdir()
+    try:
+        (broken / "manifest.json").write_text("{")
+        answer = http.get("/v1/models")
+        assert answer.status_code == 200, answer.text
+        assert [model["name"] for model in answer.json()["items"]] == [BUNDLE]
+        (told,) = answer.json()["broken"]
+        assert told["name"] == "broken"
+        assert told["reason"].startswith("manifest.json: is not JSON")
+        asked = http.get("/v1/models/broken")
+        refused(asked, 422, "invalid-bundle")
+        assert str(api_home) not in answer.text + asked.text
+    finally:
+        shutil.rmtree(broken)
 
 
 def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:

@@ -19,7 +19,7 @@ router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 @router.get("")
 def list_models(shared: Shared, key: Reader) -> ModelsView:
     """Bundles that this server can make motions with."""
-    return ModelsView(items=[ModelView.of(offer) for offer in offers(shared.config)])
+    return ModelsView.of(offers(shared.config))
 
 
 @router.get("/{name}")

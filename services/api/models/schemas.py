@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from services.api.schemas import View
-from shared.offers import Offer
+from shared.bundles import BrokenBundle
+from shared.offers import Offer, Offers
 
 
 class DataView(View):
@@ -50,7 +51,30 @@ class ModelView(View):
         )
 
 
+class BrokenView(View):
+    """A bundle that is there and cannot be used."""
+
+    name: str
+    """Of its folder."""
+    reason: str
+
+    @classmethod
+    def of(cls, broken: BrokenBundle) -> BrokenView:
+        """From what was found."""
+        return cls(name=broken.name, reason=broken.reason)
+
+
 class ModelsView(View):
     """Every bundle."""
 
     items: list[ModelView]
+    broken: list[BrokenView]
+    """Bundles that are left out, each with the reason."""
+
+    @classmethod
+    def of(cls, offers: Offers) -> ModelsView:
+        """From what this machine offers."""
+        return cls(
+            items=[ModelView.of(offer) for offer in offers.found],
+            broken=[BrokenView.of(broken) for broken in offers.broken],
+        )

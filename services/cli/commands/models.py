@@ -16,7 +16,10 @@ Local = Annotated[bool, typer.Option("--local", help="The bundles of this machin
 @app.command("list")
 def list_models(local: Local = False, as_json: console.Json = False) -> None:
     """List the bundles of the server, or of this machine when none runs."""
-    found = _local_models() if local or not _server_named() else _ask("/v1/models")["items"]
+    answer = _local_models() if local or not _server_named() else _ask("/v1/models")
+    found = answer["items"]
+    for broken in answer.get("broken", []):  # an older server does not tell
+        console.say(f"left out: {broken['name']}: {broken['reason']}")
     if as_json:
         for model in found:
             console.result_json(model)
@@ -61,16 +64,16 @@ def _ask(path: str) -> Any:
         return client.get(path)
 
 
-def _local_models() -> list[dict[str, Any]]:
+def _local_models() -> dict[str, Any]:
     from services.cli.extras import needs_extra
 
     try:
-        from services.api.models.schemas import ModelView
+        from services.api.models.schemas import ModelsView
         from shared.offers import offers
         from shared.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
-    return [ModelView.of(offer).model_dump(mode="json") for offer in offers(settings())]
+    return ModelsView.of(offers(settings())).model_dump(mode="json")
 
 
 def _local_model(name: str) -> dict[str, Any]:

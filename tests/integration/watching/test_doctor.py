@@ -111,3 +111,12 @@ def test_a_bundle_that_was_changed_is_bad_and_one_whose_encoder_is_another_too(t
     shard.write_bytes(content)
     (broken,) = models(config)
     bad(broken, "sha256", "again")
+
+
+def test_a_bundle_that_cannot_be_read_is_bad_and_hides_no_other(tmp_path: Path) -> None:
+    write_bundle(tmp_path / "models")
+    (tmp_path / "models" / "another").mkdir()
+    (tmp_path / "models" / "another" / "manifest.json").write_text("[" * 100_000)
+    broken, whole, _ = models(Settings(home=tmp_path, models=tmp_path / "models"))
+    bad(broken, "another", "nested more than", "again")
+    assert whole.state == "ok"
