@@ -88,6 +88,32 @@ class Unreachable(MareyError):
     status = 503
     problem_type = "unreachable"
 
+    def __init__(
+        self, message: str, *, where: str | None = None, hint: str | None = None, public: str | None = None
+    ) -> None:
+        """Set the message for operators, and the one for clients of the API.
+
+        Args:
+            public: what the API tells its clients, whoever they are: what is down, never where or how. None = only
+                that something the server needs is down.
+        """
+        super().__init__(message, where=where, hint=hint)
+        self.public = public
+
+
+class Overloaded(Unreachable):
+    """The server has no room for a request now; the same request works later.
+
+    Args:
+        seconds: when to ask again.
+    """
+
+    problem_type = "overloaded"
+
+    def __init__(self, message: str, *, where: str | None = None, hint: str | None = None, seconds: int) -> None:
+        super().__init__(message, where=where, hint=hint, public=message)
+        self.seconds = seconds
+
 
 class TooSlow(MareyError):
     """A request came slower than the server waits for one; sending it again may work."""

@@ -35,7 +35,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 PREFIX = "MAREY_"
 BY_FILE = (
     *("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
-    "webhook_key",
+    *("webhook_key", "text_key"),
 )
 """Settings that may come by file."""
 LONGEST = 366 * 86_400
@@ -46,6 +46,7 @@ QUEUES = ("redis", "rediss", "redis+socket")
 HOST = re.compile(r"(\[[^\]]*\]|[^:]*)(:[0-9]{1,5})?")
 WEB = re.compile(r"https?://[^/?#\s]")
 ENDPOINT = re.compile(r"(https?://)?(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(:[0-9]{1,5})?/?")
+TEXT = re.compile(r"https?://[^/?#\s]+/?|unix:///.+")
 
 
 def _of_json(value: object) -> object:
@@ -90,6 +91,12 @@ def _endpoint(value: str) -> str:
     return value.rstrip("/")
 
 
+def _text_service(value: str) -> str:
+    if TEXT.fullmatch(value) is None:
+        raise ValueError("Write http://host:port, or unix:///path of a socket.")
+    return value.rstrip("/")
+
+
 def _level(value: object) -> object:
     return value.upper() if isinstance(value, str) and value.upper() in LEVELS else value
 
@@ -100,6 +107,7 @@ Database = Annotated[SecretStr, AfterValidator(_database)]
 Queue = Annotated[SecretStr, AfterValidator(_queue)]
 Web = Annotated[str, AfterValidator(_web)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
+TextService = Annotated[str, AfterValidator(_text_service)]
 Names = Annotated[list[str], NoDecode, BeforeValidator(_of_json)]
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
 LEVELS: tuple[str, ...] = get_args(Level)
@@ -155,6 +163,13 @@ class Settings(BaseSettings):
     rates: Annotated[dict[str, str], NoDecode, BeforeValidator(_of_json)] = {}
     """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
     is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
+
+    text_url: TextService | None = None
+    """Where the text service (`marey text serve`) answers the API; `marey serve` brings its own."""
+    text_key: SecretStr | None = None
+    """Secret that the API shows the text service."""
+    text_seconds: Seconds = 10.0
+    """A request to parse prompts is answered 503 after this long."""
 
     require_licence: Literal["any", "commercial"] = "any"
     """`commercial` refuses bundles whose weights carry non-commercial terms."""

@@ -66,4 +66,9 @@ class Spool:
             yield
         except OSError as error:
             reason = os.strerror(error.errno or errno.EIO)  # its own words may name folders of this machine
-            raise Unreachable(f"cannot be kept: {reason}", where=self._where, hint=self._hint) from error
+            raise Unreachable(
+                f"cannot be kept: {reason}",
+                where=self._where,
+                hint=self._hint,
+                public=f"{self._where} cannot be kept: {reason}",
+            ) from error

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import signal
-import sys
 from collections.abc import AsyncIterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -33,6 +31,7 @@ from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.process import prepare_process
 from services.api.queries import known_query
 from services.api.rates import Rates
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
@@ -40,29 +39,23 @@ from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
 from services.api.streams.routes import router as streams_router
 from services.api.tailer import Tailer
+from services.api.texts.routes import router as texts_router
+from services.api.texts.service import TextService
 from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
-from services.text.routes import router as texts_router
 from shared.errors import InvalidInput
 from shared.jobs import create_engine
-from shared.runtime.logs import configure_logging
-from shared.runtime.malloc import one_heap
 from shared.settings import Settings, settings
 from shared.storage import open_store
-from shared.tracing import configure_tracing
 from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
-GRACE_SECONDS = 3
-"""For answers under way at SIGTERM; event streams and sockets end at once."""
 ROUTERS = (
     *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, models_router),
     texts_router,
     *(evaluations_router, schedules_router, webhooks_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)
-TEXT_ROUTERS = (health_router, texts_router)
-"""For `marey text serve`: parsing alone, which can be given machines of its own."""
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."
 
 
@@ -106,12 +99,17 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     tailer = Tailer(engine, url, message)
     redis_url = config.streams_url or config.queue_url
     hub = None if redis_url is None else Hub(redis_url.get_secret_value())
-    app.state.context = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), hub)
+    texts = TextService(config)
+    shared = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), texts, hub)
+    app.state.context = shared
     tailer.start()
+    shared.readiness.start()
     try:
         yield
     finally:
+        shared.readiness.stop()
         tailer.stop()
+        await texts.close()
         app.state.context.rates.close()
         if hub is not None:
             hub.close()
@@ -152,21 +150,8 @@ def write_openapi(path: Path) -> None:
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def serve(routers: Sequence[APIRouter] = ROUTERS) -> None:
+def serve() -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
-    one_heap()
     config = settings()
-    # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    configure_logging("api", level=config.log_level, json=config.log_json)
-    configure_tracing("api")
-    uvicorn.run(
-        create_app(config, routers),
-        host=config.host,
-        port=config.port,
-        log_config=None,
-        access_log=False,
-        server_header=False,
-        timeout_graceful_shutdown=GRACE_SECONDS,
-        **connection_options(config),
-    )
+    options = prepare_process("api", config)
+    uvicorn.run(create_app(config), host=config.host, port=config.port, **options, **connection_options(config))

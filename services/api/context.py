@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, TypeVar
 
 import sqlalchemy as sa
@@ -11,9 +11,11 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from services.api.catalogue import Catalogue
+from services.api.health.readiness import Readiness
 from services.api.rates import Rates
 from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
+from services.api.texts.service import TextService
 from shared.jobs import Deadline, transaction
 from shared.settings import Settings
 from shared.storage import AssetStore
@@ -29,14 +31,20 @@ class Context:
     catalogue: Catalogue
     tailer: Tailer
     rates: Rates
+    texts: TextService
     streams: Hub | None = None
     """None where no Redis is named."""
     seen_ready: bool = False
     """A worker has had its model loaded: from then on `/readyz` no longer asks for one."""
+    readiness: Readiness = field(init=False)
+    """What `/readyz` says."""
+
+    def __post_init__(self) -> None:
+        self.readiness = Readiness(self)
 
 
-def context(asked: HTTPConnection) -> Context:
-    """The context of this process; of a request or a socket."""
+async def context(asked: HTTPConnection) -> Context:
+    """The context of this process; of a request or a socket. Async: no thread is needed to find it."""
     return asked.app.state.context
 
 

@@ -14,7 +14,16 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from shared.errors import Busy, InvalidInput, MareyError, NotFound, QuotaUsedUp, Unauthenticated, Unreachable
+from shared.errors import (
+    Busy,
+    InvalidInput,
+    MareyError,
+    NotFound,
+    Overloaded,
+    QuotaUsedUp,
+    Unauthenticated,
+    Unreachable,
+)
 from shared.items import InvalidItems
 from shared.jobs import Room
 
@@ -73,8 +82,25 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 """What every route may answer besides its own."""
 
 
+def public_error(error: MareyError) -> MareyError:
+    """Return what clients are told of an error.
+
+    Faults of the server's own side may name its hosts, files and settings, and reach callers without a key: these are
+    told what is down, never where or how. The log has the error itself.
+    """
+    if error.status < 500:
+        return error
+    if isinstance(error, Overloaded):
+        return error
+    if isinstance(error, Unreachable):
+        told = error.public or "something that this server needs does not answer"
+        return Unreachable(told, hint="Try again in a moment; the server's log says more.")
+    return MareyError("an internal error; the server's log says more")
+
+
 def problem_body(error: MareyError) -> ProblemBody:
     """The problem an expected error is told as."""
+    error = public_error(error)
     body = ProblemBody(
         type=TYPE_PREFIX + error.problem_type,
         title=error.problem_type.replace("-", " ").capitalize(),
@@ -101,7 +127,7 @@ def problem_response(error: MareyError) -> JSONResponse:
         headers["WWW-Authenticate"] = 'Bearer realm="marey"'
     if isinstance(error, Unreachable):
         headers["Retry-After"] = RETRY_AFTER
-    if isinstance(error, Busy):
+    if isinstance(error, Busy | Overloaded):
         headers["Retry-After"] = str(error.seconds)
     return JSONResponse(
         body.model_dump(mode="json", exclude_none=True), error.status, headers=headers, media_type=MEDIA_TYPE
@@ -128,7 +154,7 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(Exception)
     def _bug(_: Request, error: Exception) -> JSONResponse:
         log.error("internal_error", exc_info=error)
-        return problem_response(MareyError("an internal error; the server's log has its traceback"))
+        return problem_response(MareyError("internal"))
 
 
 def _validation(error: RequestValidationError) -> JSONResponse:

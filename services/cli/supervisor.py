@@ -6,6 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
+import secrets
 import signal
 import time
 import urllib.error
@@ -22,7 +23,7 @@ from services.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of,
 from shared.errors import Conflict, InvalidInput, MareyError
 from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
 from shared.jobs.types import DEFAULT_TENANT
-from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from shared.runtime.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
 from shared.settings import Settings
 from shared.storage import open_store
 from shared.webhooks.vault import Vault, key_file
@@ -112,9 +113,21 @@ class Supervisor:
             **{f"worker-{i}": ["worker", "+".join(q), "--only", "queue"] for i, q in enumerate(self.roles, 1)},
             **{f"live-{model}": ["worker", model, "--only", "live"] for model in self._shown()},
         }
-        self._children = [self._child("api", ["api"], environment)]
+        if self.config.text_url is None:
+            self._add_text_service(environment)
+        self._children.append(self._child("api", ["api"], environment))
         for place, (name, command) in enumerate(commands.items()):
             self._children.append(self._child(name, command, {**environment, **metrics_port(self.config, place)}))
+
+    def _add_text_service(self, environment: dict[str, str]) -> None:
+        """One process that parses for the API, on a socket that no other user can open."""
+        folder = socket_folder(self.home)
+        if not folder.exists():  # where Postgres and Valkey are servers of the user's own
+            make_socket_folder(folder, None)
+        path = folder / "text.sock"
+        environment |= {"MAREY_TEXT_URL": f"unix://{path}", "MAREY_TEXT_KEY": secrets.token_urlsafe(32)}
+        own = {**environment, "MAREY_THREADS": "1", "OMP_NUM_THREADS": "1"}
+        self._children.append(self._child("text", ["text", "serve", "--socket", str(path)], own))
 
     def _start_backings(self) -> tuple[str, str]:
         """URLs of database and queue: those of the settings, else embedded ones."""

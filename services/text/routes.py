@@ -1,30 +1,36 @@
-"""`POST /v1/texts/parse`: the graph a prompt becomes."""
+"""`POST /v1/texts/parse` of the text service, and the bodies it shares with the API's route."""
 
 from __future__ import annotations
 
+import hmac
 import threading
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from fastapi import APIRouter
+import anyio
+from anyio import CapacityLimiter, to_thread
+from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.auth import Parser
 from services.api.problems import RESPONSES
+from services.text.limits import Ticket, WordLimit
 from shared.bundles import TextSpec, choose_bundle, named_by
-from shared.errors import InvalidInput, Unreachable
+from shared.errors import InvalidInput, Unauthenticated, Unreachable
 from shared.items import MODEL
+from shared.settings import Settings
 from shared.text.keys import as_served
 from shared.text.prompts import check_prompt
 
 if TYPE_CHECKING:
     from shared.text.pipeline import TextPipeline
 
-router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
-
 MAX_PROMPTS = 64
 """Of one request: a second of work; more belong into a job."""
+THREADS = 4
+"""Requests parsed at once: torch serves one after the other, but a request may wait for a rewriter."""
+MAX_LOADED = 4
+"""Pipelines kept: bundles of one text specification share one."""
 _loading = threading.Lock()
+_loaded: dict[str, TextPipeline] = {}
 
 
 class ParseBody(BaseModel):
@@ -79,12 +85,75 @@ class GraphsView(BaseModel):
     items: list[GraphView]
 
 
-@router.post("/parse")
-def parse_texts(body: ParseBody, key: Parser) -> GraphsView:
-    """The semantic graph of each prompt."""
+def parse_prompts(body: ParseBody) -> GraphsView:
+    """Parse each prompt into its semantic graph."""
     prompts = [check_prompt(prompt, where=f"prompts.{index}") for index, prompt in enumerate(body.prompts)]
     parsed = pipeline_of(body.model).explain(prompts)
     return GraphsView(items=[GraphView.model_validate(each.to_json()) for each in parsed])
+
+
+def text_router(config: Settings) -> APIRouter:
+    """The route of the text service.
+
+    Args:
+        config: its `text_key` is the secret that a request must show.
+
+    Raises:
+        InvalidInput: there is no such secret.
+    """
+    if config.text_key is None:
+        raise InvalidInput(
+            "the text service needs a secret that it shares with the API",
+            where="MAREY_TEXT_KEY",
+            hint="Set it for both, or use `marey serve`, which draws one.",
+        )
+    secret = config.text_key.get_secret_value().encode()
+    limit, threads = WordLimit(), CapacityLimiter(THREADS)
+
+    async def check(request: Request) -> None:
+        scheme, _, shown = request.headers.get("authorization", "").partition(" ")
+        if scheme.lower() != "bearer" or not hmac.compare_digest(shown.strip().encode(), secret):
+            raise Unauthenticated("the key of the text service is missing or wrong", hint="It is MAREY_TEXT_KEY.")
+
+    router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES, dependencies=[Depends(check)])
+
+    @router.post("/parse")
+    async def parse_texts(body: ParseBody) -> GraphsView:
+        """Parse each prompt into its semantic graph."""
+        ticket = limit.take(body.prompts)
+        work = _Work(body, ticket)
+        try:
+            with anyio.fail_after(config.text_seconds):
+                return await to_thread.run_sync(work, limiter=threads, abandon_on_cancel=True)
+        except TimeoutError:
+            raise too_late(config.text_seconds) from None
+        finally:
+            work.forget()
+
+    return router
+
+
+class _Work:
+    """One request in a thread. It counts as in flight until the thread is done, also when nobody waits for it."""
+
+    def __init__(self, body: ParseBody, ticket: Ticket) -> None:
+        self._body, self._ticket, self._started = body, ticket, False
+
+    def __call__(self) -> GraphsView:
+        self._started = True
+        with self._ticket:
+            return parse_prompts(self._body)
+
+    def forget(self) -> None:
+        """Give its share back if no thread has it."""
+        if not self._started:
+            self._ticket.release()
+
+
+def too_late(seconds: float) -> Unreachable:
+    """The error of a request that took too long."""
+    message = f"the prompts were not parsed within {seconds:g} s"
+    return Unreachable(message, where="prompts", hint="Send fewer at a time.", public=message)
 
 
 def pipeline_of(model: str) -> TextPipeline:
@@ -93,24 +162,26 @@ def pipeline_of(model: str) -> TextPipeline:
     Raises:
         InvalidInput: it reads none.
         NotFound, InvalidBundle: as `choose_bundle` and `TextPipeline.load`.
-        Unreachable: this server was installed without what parsing needs.
     """
     with named_by("model"):
         bundle = choose_bundle(model, verify=False)
     if bundle.manifest.text is None:
         raise InvalidInput(f"{model!r} does not read prompts", where="model", hint="Name a generator.")
-    with _loading:
-        return _loaded(as_served(bundle.manifest.text).model_dump_json())
+    return load_pipeline(bundle.manifest.text)
 
 
-@lru_cache(maxsize=4)
-def _loaded(spec: str) -> TextPipeline:
-    try:
-        import torch  # noqa: F401  # not before somebody asks
-    except ImportError as error:
-        raise Unreachable(
-            "this server cannot parse texts: torch is not installed beside it", hint="Install marey[worker] there."
-        ) from error
+def load_pipeline(spec: TextSpec) -> TextPipeline:
+    """The pipeline of a bundle's text specification, loaded once a process."""
     from shared.text.pipeline import TextPipeline
 
-    return TextPipeline.load(TextSpec.model_validate_json(spec))
+    served = as_served(spec)
+    name = served.model_dump_json()
+    found = _loaded.get(name)
+    if found is None:
+        with _loading:
+            if name not in _loaded:
+                while len(_loaded) >= MAX_LOADED:
+                    del _loaded[next(iter(_loaded))]
+                _loaded[name] = TextPipeline.load(served)
+            return _loaded[name]
+    return found

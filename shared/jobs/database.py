@@ -116,13 +116,16 @@ def unreachable(error: BaseException) -> Unreachable:
     cause = getattr(error, "orig", None) or error
     if isinstance(cause, psycopg.errors.DiskFull):  # its text names a file of the server
         hint = "Make room on the disk of Postgres; what waits goes on by itself."
-        return Unreachable("the database has no room left", where="database", hint=hint)
+        message = "the database has no room left"
+        return Unreachable(message, where="database", hint=hint, public=message)
     if isinstance(cause, psycopg.errors.QueryCanceled):
         hint = "It is overloaded, or another transaction holds a lock for long. Try again."
-        return Unreachable("the database took too long for a statement", where="database", hint=hint)
+        message = "the database took too long for a statement"
+        return Unreachable(message, where="database", hint=hint, public=message)
     first_line = (str(cause).splitlines() or [type(cause).__name__])[0]
     return Unreachable(
         f"the database does not answer ({first_line})",
         where="database",
         hint="Is it running, and is MAREY_DATABASE_URL right? Embedded: `marey serve` starts it.",
+        public="the database does not answer",
     )

@@ -19,6 +19,7 @@ from shared.metrics import STORE_ERRORS
 from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
+    PUBLIC,
     Digest,
     NewObject,
     Opened,
@@ -259,4 +260,5 @@ def _unreachable(root: Path, error: OSError) -> Unreachable:
         f"the asset folder cannot be used ({error.strerror or error})",
         where=str(root),
         hint="Make it writable for this user, free some space, or name another one in MAREY_STORE.",
+        public=PUBLIC,
     )

@@ -13,6 +13,8 @@ from shared.errors import InvalidInput, NotFound
 
 CHUNK = 1 << 20
 PRESIGN_SECONDS = 900
+PUBLIC = "the asset store does not answer"
+"""What clients of the API are told when it is down: never where it is."""
 KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
 
 

@@ -21,6 +21,7 @@ from shared.storage.deadlines import Silence, open_pool
 from shared.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
+    PUBLIC,
     Digest,
     NewObject,
     Opened,
@@ -212,7 +213,9 @@ class S3Store:
                 response.close()
                 response.release_conn()
             if read != length:
-                raise Unreachable(f"the connection ended after {read} of {length} bytes", where=self._where(key))
+                raise Unreachable(
+                    f"the connection ended after {read} of {length} bytes", where=self._where(key), public=PUBLIC
+                )
 
     def _where(self, key: str | None = None) -> str:
         host, _ = self.options.address(self.options.endpoint)
@@ -260,12 +263,12 @@ class S3Store:
         if what is None or hint is None:
             return self._unreachable(f"{code}: {message}")
         STORE_ERRORS.labels("s3").inc()
-        return Unreachable(f"the object store {what} ({message or code})", where=self._where(), hint=hint)
+        return Unreachable(f"the object store {what} ({message or code})", where=self._where(), hint=hint, public=PUBLIC)
 
     def _untrusted(self, why: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()
         message = f"the certificate of the object store is not trusted ({why})"
-        return Unreachable(message, where=self._where(), hint=UNTRUSTED_HINT)
+        return Unreachable(message, where=self._where(), hint=UNTRUSTED_HINT, public=PUBLIC)
 
     def _unreachable(self, cause: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()
@@ -273,6 +276,7 @@ class S3Store:
             f"the object store does not answer as it should ({cause})",
             where=self._where(),
             hint="Is it running, has it room left, and are MAREY_S3_ENDPOINT (with its scheme) and the keys right?",
+            public=PUBLIC,
         )
 
 

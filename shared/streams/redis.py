@@ -286,7 +286,12 @@ def reached(stream: str) -> Generator[None]:
         yield
     except (NoConnection, TookTooLong, OutOfMemoryError, ReadOnlyError) as error:
         hint = "see that Redis runs and has memory left"
-        raise Unreachable(f"Redis does not serve: {error}", where=f"stream {stream}", hint=hint) from error
+        raise Unreachable(
+            f"Redis does not serve: {error}",
+            where=f"stream {stream}",
+            hint=hint,
+            public="the frames of live streams cannot be reached",
+        ) from error
 
 
 def _number(identity: bytes) -> int:

@@ -13,9 +13,10 @@ from starlette.websockets import WebSocketDisconnect
 
 from services.api.auth import admit, authenticated, check_scope
 from services.api.context import Context
+from services.api.problems import public_error
 from services.api.streams import service
 from services.api.streams.session import Session, Visit
-from services.api.streams.wire import Wire, close_code
+from services.api.streams.wire import Wire
 from shared.errors import InvalidInput, MareyError, NotFound
 from shared.jobs import get_stream, told_prompts, transaction
 
@@ -46,10 +47,10 @@ async def let_in(websocket: WebSocket, stream: str, shared: Context) -> None:
             with hub.place():
                 await Session(wire, hub, shared, visit).run()
         except MareyError as error:
-            await wire.close(close_code(error), error.message)
+            await wire.refuse(error)
         except Exception:
             log.exception("stream_socket_failed", stream=stream[:64])
-            await wire.close(1011, "an internal error; the server's log has its traceback")
+            await wire.close(1011, public_error(MareyError("internal")).message)
 
 
 def key_of(header: str | None, offered: list[str]) -> str | None:

@@ -47,7 +47,10 @@ def hub_of(shared: Context) -> Hub:
     """
     if shared.streams is None:
         raise Unreachable(
-            "live streams need Redis, and none is named", where="MAREY_QUEUE_URL", hint="Set it, or MAREY_STREAMS_URL."
+            "live streams need Redis, and none is named",
+            where="MAREY_QUEUE_URL",
+            hint="Set it, or MAREY_STREAMS_URL.",
+            public="this server has no live streams",
         )
     return shared.streams
 

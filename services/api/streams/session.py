@@ -21,7 +21,7 @@ from services.api.streams.messages import Messages
 from services.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
 from services.api.streams.service import is_over
 from services.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
-from services.api.streams.wire import Wire, close_code
+from services.api.streams.wire import Wire
 from shared.errors import MareyError, Unreachable
 from shared.jobs import ApiKey, StreamPrompt, StreamRow, StreamState, check_key, get_stream, told_prompts, transaction
 from shared.streams.control import ControlQueue
@@ -111,7 +111,7 @@ class Session:
                 if await self._give_up(error):
                     return
             except MareyError as error:
-                await self._wire.close(close_code(error), error.message)
+                await self._wire.refuse(error)
                 return
 
     async def _turn(self) -> bool:
@@ -214,7 +214,7 @@ class Session:
             self._away = now
             await self._wire.complain(error)
         if now - self._away > OUTAGE_SECONDS:
-            await self._wire.close(close_code(error), error.message)
+            await self._wire.refuse(error)
             return True
         await anyio.sleep(AGAIN_SECONDS)
         return False

@@ -7,13 +7,16 @@ import socket
 from contextlib import suppress
 from typing import Any
 
+import structlog
 from anyio import Lock
 from fastapi import WebSocket
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from services.api.problems import problem_body
+from services.api.problems import problem_body, public_error
 from services.api.streams.schemas import ErrorMessage, SocketMessage
 from shared.errors import MareyError
+
+log = structlog.get_logger(__name__)
 
 AWAY = 1013
 """Close code: try again later."""
@@ -66,6 +69,12 @@ class Wire:
     async def complain(self, error: MareyError) -> None:
         """Tell what is wrong, and stay; raises as `send`."""
         await self.tell(ErrorMessage(problem=problem_body(error)))
+
+    async def refuse(self, error: MareyError) -> None:
+        """Close for an error, and tell what clients may know of it; raises as `send`."""
+        if error.status >= 500:
+            log.warning("stream_socket_closed", error=str(error))
+        await self.close(close_code(error), public_error(error).message)
 
     async def close(self, code: int, reason: str = "") -> None:
         """The last thing that is sent; raises as `send`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -40,16 +41,19 @@ def parse(
 
 
 @app.command()
-def serve() -> None:
-    """Serve `POST /v1/texts/parse` alone; MAREY_HOST and MAREY_PORT say where."""
+def serve(
+    path: Annotated[
+        Path | None, typer.Option("--socket", help="Unix socket to listen on, in place of MAREY_HOST and MAREY_PORT.")
+    ] = None,
+) -> None:
+    """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is the secret that both share."""
     from services.cli.extras import needs_extra
 
     try:
-        from services.api.app import TEXT_ROUTERS
-        from services.api.app import serve as serve_api
+        from services.text.server import serve_text
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    serve_api(TEXT_ROUTERS)
+    serve_text(path)
 
 
 def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:

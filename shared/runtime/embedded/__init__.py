@@ -6,13 +6,14 @@ takes a lock that all users of a machine share, and its servers outlive a killed
 """
 
 from shared.runtime.embedded.postgres import postgres_url, start_postgres
-from shared.runtime.embedded.server import SOCKET_LIMIT, EmbeddedServer, StartFailed, socket_folder
+from shared.runtime.embedded.server import SOCKET_LIMIT, EmbeddedServer, StartFailed, make_socket_folder, socket_folder
 from shared.runtime.embedded.valkey import start_valkey, valkey_url
 
 __all__ = [
     "SOCKET_LIMIT",
     "EmbeddedServer",
     "StartFailed",
+    "make_socket_folder",
     "postgres_url",
     "socket_folder",
     "start_postgres",

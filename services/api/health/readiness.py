@@ -1,0 +1,134 @@
+"""What `/readyz` says: checks that run in the background, each in a thread of its own.
+
+A check that hangs holds up nothing but itself: its last result grows old, and an old result counts as a failure.
+To add a check, add an entry to `CHECKS`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import redis
+import structlog
+
+from shared.errors import MareyError, Unreachable
+from shared.jobs import TEXT_QUEUE, check_revision, list_workers, transaction
+from shared.runtime.queue import redis_client
+
+if TYPE_CHECKING:
+    from services.api.context import Context
+
+INTERVAL_SECONDS = 2.0
+"""Between the end of one round of a check and its next."""
+DEADLINE_SECONDS = 5.0
+"""A check that takes longer counts as failed, until it ends."""
+STALE_SECONDS = INTERVAL_SECONDS + DEADLINE_SECONDS
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a check ended. `message` is for everybody: what is down, never where or how."""
+
+    ok: bool
+    message: str | None = None
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something that must work.
+
+    Attributes:
+        run: raises MareyError when it does not.
+        message: what everybody is told then; the log has the error itself.
+    """
+
+    run: Callable[[Context], object]
+    message: str
+
+
+def _ping(shared: Context) -> None:
+    url = shared.config.queue_url
+    if url is None:
+        raise Unreachable("no queue is named", hint="Set MAREY_QUEUE_URL.")
+    try:
+        with redis_client(url.get_secret_value()) as client:
+            client.ping()
+    except redis.RedisError as error:
+        raise Unreachable(f"the queue does not answer ({type(error).__name__}: {error})") from error
+
+
+def _model(shared: Context) -> None:
+    """A generator's worker is ready. Once seen, its absence no longer counts: jobs wait in the queue meanwhile."""
+    if shared.seen_ready:
+        return
+    with transaction(shared.engine) as conn:
+        workers = list_workers(conn)
+    if not any(w.live and w.bundle is not None and w.queue != TEXT_QUEUE for w in workers):
+        raise Unreachable("no worker has its model loaded yet")
+    shared.seen_ready = True
+
+
+CHECKS: Mapping[str, Check] = {
+    "database": Check(
+        lambda shared: check_revision(shared.engine), "the database does not answer, or its tables are too old"
+    ),
+    "queue": Check(_ping, "the queue does not answer"),
+    "store": Check(lambda shared: shared.store.check(), "the asset store does not answer"),
+    "model": Check(_model, "no worker has its model loaded yet"),
+}
+UNCHECKED = Result(False, "not checked yet")
+
+
+class Readiness:
+    """Runs checks again and again, and remembers how each ended last."""
+
+    def __init__(
+        self, shared: Context, checks: Mapping[str, Check] = CHECKS, *, interval: float = INTERVAL_SECONDS
+    ) -> None:
+        self._shared, self._checks, self._interval = shared, checks, interval
+        self._results: dict[str, tuple[float, Result]] = {}
+        self._stopping = threading.Event()
+
+    def start(self) -> None:
+        """Begin the first round."""
+        for name, check in self._checks.items():
+            threading.Thread(target=self._repeat, args=(name, check), name=f"check-{name}", daemon=True).start()
+
+    def stop(self) -> None:
+        """Begin no other round. A check that hangs is left alone: its thread ends with the process."""
+        self._stopping.set()
+
+    def results(self) -> dict[str, Result]:
+        """How each check stands now. Never waits."""
+        oldest = time.monotonic() - STALE_SECONDS
+        found: dict[str, Result] = {}
+        for name, check in self._checks.items():
+            at, result = self._results.get(name, (float("inf"), UNCHECKED))
+            found[name] = Result(False, check.message) if at < oldest else result
+        return found
+
+    def _repeat(self, name: str, check: Check) -> None:
+        while not self._stopping.is_set():
+            result, error = self._run(check)
+            before = self._results.get(name, (0.0, UNCHECKED))[1]
+            self._results[name] = (time.monotonic(), result)
+            if error is not None and before != result:
+                log.warning("not_ready", check=name, error=str(error))
+            elif before.ok != result.ok:
+                log.info("ready", check=name)
+            self._stopping.wait(self._interval)
+
+    def _run(self, check: Check) -> tuple[Result, Exception | None]:
+        try:
+            check.run(self._shared)
+        except Exception as error:
+            if not isinstance(error, MareyError):
+                log.exception("check_failed")
+            return Result(False, check.message), error
+        return Result(True), None

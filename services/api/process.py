@@ -1,0 +1,34 @@
+"""What every HTTP server process of ours does before it serves."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import Any
+
+from shared.runtime.logs import configure_logging
+from shared.runtime.malloc import one_heap
+from shared.settings import Settings
+from shared.tracing import configure_tracing
+
+GRACE_SECONDS = 3
+"""For answers under way at SIGTERM; event streams and sockets end at once."""
+SWITCH_SECONDS = 0.001
+"""Longest turn of a thread while another waits for the interpreter (Python: 5 ms). The event loop answers between the
+turns of threads that read large bodies."""
+
+
+def prepare_process(name: str, config: Settings) -> dict[str, Any]:
+    """Set up memory, signals, logs and traces of this process; returns options of uvicorn."""
+    one_heap()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    configure_logging(name, level=config.log_level, json=config.log_json)
+    configure_tracing(name)
+    return {
+        "log_config": None,
+        "access_log": False,
+        "server_header": False,
+        "timeout_graceful_shutdown": GRACE_SECONDS,
+    }

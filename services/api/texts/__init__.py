@@ -1,0 +1,1 @@
+"""Parsing of prompts, by the text service."""

@@ -1,0 +1,103 @@
+"""The API's client of the text service."""
+
+from __future__ import annotations
+
+import asyncio
+
+import httpx2
+import structlog
+from starlette.responses import Response
+
+from services.api.problems import MEDIA_TYPE, RETRY_AFTER
+from services.text.limits import WordLimit
+from services.text.routes import ParseBody, too_late
+from shared import tracing
+from shared.errors import InvalidInput, Unreachable
+from shared.settings import Settings
+
+CONNECT_SECONDS = 2.0
+SOCKET = "unix://"
+PATH = "/v1/texts/parse"
+PASSED_ON = (200, 404, 413, 422, 429, 503)
+"""Answers that are the caller's business; any other is a fault of ours."""
+
+log = structlog.get_logger(__name__)
+
+
+class TextService:
+    """Forwards prompts to the text service over HTTP; on the event loop, no thread waits.
+
+    Raises:
+        InvalidInput: it is named, but the secret is not.
+    """
+
+    def __init__(self, config: Settings) -> None:
+        self._seconds = config.text_seconds
+        self._limit = WordLimit()
+        self._http = None if config.text_url is None else _client(config, config.text_url)
+
+    async def parse(self, body: ParseBody) -> Response:
+        """The answer of the text service, a problem included.
+
+        Raises:
+            Busy: too much is being parsed.
+            Unreachable: it does not answer in time, or there is none.
+        """
+        if self._http is None:
+            raise Unreachable(
+                "there is no text service",
+                where="MAREY_TEXT_URL",
+                hint="Start `marey text serve` and name it by MAREY_TEXT_URL.",
+                public="this server does not parse texts",
+            )
+        headers = {"Content-Type": "application/json"}
+        if (trace := tracing.current()) is not None:
+            headers[tracing.HEADER] = trace
+        with self._limit.take(body.prompts):
+            try:
+                async with asyncio.timeout(self._seconds):
+                    answer = await self._http.post(PATH, content=body.model_dump_json(), headers=headers)
+            except TimeoutError:
+                raise too_late(self._seconds) from None
+            except httpx2.TransportError as error:
+                raise _away(f"{type(error).__name__}: {error}") from error
+        if answer.status_code not in PASSED_ON:
+            raise _away(f"it answered {answer.status_code}")
+        return _passed_on(answer)
+
+    async def close(self) -> None:
+        """Close the connections."""
+        if self._http is not None:
+            await self._http.aclose()
+
+
+def _client(config: Settings, url: str) -> httpx2.AsyncClient:
+    if config.text_key is None:
+        raise InvalidInput(
+            "the text service is named, but not the secret it wants",
+            where="MAREY_TEXT_KEY",
+            hint="Set it to what the text service has.",
+        )
+    path = url.removeprefix(SOCKET) if url.startswith(SOCKET) else None
+    return httpx2.AsyncClient(
+        base_url=url if path is None else "http://text",
+        headers={"Authorization": f"Bearer {config.text_key.get_secret_value()}"},
+        transport=httpx2.AsyncHTTPTransport(uds=path, trust_env=False),
+        timeout=httpx2.Timeout(config.text_seconds, connect=CONNECT_SECONDS),
+        trust_env=False,
+    )
+
+
+def _passed_on(answer: httpx2.Response) -> Response:
+    headers = {"Retry-After": answer.headers.get("Retry-After", RETRY_AFTER)} if answer.status_code >= 429 else {}
+    media_type = "application/json" if answer.status_code == 200 else MEDIA_TYPE
+    return Response(answer.content, answer.status_code, headers, media_type)
+
+
+def _away(why: str) -> Unreachable:
+    return Unreachable(
+        f"the text service does not answer ({why})",
+        where="MAREY_TEXT_URL",
+        hint="Does `marey text serve` run there, with the same MAREY_TEXT_KEY?",
+        public="the text service does not answer",
+    )

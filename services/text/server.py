@@ -1,0 +1,116 @@
+"""`marey text serve`: the process that parses prompts for the API.
+
+It needs no database: whoever may call it shows the secret that it shares with the API (`MAREY_TEXT_KEY`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import threading
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import structlog
+import uvicorn
+from fastapi import FastAPI
+from fastapi.responses import PlainTextResponse
+from starlette.responses import Response
+
+from services.api import problems
+from services.api.bodies import BodyGuard, Patience
+from services.api.connections import connection_options
+from services.api.process import prepare_process
+from services.api.traces import Trace
+from services.text.routes import load_pipeline, text_router
+from shared.bundles import list_bundles
+from shared.errors import InvalidInput, MareyError
+from shared.settings import Settings, settings
+
+log = structlog.get_logger(__name__)
+
+
+def create_text_app(config: Settings, *, preload: bool = True) -> FastAPI:
+    """Make the application of the text service.
+
+    Args:
+        preload: load what the bundles here need as soon as it starts; `/readyz` answers 503 until then.
+
+    Raises:
+        InvalidInput: `MAREY_TEXT_KEY` is not set.
+    """
+    loaded = threading.Event()
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        if preload:
+            threading.Thread(target=_preload, args=(config, loaded), name="preload", daemon=True).start()
+        else:
+            loaded.set()
+        yield
+
+    app = FastAPI(title="Marey text service", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+    problems.install(app)
+    app.include_router(text_router(config))
+
+    @app.get("/livez")
+    async def livez() -> Response:
+        return PlainTextResponse("ok")
+
+    @app.get("/readyz")
+    async def readyz() -> Response:
+        ready = loaded.is_set()
+        return PlainTextResponse("ready" if ready else "loading", 200 if ready else 503)
+
+    app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
+    app.add_middleware(Trace)
+    return app
+
+
+def serve_text(path: Path | None = None) -> None:
+    """Serve until SIGTERM.
+
+    Args:
+        path: of the Unix socket to listen on, readable by this user alone; None = `MAREY_HOST` and `MAREY_PORT`.
+    """
+    config = settings()
+    app = create_text_app(config)
+    import torch
+
+    torch.set_num_threads(1)
+    options = prepare_process("text", config)
+    if path is None:
+        uvicorn.run(app, host=config.host, port=config.port, **options, **connection_options(config))
+        return
+    with _unix_socket(path) as listening:
+        uvicorn.Server(uvicorn.Config(app, **options, **connection_options(config))).run(sockets=[listening])
+
+
+@contextlib.contextmanager
+def _unix_socket(path: Path) -> Iterator[socket.socket]:
+    """A listening socket that its owner alone can open."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
+        path.unlink(missing_ok=True)
+        before = os.umask(0o177)
+        try:
+            listening.bind(str(path))
+        except OSError as error:
+            raise InvalidInput(f"cannot be listened on: {error.strerror or error}", where=str(path)) from error
+        finally:
+            os.umask(before)
+        yield listening
+
+
+def _preload(config: Settings, loaded: threading.Event) -> None:
+    """Load the pipeline of each bundle. One that cannot be loaded is told when it is asked for."""
+    try:
+        for bundle in list_bundles(config=config, kind="generator"):
+            if bundle.manifest.text is not None:
+                load_pipeline(bundle.manifest.text)
+    except MareyError as error:
+        log.warning("not_preloaded", error=str(error))
+    except Exception:
+        log.exception("preload_failed")
+    finally:
+        loaded.set()
