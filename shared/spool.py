@@ -70,5 +70,5 @@ class Spool:
                 f"cannot be kept: {reason}",
                 where=self._where,
                 hint=self._hint,
-                public=f"{self._where} cannot be kept: {reason}",
+                public=f"cannot be kept: {reason}",
             ) from error

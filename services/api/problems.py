@@ -33,6 +33,8 @@ RETRY_AFTER = "2"
 """Seconds: a database or store that restarts is back in about that."""
 
 LONGEST_VALUE = 80
+OF_THE_REQUEST = ("body", "prompts")
+"""Places that a caller knows: they are part of the request."""
 SUBJECT = re.compile(r"^\w+ should")
 
 log = structlog.get_logger(__name__)
@@ -94,7 +96,8 @@ def public_error(error: MareyError) -> MareyError:
         return error
     if isinstance(error, Unreachable):
         told = error.public or "something that this server needs does not answer"
-        return Unreachable(told, hint="Try again in a moment; the server's log says more.")
+        where = error.where if error.where in OF_THE_REQUEST else None
+        return Unreachable(told, where=where, hint="Try again in a moment; the server's log says more.")
     return MareyError("an internal error; the server's log says more")
 
 

@@ -263,7 +263,9 @@ class S3Store:
         if what is None or hint is None:
             return self._unreachable(f"{code}: {message}")
         STORE_ERRORS.labels("s3").inc()
-        return Unreachable(f"the object store {what} ({message or code})", where=self._where(), hint=hint, public=PUBLIC)
+        return Unreachable(
+            f"the object store {what} ({message or code})", where=self._where(), hint=hint, public=PUBLIC
+        )
 
     def _untrusted(self, why: str) -> Unreachable:
         STORE_ERRORS.labels("s3").inc()

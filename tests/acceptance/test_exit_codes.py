@@ -14,8 +14,7 @@ import pytest
 
 from services.cli.client import Client
 from services.cli.place import Server
-from shared.errors import NotFound
-from shared.runtime.embedded import postgres_url, valkey_url
+from shared.errors import NotFound, Unauthenticated
 from tests.servers.ports import free_ports
 from tests.support.marey import Marey, Serving
 
@@ -118,18 +117,21 @@ def test_models_texts_and_this_machine_can_be_looked_at(marey: Marey, offline: M
     assert all(check["state"] == "ok" for check in marey("doctor", "--json").ok().lines)
 
 
-def test_texts_can_be_served_alone(marey: Marey, offline: Marey) -> None:
+def test_the_text_service_needs_no_database_and_wants_the_secret_of_the_api(offline: Marey) -> None:
     (port,) = free_ports(1)
-    own = {"MAREY_DATABASE_URL": postgres_url(marey.home), "MAREY_QUEUE_URL": valkey_url(marey.home)}
-    process = replace(offline, environment={**own, "MAREY_PORT": str(port)}).start("text", "serve")
+    own = {"MAREY_TEXT_KEY": "shared", "MAREY_PORT": str(port)}
+    refused = replace(offline, environment={"MAREY_PORT": str(port)})("text", "serve")
+    assert refused.code == 2
+    assert "MAREY_TEXT_KEY" in refused.err
+    process = replace(offline, environment=own).start("text", "serve")
     try:
-        with marey.client() as client:
-            alone = Client(Server(f"http://127.0.0.1:{port}", client.server.key))
-        with alone:
-            wait_for_port(port)
+        wait_for_port(port)
+        with Client(Server(f"http://127.0.0.1:{port}", "shared")) as alone:
             assert alone.post("/v1/texts/parse", {"prompts": ["a person bows"]})["items"][0]["text"] == "a person bows"
             with pytest.raises(NotFound):
                 alone.get("/v1/jobs")
+        with Client(Server(f"http://127.0.0.1:{port}", "another")) as stranger, pytest.raises(Unauthenticated):
+            stranger.post("/v1/texts/parse", {"prompts": ["a person bows"]})
     finally:
         process.terminate()
         process.wait(20)

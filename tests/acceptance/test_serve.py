@@ -49,7 +49,7 @@ def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Mare
             def succeeded() -> int:
                 return client.get(f"/v1/jobs/{job}")["counters"]["succeeded"]
 
-            for kind in ("worker child", "scheduler", "api", "postgres", "valkey-server", "worker"):
+            for kind in ("worker child", "scheduler", "api", "text", "postgres", "valkey-server", "worker"):
                 children = server.children()
                 victim = children["worker"].children()[0] if kind == "worker child" else children[kind]
                 victim.kill()

@@ -19,7 +19,7 @@ from services.api.jobs.service import MAX_VALUES
 from shared.errors import NotFound
 from shared.jobs import WorkerBeat, beat, transaction
 from shared.spool import IN_MEMORY
-from tests.support.live_api import BUNDLE, LiveApi
+from tests.support.live_api import BUNDLE, LiveApi, wait_until
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
 
@@ -394,12 +394,15 @@ def test_a_broken_bundle_is_told_without_a_path_and_hides_no_other(http: httpx2.
 
 
 def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:
-    response = httpx2.get(f"{api.url}/readyz")
-    assert response.status_code == 503
-    assert [name for name, check in response.json()["checks"].items() if not check["ok"]] == ["model"]
+    def failing() -> list[str]:
+        checks = httpx2.get(f"{api.url}/readyz").json()["checks"]
+        return [name for name, check in checks.items() if not check["ok"]]
+
+    wait_until(lambda: failing() == ["model"])
+    assert httpx2.get(f"{api.url}/readyz").status_code == 503
     with transaction(api.engine) as conn:
         beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
-    assert httpx2.get(f"{api.url}/readyz").json()["ready"] is True
+    wait_until(lambda: httpx2.get(f"{api.url}/readyz").json()["ready"])
     with transaction(api.engine) as conn:
         beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu"))
     assert httpx2.get(f"{api.url}/readyz").status_code == 200

@@ -8,11 +8,12 @@ import httpx2
 import numpy as np
 import pytest
 
+from services.text.routes import pipeline_of
 from shared.bundles import BundleWriter, TextSpec
 from shared.jobs import create_engine, create_key, transaction
 from shared.runtime.embedded import EmbeddedServer
 from shared.settings import settings
-from tests.support.live_api import ApiThread, settings_of
+from tests.support.live_api import ApiThread, settings_of, with_text_service
 
 PATH = "/v1/texts/parse"
 READER = "hgm3-reader"
@@ -35,8 +36,12 @@ def http(
         engine = create_engine(module_database_url)
         with transaction(engine) as conn:
             key = create_key(conn, "reader", ["read"]).secret
-        with ApiThread(config) as url, httpx2.Client(base_url=url, timeout=60) as client:
-            client.headers["Authorization"] = f"Bearer {key}"
+        with (
+            with_text_service(config) as named,
+            ApiThread(named) as url,
+            httpx2.Client(base_url=url, timeout=60, headers={"Authorization": f"Bearer {key}"}) as client,
+        ):
+            pipeline_of(READER)  # as the service's process does before it is ready
             yield client
         engine.dispose()
 

@@ -30,7 +30,7 @@ class Network:
 
     Attributes:
         folder: of homes, logs and secrets.
-        api: port of the API.
+        api: port of the API; the text service has the one after it.
         store: host and port of the S3 server.
     """
 
@@ -50,6 +50,8 @@ class Network:
             ("objectstore:8333", self.store),
             ("127.0.0.1:8333", self.store),
             ("127.0.0.1:8400", f"127.0.0.1:{self.api}"),
+            ("127.0.0.1:8401", f"127.0.0.1:{self.api + 1}"),
+            ("parser:8401", f"127.0.0.1:{self.api + 1}"),
             ("0.0.0.0", "127.0.0.1"),
             ("/models", str(REPOSITORY / "models")),
         ):
@@ -76,7 +78,7 @@ class Process:
         given = {name: self.network.place(value) for name, value in given.items()}
         given["PATH"] = f"{BIN}:{kept['PATH']}"
         given["MAREY_HOME"] = str(self.home)
-        given["MAREY_PORT"] = str(self.network.api)
+        given["MAREY_PORT"] = str(self.network.api + (self.service.name == "parser"))
         if self.metrics:
             given["MAREY_METRICS_PORT"] = str(self.metrics)
         if "MAREY_THREADS" in given:

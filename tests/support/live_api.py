@@ -7,7 +7,7 @@ import hashlib
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,11 +16,14 @@ import numpy as np
 import sqlalchemy as sa
 import structlog
 import uvicorn
+from fastapi import FastAPI
+from pydantic import SecretStr
 
 from services.api.app import create_app
 from services.api.connections import connection_options
 from services.cli.client import Client
 from services.cli.place import Server
+from services.text.server import create_text_app
 from shared.bundles import BundleWriter, TextSpec
 from shared.jobs import (
     DEFAULT_TENANT,
@@ -148,12 +151,13 @@ def settings_of(home: Path, database_url: str, queue_url: str) -> Settings:
 class ApiThread:
     """Serves an application until the end of the block; its log lines go to stderr, as those of a server of its own."""
 
-    def __init__(self, config: Settings) -> None:
+    def __init__(self, config: Settings, app: FastAPI | None = None) -> None:
+        """`app`: None = the API."""
         structlog.configure(logger_factory=structlog.PrintLoggerFactory(sys.__stderr__))
         self.config = config
         self._server = uvicorn.Server(
             uvicorn.Config(
-                create_app(config),
+                create_app(config) if app is None else app,
                 port=config.port,
                 log_level="warning",
                 timeout_graceful_shutdown=1,
@@ -177,11 +181,31 @@ class ApiThread:
 
 
 @contextlib.contextmanager
+def with_text_service(config: Settings) -> Iterator[Settings]:
+    """A text service beside the API of these settings; yields the settings that name it."""
+    port = free_ports(1)[0]
+    named = config.model_copy(
+        update={"text_url": f"http://127.0.0.1:{port}", "text_key": SecretStr("the text service's")}
+    )
+    own = named.model_copy(update={"port": port})
+    with ApiThread(own, create_text_app(own, preload=False)):
+        yield named
+
+
+def wait_until(happened: Callable[[], bool], seconds: float = 20) -> None:
+    """Wait until something is so; fails after a while."""
+    deadline = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < deadline, "it does not happen"
+        time.sleep(0.05)
+
+
+@contextlib.contextmanager
 def running_api(config: Settings, database_url: str) -> Iterator[LiveApi]:
     """The API of these settings, with a key that may do everything."""
     engine = create_engine(database_url)
     with transaction(engine) as conn:
         key = create_key(conn, "all", ["admin"]).secret
-    with ApiThread(config) as url:
+    with with_text_service(config) as named, ApiThread(named) as url:
         yield LiveApi(url, key, engine, open_store(config))
     engine.dispose()

@@ -119,7 +119,8 @@ class Readiness:
             before = self._results.get(name, (0.0, UNCHECKED))[1]
             self._results[name] = (time.monotonic(), result)
             if error is not None and before != result:
-                log.warning("not_ready", check=name, error=str(error))
+                bug = None if isinstance(error, MareyError) else error
+                log.warning("not_ready", check=name, error=str(error), exc_info=bug)
             elif before.ok != result.ok:
                 log.info("ready", check=name)
             self._stopping.wait(self._interval)
@@ -128,7 +129,5 @@ class Readiness:
         try:
             check.run(self._shared)
         except Exception as error:
-            if not isinstance(error, MareyError):
-                log.exception("check_failed")
             return Result(False, check.message), error
         return Result(True), None

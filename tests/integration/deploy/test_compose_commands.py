@@ -13,6 +13,8 @@ import pytest
 import redis
 import sqlalchemy as sa
 
+from services.cli.client import Client
+from services.cli.place import Server
 from shared.jobs import create_engine, transaction
 from shared.runtime.embedded import EmbeddedServer
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
@@ -39,7 +41,7 @@ def stack(
 ) -> Iterator[Stack]:
     folder = tmp_path_factory.mktemp("composed")
     _empty(module_database_url, valkey)
-    network = Network(folder, free_ports(1), swift.endpoint)
+    network = Network(folder, free_ports(2), swift.endpoint)
     own = {"database_url": module_database_url, "queue_url": valkey.url}
     write_secrets(network.secrets, own | {"s3_access_key": ACCESS_KEY, "s3_secret_key": SECRET_KEY})
     processes = {name: Process(service, network) for name, service in services().items() if service.ours}
@@ -47,7 +49,7 @@ def stack(
         migrate = processes["migrate"]
         assert migrate.start().wait() == 0, migrate.log.read_text()
         lasting = [process for name, process in processes.items() if name != "migrate"]
-        assert all("migrate" in waits_for(process.service) for process in lasting)
+        assert all("migrate" in waits_for(each.service) for each in lasting if each.service.name != "parser")
         for process in lasting:
             process.start()
         for process in lasting:
@@ -75,6 +77,13 @@ def test_prompts_become_motions_of_both_models(stack: Stack, tmp_path: Path) -> 
         out = tmp_path / model
         stack.client("submit", "a person walks", "--model", model, "--seconds", 2, "--fetch", out, timeout=300).ok()
         assert {path.suffix for path in out.iterdir()} >= {".bvh", ".npz"}
+
+
+def test_the_parser_parses_for_the_api(stack: Stack) -> None:
+    server = Server(stack.client.environment["MAREY_SERVER"], stack.client.environment["MAREY_KEY"])
+    with Client(server) as client:
+        parsed = client.post("/v1/texts/parse", {"prompts": ["a person walks"]})
+    assert parsed["items"][0]["text"] == "a person walks"
 
 
 def test_an_evaluation_ends_in_a_report(stack: Stack, tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def settings_of(service: Service, monkeypatch: pytest.MonkeyPatch, secrets: str)
 
 
 def test_every_part_of_the_platform_is_there() -> None:
-    ours = {"migrate", "api", "scheduler", "text", "worker-hgm3", "worker-mogo", "evaluator"}
+    ours = {"migrate", "api", "scheduler", "parser", "text", "worker-hgm3", "worker-mogo", "evaluator"}
     assert set(ALL) == ours | {"postgres", "redis", "objectstore"}
     assert {service.name for service in OURS} == ours
     assert {service.command[1] for service in OURS if service.command[0] == "worker"} == set(HANDLERS)
@@ -107,8 +107,17 @@ def test_settings_load_and_every_secret_reaches_one(
     found = settings_of(service, monkeypatch, secrets_folder)
     for name in service.secrets:
         assert getattr(found, name).get_secret_value() == secrets[name]
-    assert found.store == "s3://marey"
-    assert found.host == ("0.0.0.0" if service.target == "server" else "127.0.0.1")
+    assert found.store == (None if service.name == "parser" else "s3://marey")
+    assert found.host == ("0.0.0.0" if service.target == "server" or service.name == "parser" else "127.0.0.1")
+
+
+def test_the_api_finds_the_parser_and_both_share_a_secret_that_no_other_service_has() -> None:
+    api, parser = ALL["api"], ALL["parser"]
+    assert api.environment["MAREY_TEXT_URL"] == f"http://parser:{parser.environment['MAREY_PORT']}"
+    assert {name for name, service in ALL.items() if "text_key" in service.secrets} == {"api", "parser"}
+    assert parser.secrets == ["text_key"]
+    assert parser.raw["networks"] == ["back"]
+    assert "ports" not in parser.raw
 
 
 def test_every_secret_is_drawn_and_used(secrets: dict[str, str]) -> None:
@@ -140,5 +149,7 @@ def test_whoever_is_stopped_gets_the_time_it_asks_for() -> None:
 def test_limits_of_processor_time_and_threads_are_one_number() -> None:
     chosen = services({"MAREY_WORKER_CPUS": "7"})
     for service in chosen.values():
-        if service.ours and service.target == "worker":
+        if service.name == "parser":  # one sentence at a time fills one core
+            assert str(service.raw["cpus"]) == service.environment["MAREY_THREADS"] == "1"
+        elif service.ours and service.target == "worker":
             assert str(service.raw["cpus"]) == service.environment["MAREY_THREADS"] == "7"

@@ -16,7 +16,7 @@ from sqlalchemy import make_url
 from tests.support.marey import REPOSITORY
 
 SCRIPT = REPOSITORY / "deploy" / "make-secrets"
-OURS = {"database_url", "queue_url", "s3_access_key", "s3_secret_key", "webhook_key"}
+OURS = {"database_url", "queue_url", "s3_access_key", "s3_secret_key", "webhook_key", "text_key"}
 SOMEBODY = 65534
 THEIRS = {"postgres_password", "queue_password"}
 
@@ -29,8 +29,8 @@ def test_what_is_drawn_fits_together(secrets: dict[str, str]) -> None:
     assert Fernet(secrets["webhook_key"])
     given = dict(line.split("=") for line in secrets["objectstore.env"].splitlines())
     assert given == {"AWS_ACCESS_KEY_ID": secrets["s3_access_key"], "AWS_SECRET_ACCESS_KEY": secrets["s3_secret_key"]}
-    drawn = [secrets[name] for name in ("postgres_password", "queue_password", "s3_access_key", "s3_secret_key")]
-    assert len(set(drawn)) == 4
+    drawn = [secrets[name] for name in sorted(THEIRS | {"s3_access_key", "s3_secret_key", "text_key"})]
+    assert len(set(drawn)) == 5
     assert all(len(value) == 48 for value in drawn)
 
 
