@@ -14,18 +14,12 @@ from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_add
 import httpx2
 
 from shared.errors import InvalidInput, Refused
+from shared.webhooks.special_addresses import purpose_of
 
 Address = IPv4Address | IPv6Address
 
 PUBLIC = "public"
 MAX_URL = 2000  # characters
-INTERNET_6 = IPv6Network("2000::/3")
-NOT_PUBLIC = (
-    ip_network("192.88.99.0/24"),  # 6to4 relays
-    ip_network("168.63.129.16/32"),  # Azure's own services, seen from its machines alone
-    ip_network("2002::/16"),  # 6to4: an IPv4 address inside
-)
-"""What `ipaddress` takes for public."""
 HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."
 
 
@@ -73,11 +67,7 @@ def parse_address(text: str) -> Address:
 
 def is_public(address: Address) -> bool:
     """Whether an address belongs to one machine of the internet."""
-    if isinstance(address, IPv6Address) and address not in INTERNET_6:
-        return False
-    if any(address in network for network in NOT_PUBLIC if network.version == address.version):
-        return False
-    return address.is_global and not address.is_multicast
+    return purpose_of(address) is None
 
 
 def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
