@@ -45,7 +45,7 @@ def main() -> None:
         api = cluster.serve()
         with cluster.client() as client:
             job = client.submit([{"prompt": f"walk {n} steps", "model": BUNDLE} for n in range(MOTIONS)])["id"]
-            _make(cluster)
+            make_motions(cluster, _motion)
             planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), cluster.home / "bare", None)
         files = [file for _, of_item in planned for file in of_item]
         assert len(files) == 2 * MOTIONS
@@ -106,8 +106,8 @@ def _bare(cluster: Platform, files: Sequence[Download], folder: Path, threads: i
     return time.process_time() - before
 
 
-def _make(cluster: Platform) -> None:
-    """What workers would do, with files of the usual size, no two the same."""
+def make_motions(cluster: Platform, motion_of: Callable[[AssetStore, ClaimedItem], NewMotion]) -> None:
+    """Do what workers would, with the motions that `motion_of` puts into the store."""
     store = open_store(cluster.settings())
     while True:
         with transaction(cluster.engine) as conn:
@@ -120,7 +120,7 @@ def _make(cluster: Platform) -> None:
             found = claim(conn, QUEUE, "hands", 256)
         if found is None:
             return
-        motions = [_motion(store, item) for item in found.items]
+        motions = [motion_of(store, item) for item in found.items]
         with transaction(cluster.engine) as conn:
             begin_assets(conn, found.lease_token, [file for motion in motions for file in motion.files.values()])
         with transaction(cluster.engine) as conn:
@@ -128,6 +128,7 @@ def _make(cluster: Platform) -> None:
 
 
 def _motion(store: AssetStore, item: ClaimedItem) -> NewMotion:
+    """Files of the usual size, no two the same."""
     digests: dict[str, AssetDigest] = {}
     for ending, size in (("npz", NPZ), ("bvh", BVH)):
         content = hashlib.shake_128(f"{item.id} {ending}".encode()).digest(size)

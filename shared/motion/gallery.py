@@ -18,7 +18,7 @@ from shared.motion.pages import asset, fill, script_json, whole_page
 from shared.motion.paper import one_line
 from shared.motion.player import motion_document
 
-MOST_CARDS = 100
+MOST_CARDS = 400
 """Motions of a page: a clip of 10 s takes 50 kB."""
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,12 +17,16 @@ from services.cli.commands.motions import Review, review_of
 from shared.errors import Conflict, InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
-    from shared.motion.clip import MotionClip
+    from PIL.Image import Image
 
-PER_PAGE = {".html": 48, ".htm": 48, ".png": 24}
-MOST_A_PAGE = 100
-"""A hundred strips are a picture of 33,000 pixels; a hundred players 5 MB."""
+    from services.cli.client import Client
+    from services.cli.drawing import Drawers
+
+ENDINGS = (".html", ".htm", ".png")
+PER_PAGE = 400
+"""A page of so many players has 20 MB."""
+ROWS = 24
+"""A sheet of more motions than this shows each as a tile; of these, as a row that takes the whole width."""
 MOST = 1000
 """Motions of one call."""
 CONTINUED = re.compile(r"-from-\d+$")
@@ -32,50 +37,52 @@ def review(
     job: Annotated[str, typer.Argument(metavar="JOB", help="The job's id.")],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help="A .html (3D players) or .png (contact sheet); then -2, -3, …"),
+        typer.Option("-o", "--output", help="A .html (3D players) or .png (contact sheet); several get -1, -2, …"),
     ] = Path("review.html"),
     reviews: Annotated[
-        list[Review] | None, typer.Option("--review", help="Only motions of which this was said; may be repeated.")
+        list[Review] | None, typer.Option("--review", help="Only motions with this review; may be repeated.")
     ] = None,
     tags: Annotated[list[str] | None, typer.Option("--tag", help="Only motions with this tag.")] = None,
     per_page: Annotated[
-        int | None, typer.Option("--per-page", min=1, max=MOST_A_PAGE, help="Motions a page: 48, of a .png 24.")
-    ] = None,
+        int, typer.Option("--per-page", min=1, max=PER_PAGE, help="Motions on a page, at most.")
+    ] = PER_PAGE,
     skip: Annotated[int, typer.Option("--skip", min=0, help="Leave out so many at the start.")] = 0,
     limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many.")] = MOST,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace pages that are there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing pages.")] = False,
 ) -> None:
-    """Draw the motions of a job, in the order they were made, on pages to choose by or on contact sheets."""
+    """Draw the motions of a job, in input order, on pages to choose from or on contact sheets.
+
+    A .png of up to 24 motions shows a row of each; one of more shows tiles.
+    """
     from services.cli.client import Client
+    from services.cli.drawing import Drawers
     from services.cli.extras import needs_extra
 
     try:
         import shared.motion.gallery  # noqa: F401
     except ImportError as error:
         raise needs_extra("motion", error) from error
-    if output.suffix.lower() not in PER_PAGE:
+    if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="The ending says what to draw.")
-    size = per_page or PER_PAGE[output.suffix.lower()]
     with Client.here() as client:
         found, more = _motions(client, job, reviews, tags, skip, limit)
         name = client.get(f"/v1/jobs/{job}")["name"] or f"Job {job}"
-        pages = [found[first : first + size] for first in range(0, len(found), size)]
-        paths = [
-            output.with_stem(output.stem + (f"-{number}" if number > 1 else "")) for number in range(1, len(pages) + 1)
-        ]
+        pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]
+        paths = _paths(output, len(pages))
         _check_free(paths, overwrite=overwrite)
-        with console.bar() as bar:
+        with console.bar() as bar, _together(paths) as drafts, Drawers(len(found)) as drawers:
             task = bar.add_task("drawing", total=len(found))
             for number, page in enumerate(pages):
-                first = skip + number * size
-                told = f"{first + 1} to {first + len(page)} of {skip + len(found)}{' and more' if more else ''}"
-                clips = list(_clips(client, page))
-                if paths[number].suffix.lower() == ".png":
-                    _sheet(page, clips, paths[number], f"{name}: {told}")
-                else:
-                    beside = [None, *(path.name for path in paths), None]
-                    _page(page, clips, paths[number], name, told, beside[number], beside[number + 2])
-                bar.advance(task, len(page))
+                first = skip + number * per_page
+                count = f"{first + 1} to {first + len(page)} of {skip + len(found)}{' and more' if more else ''}"
+                with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
+                    files = _fetch(client, page, Path(folder))
+                    if output.suffix.lower() == ".png":
+                        _sheet(page, files, drafts[number], f"{name}: {count}", drawers, lambda: bar.advance(task))
+                    else:
+                        beside = [None, *(path.name for path in paths), None]
+                        _page(page, files, drafts[number], name, count, beside[number], beside[number + 2])
+                        bar.advance(task, len(page))
     for path in paths:
         console.result(console.home_relative(path))
     if more:
@@ -87,33 +94,64 @@ def review(
         )
 
 
-def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
-    """Nothing, if the pages may be written.
+def _paths(output: Path, pages: int) -> list[Path]:
+    """The page's name; of several pages, numbered ones."""
+    if pages == 1:
+        return [output]
+    return [output.with_stem(f"{output.stem}-{number}") for number in range(1, pages + 1)]
+
+
+@contextmanager
+def _together(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Where to write pages, so that they appear under their names when all of them are written.
 
     Raises:
-        Conflict: one is there already.
+        InvalidInput: the folder is missing or cannot be written to.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(prefix=".marey-review-", dir=paths[0].parent)
+    except OSError as error:
+        raise InvalidInput(f"cannot be written: {error.strerror}", where=str(paths[0])) from None
+    with folder as name:
+        drafts = [Path(name) / path.name for path in paths]
+        yield drafts
+        for draft, path in zip(drafts, paths, strict=True):
+            draft.replace(path)
+
+
+def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
+    """Raise unless the pages may be written.
+
+    Raises:
+        Conflict: one exists.
     """
     there = [path for path in paths if path.exists()]
     if there and not overwrite:
         more = f", and {len(there) - 1} more of {len(paths)} pages" if len(there) > 1 else ""
         raise Conflict(
-            f"is there already{more}",
+            f"already exists{more}",
             where=str(there[0]),
-            hint="Name another file with -o, or --overwrite.",
+            hint="Name another file with -o, or use --overwrite.",
         )
 
 
 def _motions(
     client: Client, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
 ) -> tuple[list[dict[str, Any]], bool]:
-    """The motions to show, and whether there are more.
+    """The motions to show, in the order of the job's items, and True if there are more.
 
     Raises:
         NotFound: none.
     """
-    params = {"review": [review.value for review in reviews] if reviews else None, "tag": tags, "limit": 1000}
-    listed = islice(client.pages(f"/v1/jobs/{job}/motions", **params), skip, skip + limit + 1)
-    found = list(listed)
+    wanted, of_each = set(reviews or Review), set(tags or ())
+    items = client.pages(f"/v1/jobs/{job}/items", state="succeeded", limit=1000)
+    motions = (item["motion"] for item in items if item["motion"])
+    chosen = (
+        motion
+        for motion in motions
+        if of_each <= set(motion["tags"]) and (review_of(motion) or Review.NEW.value) in wanted
+    )
+    found = list(islice(chosen, skip, skip + limit + 1))
     if not found:
         raise NotFound(
             "no motion of this job fits",
@@ -123,41 +161,61 @@ def _motions(
     return found[:limit], len(found) > limit
 
 
-def _sheet(motions: Sequence[dict[str, Any]], clips: list[MotionClip], path: Path, title: str) -> None:
-    from shared.motion.render import contact_sheet
+def _sheet(
+    motions: Sequence[dict[str, Any]],
+    files: Sequence[Path],
+    path: Path,
+    title: str,
+    drawers: Drawers,
+    done: Callable[[], None],
+) -> None:
+    from services.cli.drawing import THEME, Drawing
+    from shared.motion.overview import overview
+    from shared.motion.paper import theme_named
+    from shared.motion.render import COLUMNS, save_png, stack_rows
 
+    columns = COLUMNS if len(motions) <= ROWS else None
     captions = [f"{_facts(motion)}  ·  {motion['prompt']}" for motion in motions]
-    contact_sheet(clips, path, captions=captions, title=title)
+    drawings = [Drawing(file, caption, columns) for file, caption in zip(files, captions, strict=True)]
+
+    def images() -> Iterator[Image]:
+        for image in drawers.draw(drawings):
+            yield image
+            done()
+
+    if columns is None:
+        sheet = overview(images(), len(drawings), title, theme=theme_named(THEME))
+    else:
+        sheet = stack_rows(list(images()), title, theme=theme_named(THEME))
+    save_png(sheet, path)
 
 
 def _page(
     motions: Sequence[dict[str, Any]],
-    clips: list[MotionClip],
+    files: Sequence[Path],
     path: Path,
     title: str,
     count: str,
     earlier: str | None,
     later: str | None,
 ) -> None:
+    from shared.motion.clip import load_npz
     from shared.motion.gallery import Card, html_gallery
 
     cards = [
-        Card(motion["id"], clip, motion["prompt"], _facts(motion), motion["tags"], _said(motion))
-        for motion, clip in zip(motions, clips, strict=True)
+        Card(motion["id"], load_npz(file), motion["prompt"], _facts(motion), motion["tags"], _said(motion))
+        for motion, file in zip(motions, files, strict=True)
     ]
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later)
 
 
-def _clips(client: Client, motions: Sequence[dict[str, Any]]) -> Iterator[MotionClip]:
-    """The motions' npz, fetched eight at a time into a folder that goes again."""
+def _fetch(client: Client, motions: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
+    """The motions' npz, fetched eight at a time into a folder."""
     from services.cli.fetching import Download, download_all
-    from shared.motion.clip import load_npz
 
-    with tempfile.TemporaryDirectory(prefix="marey-review-") as folder:
-        downloads = [_download(motion, Path(folder), Download) for motion in motions]
-        download_all(client, downloads, overwrite=False, done=lambda _: None)
-        for download in downloads:
-            yield load_npz(download.path)
+    downloads = [_download(motion, folder, Download) for motion in motions]
+    download_all(client, downloads, overwrite=False, done=lambda _: None)
+    return [download.path for download in downloads]
 
 
 def _download(motion: dict[str, Any], folder: Path, kind: Any) -> Any:

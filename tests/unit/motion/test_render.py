@@ -48,6 +48,14 @@ def orangish(picture: NDArray[np.int16]) -> NDArray[np.bool_]:
     return picture[..., 0] - picture[..., 2] > 60
 
 
+def shaded(ends: NDArray, radii: NDArray, colours: NDArray, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Round cones as an RGBA picture: alpha is 255 where there is one."""
+    picture = np.zeros((size[1], size[0], 4), np.uint8)
+    shown = shade(ends, radii, colours, size)
+    picture[shown.rows, shown.columns] = np.concatenate([shown.colours, np.full((len(shown.rows), 1), 255, "u1")], -1)
+    return picture
+
+
 def centre(mask: NDArray[np.bool_]) -> tuple[float, float]:
     rows, columns = np.nonzero(mask)
     return float(columns.mean()), float(rows.mean())
@@ -259,7 +267,7 @@ def test_small_branches_of_the_trunk_are_no_arms():
 
 def test_a_ball_is_a_disc_with_the_light_from_above():
     ends = np.array([[[50, 50, 0], [50, 50, 0]]], np.float32)
-    picture = shade(ends, np.full((1, 2), 20, np.float32), np.full((1, 3), 0.6, np.float32), (100, 100))
+    picture = shaded(ends, np.full((1, 2), 20, np.float32), np.full((1, 3), 0.6, np.float32), (100, 100))
     y, x = np.mgrid[:100, :100] + 0.5
     inside = np.hypot(x - 50, y - 50)
     assert (picture[..., 3][inside < 19.5] == 255).all()
@@ -274,7 +282,7 @@ def test_a_round_cone_is_the_union_of_its_balls(seed):
     spread = [22, 22, 60] if seed % 2 else [2, 2, 22]
     ends = np.array([40.0, 60, 0]) + random.normal(0, 1, (2, 3)) * spread
     radii = random.uniform(4, 16, 2)
-    picture = shade(ends[None].astype(np.float32), radii[None].astype(np.float32), np.ones((1, 3), "f4"), (90, 120))
+    picture = shaded(ends[None].astype(np.float32), radii[None].astype(np.float32), np.ones((1, 3), "f4"), (90, 120))
     y, x = np.mgrid[:120, :90] + 0.5
     share = np.linspace(0, 1, 400)[:, None, None]
     (ax, ay, _), (bx, by, _) = ends
@@ -288,14 +296,14 @@ def test_what_is_nearer_hides_what_is_behind():
     ends = np.array([[[30, 50, 10], [70, 50, 10]], [[50, 30, -10], [50, 70, -10]]], np.float32)
     colours = np.array([[1, 0, 0], [0, 0, 1]], np.float32)
     for order in ([0, 1], [1, 0]):
-        picture = shade(ends[order], np.full((2, 2), 6, np.float32), colours[order], (100, 100))
+        picture = shaded(ends[order], np.full((2, 2), 6, np.float32), colours[order], (100, 100))
         assert picture[50, 50, 0] > 100 > picture[50, 50, 2]
         assert picture[35, 50, 2] > 100
 
 
 def test_the_camera_keeps_lengths_and_looks_down():
     camera = Camera(azimuth=20, elevation=30)
-    axes = camera.axes()
+    axes = camera.axes
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-6)
     assert np.linalg.det(axes) == pytest.approx(-1, abs=1e-6)  # y is down: the mirror image of a right-handed view
     assert camera.project(np.array([0.0, 1.0, 0.0]))[1] < 0  # up is up the page
