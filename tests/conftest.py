@@ -11,17 +11,19 @@ import itertools
 import shutil
 import tempfile
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import psycopg
 import pytest
-import redis
 import sqlalchemy as sa
 
 from shared.jobs import create_engine, upgrade
-from shared.runtime.embedded import EmbeddedServer, socket_folder, start_postgres, start_valkey
+from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from shared.runtime.queue import redis_client
 from shared.storage import FolderStore
 from shared.storage.s3 import S3Store
+from tests.servers.given import GivenServer, given_server
 from tests.servers.swift import Swift
 
 TEMPLATE = "migrated"
@@ -45,9 +47,11 @@ def short_home() -> Iterator[Path]:
 
 
 @pytest.fixture(scope="session")
-def postgres(servers_home: Path) -> Iterator[EmbeddedServer]:
+def postgres(servers_home: Path) -> Iterator[EmbeddedServer | GivenServer]:
     """The run's Postgres, with a migrated template database. Not to be killed: see `short_home`."""
-    with start_postgres(servers_home, durable=False) as server:
+    given = given_server("MAREY_TEST_POSTGRES")
+    with start_postgres(servers_home, durable=False) if given is None else nullcontext(given) as server:
+        _execute(server, f"DROP DATABASE IF EXISTS {TEMPLATE} WITH (FORCE)")
         _execute(server, f"CREATE DATABASE {TEMPLATE}")
         engine = create_engine(_url(server, TEMPLATE))
         upgrade(engine)
@@ -56,7 +60,7 @@ def postgres(servers_home: Path) -> Iterator[EmbeddedServer]:
 
 
 @pytest.fixture
-def database_url(postgres: EmbeddedServer) -> Iterator[str]:
+def database_url(postgres: EmbeddedServer | GivenServer) -> Iterator[str]:
     """URL of a migrated, empty database of this test's own."""
     name = f"test_{next(_numbers)}"
     _execute(postgres, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
@@ -65,7 +69,7 @@ def database_url(postgres: EmbeddedServer) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def module_database_url(postgres: EmbeddedServer) -> Iterator[str]:
+def module_database_url(postgres: EmbeddedServer | GivenServer) -> Iterator[str]:
     """URL of a migrated, empty database that the tests of a module share."""
     name = f"module_{next(_numbers)}"
     _execute(postgres, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
@@ -82,16 +86,17 @@ def engine(database_url: str) -> Iterator[sa.Engine]:
 
 
 @pytest.fixture(scope="session")
-def valkey(servers_home: Path) -> Iterator[EmbeddedServer]:
+def valkey(servers_home: Path) -> Iterator[EmbeddedServer | GivenServer]:
     """The run's Valkey. Not to be killed: see `short_home`."""
-    with start_valkey(servers_home) as server:
+    given = given_server("MAREY_TEST_REDIS")
+    with start_valkey(servers_home) if given is None else nullcontext(given) as server:
         yield server
 
 
 @pytest.fixture
-def queue_url(valkey: EmbeddedServer, servers_home: Path) -> str:
+def queue_url(valkey: EmbeddedServer | GivenServer) -> str:
     """Celery's URL of an empty Valkey."""
-    with redis.Redis(unix_socket_path=str(socket_folder(servers_home) / "valkey.sock")) as client:
+    with redis_client(valkey.url) as client:
         client.flushall()
     return valkey.url
 
@@ -119,11 +124,11 @@ def s3_store(swift: Swift) -> S3Store:
     return swift.new_store()
 
 
-def _url(server: EmbeddedServer, database: str) -> str:
+def _url(server: EmbeddedServer | GivenServer, database: str) -> str:
     return sa.make_url(server.url).set(database=database).render_as_string(hide_password=False)
 
 
-def _execute(server: EmbeddedServer, statement: str) -> None:
+def _execute(server: EmbeddedServer | GivenServer, statement: str) -> None:
     dsn = sa.make_url(server.url).set(drivername="postgresql", database="postgres")
     with psycopg.connect(dsn.render_as_string(hide_password=False), autocommit=True) as connection:
         connection.execute(statement.encode())

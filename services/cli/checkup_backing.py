@@ -150,13 +150,14 @@ def queue(name: str, url: str) -> Check:
     """A Redis that answers and throws nothing away."""
     import redis
 
-    from shared.runtime.queue import redis_client
+    from shared.runtime.queue import check_queue, redis_client
 
     try:
+        version = check_queue(url)
         with redis_client(url) as client:
-            client.ping()
-            version = client.info("server").get("redis_version", "unknown")  # pyright: ignore[reportAttributeAccessIssue]
             policy = _memory_policy(client)
+    except MareyError as error:
+        return broken(name, error)
     except (redis.RedisError, ValueError) as error:
         hint = "Is it running, and is MAREY_QUEUE_URL (MAREY_STREAMS_URL) right? Embedded: `marey serve` starts it."
         return Check(name, "bad", f"it does not answer ({type(error).__name__})", hint)

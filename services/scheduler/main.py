@@ -15,6 +15,7 @@ from services.scheduler.evaluations import Evaluations
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from services.scheduler.sending import Sender
+from services.scheduler.servers import CHECK_SECONDS, server_check
 from services.scheduler.webhooks import Deliverer
 from shared import metrics
 from shared.errors import InvalidInput
@@ -117,6 +118,8 @@ def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
 
 
 def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:
+    assert chosen.queue_url is not None  # the caller looked
+    queue_url = chosen.queue_url.get_secret_value()
     store = open_store(chosen)
     evaluations = Evaluations(engine, chosen)
 
@@ -168,5 +171,6 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
         Periodic(
             "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY
         ),
+        Periodic("servers", server_check(engine, queue_url), seconds=CHECK_SECONDS, stopping=stopping),
         Periodic("evaluations", evaluations.round, seconds=chosen.evaluation_seconds, stopping=stopping),
     ]

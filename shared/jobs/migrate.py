@@ -17,6 +17,7 @@ from alembic.util import CommandError
 from shared.errors import Conflict, Unreachable
 from shared.jobs.database import transaction
 from shared.jobs.deadlines import MIGRATION
+from shared.versions import check_postgres
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
 LOCK_SECONDS = 3.0
@@ -24,13 +25,15 @@ LOCK_SECONDS = 3.0
 PATIENCE = 60.0
 """Then the migration is tried again, for so long."""
 PAUSE_SECONDS = 2.0
+VERSION = sa.cast(sa.func.current_setting("server_version_num"), sa.Integer)
 
 
 def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATIENCE) -> None:
     """Migrate up, all or nothing, under an advisory lock: several processes may start at once.
 
     Raises:
-        Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
+        Conflict: somebody held a table for `patience` seconds, the database is of a newer version, or its server is too
+            old.
         Unreachable: the database does not answer.
     """
     _migrate(engine, command.upgrade, revision, patience)
@@ -77,11 +80,12 @@ def check_revision(engine: sa.Engine) -> None:
     A database of a newer version is fine: migrations only add (docs/deployment.md), and an upgrade migrates first.
 
     Raises:
-        Conflict: it is older, or not migrated at all.
+        Conflict: it is older, or not migrated at all, or its server is too old.
         Unreachable: it does not answer.
     """
     with transaction(engine) as conn:
-        table = conn.execute(sa.select(sa.func.to_regclass("alembic_version"))).scalar_one()
+        table, version = conn.execute(sa.select(sa.func.to_regclass("alembic_version"), VERSION)).one()
+        check_postgres(version)
         found = table and conn.execute(sa.text("SELECT version_num FROM alembic_version")).scalar_one_or_none()
     scripts = ScriptDirectory(str(_folder()))
     newest = scripts.get_current_head()
@@ -102,6 +106,7 @@ def _folder() -> Path:
 
 
 def _config(conn: sa.Connection) -> Config:
+    check_postgres(conn.execute(sa.select(VERSION)).scalar_one())
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
     conn.execute(sa.text(f"SET LOCAL lock_timeout = {int(LOCK_SECONDS * 1000)}"))
     config = Config()

@@ -12,7 +12,9 @@ import redis
 from redis.backoff import NoBackoff
 from redis.retry import Retry
 
+from shared.errors import Unreachable
 from shared.runtime.app import CONNECT_TIMEOUT, HEALTH_CHECK_INTERVAL, SOCKET_TIMEOUT
+from shared.versions import check_redis
 
 SOCKET_SCHEME = "redis+socket://"
 
@@ -80,3 +82,22 @@ def redis_client(
         client = redis.Redis.from_url(queue_url, socket_keepalive=True, **options)
     client.set_retry(_OneRetry(client.connection_pool))
     return client
+
+
+def check_queue(queue_url: str) -> str:
+    """Return the version of a Redis that answers and is new enough.
+
+    Raises:
+        Unreachable: it does not answer, or refuses us.
+        Conflict: it is too old.
+    """
+    try:
+        with redis_client(queue_url) as client:
+            client.ping()
+            info: Any = client.info("server")
+    except (redis.RedisError, ValueError) as error:
+        hint = "Is it running, and is MAREY_QUEUE_URL (MAREY_STREAMS_URL) right? Embedded: `marey serve` starts it."
+        raise Unreachable(f"the queue does not answer ({type(error).__name__}: {error})", hint=hint) from error
+    version = str(info.get("redis_version", "unknown"))
+    check_redis(version)
+    return version

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import httpx2
 import pytest
-import redis
 import sqlalchemy as sa
 
 from services.api import rates
@@ -17,7 +16,8 @@ from services.cli.client import Client
 from services.cli.place import Server
 from shared.errors import Busy
 from shared.jobs import ApiKey, create_key, transaction
-from shared.runtime.embedded import socket_folder, start_valkey
+from shared.runtime.embedded import start_valkey
+from shared.runtime.queue import redis_client
 from shared.settings import Settings
 from tests.support.live_api import ApiThread, settings_of
 
@@ -69,12 +69,10 @@ def test_what_a_key_has_of_its_own_goes_before_what_the_server_says(
     assert taken(counter(queue_url, {}), new_key()) == 10
 
 
-def test_at_the_border_of_two_windows_no_more_pass_than_in_one(
-    queue_url: str, new_key: Callable[..., ApiKey], servers_home: Path
-) -> None:
+def test_at_the_border_of_two_windows_no_more_pass_than_in_one(queue_url: str, new_key: Callable[..., ApiKey]) -> None:
     count, key, day = counter(queue_url), new_key(), 86_400_000
     assert taken(count, key) == 3
-    with redis.Redis(unix_socket_path=str(socket_folder(servers_home) / "valkey.sock")) as client:
+    with redis_client(queue_url) as client:
         (current,) = client.keys("*read*")
         client.pexpire(current, day - 1000)  # kept for two windows: its own ended a second ago
         assert taken(count, key) == 1  # of three that weigh nearly three, rounded down; a fixed window lets three pass

@@ -12,12 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import redis
 import structlog
 
 from shared.errors import MareyError, Unreachable
 from shared.jobs import TEXT_QUEUE, check_revision, list_workers, transaction
-from shared.runtime.queue import redis_client
+from shared.runtime.queue import check_queue
 
 if TYPE_CHECKING:
     from services.api.context import Context
@@ -56,11 +55,7 @@ def _ping(shared: Context) -> None:
     url = shared.config.queue_url
     if url is None:
         raise Unreachable("no queue is named", hint="Set MAREY_QUEUE_URL.")
-    try:
-        with redis_client(url.get_secret_value()) as client:
-            client.ping()
-    except redis.RedisError as error:
-        raise Unreachable(f"the queue does not answer ({type(error).__name__}: {error})") from error
+    check_queue(url.get_secret_value())
 
 
 def _model(shared: Context) -> None:
@@ -76,9 +71,9 @@ def _model(shared: Context) -> None:
 
 CHECKS: Mapping[str, Check] = {
     "database": Check(
-        lambda shared: check_revision(shared.engine), "the database does not answer, or its tables are too old"
+        lambda shared: check_revision(shared.engine), "the database does not answer, or it or its tables are too old"
     ),
-    "queue": Check(_ping, "the queue does not answer"),
+    "queue": Check(_ping, "the queue does not answer, or is too old"),
     "store": Check(lambda shared: shared.store.check(), "the asset store does not answer"),
     "model": Check(_model, "no worker has its model loaded yet"),
 }

@@ -1,0 +1,32 @@
+"""Says in the log once when a server behind the scheduler is too old, or the database is not migrated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sqlalchemy as sa
+
+from shared.errors import Conflict
+from shared.jobs import check_revision
+from shared.runtime.logs import logger
+from shared.runtime.queue import check_queue
+
+log = logger(__name__)
+
+CHECK_SECONDS = 30.0
+
+
+def server_check(engine: sa.Engine, queue_url: str) -> Callable[[], None]:
+    """Make the action of a `Periodic`; it raises `Unreachable` while a server does not answer."""
+    known: set[str] = set()
+
+    def check() -> None:
+        for one in (lambda: check_revision(engine), lambda: check_queue(queue_url)):
+            try:
+                one()
+            except Conflict as error:
+                if error.message not in known:
+                    log.error("unsupported", where=error.where, error=error.message, hint=error.hint)
+                known.add(error.message)
+
+    return check
