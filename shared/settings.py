@@ -34,7 +34,7 @@ from shared.rates import check_rates
 REPOSITORY = Path(__file__).resolve().parents[1]
 PREFIX = "MAREY_"
 BY_FILE = (
-    *("database_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
+    *("database_url", "listen_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
     *("webhook_key", "text_key"),
 )
 """Settings that may come by file."""
@@ -126,6 +126,9 @@ class Settings(BaseSettings):
 
     database_url: Database | None = None
     """`postgresql+psycopg://…`; unset = the embedded Postgres of `home`."""
+
+    listen_url: Database | None = None
+    """The same database without a transaction pooler between, for LISTEN; unset = `database_url`."""
 
     queue_url: Queue | None = None
     """`redis://…` or `redis+socket://…`; unset = the embedded Valkey of `home`."""
@@ -239,6 +242,12 @@ class Settings(BaseSettings):
     def api_url(self) -> str:
         """Where clients reach the API, without a slash at the end."""
         return self.local_url if self.public_url is None else self.public_url.rstrip("/")
+
+    @property
+    def notifications_url(self) -> str | None:
+        """Address for connections that LISTEN; None where no database is named."""
+        url = self.listen_url or self.database_url
+        return None if url is None else url.get_secret_value()
 
     @property
     def local_url(self) -> str:

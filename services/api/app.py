@@ -11,6 +11,7 @@ from typing import Any
 
 import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
+from fastapi.concurrency import run_in_threadpool
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
@@ -44,7 +45,7 @@ from services.api.texts.service import TextService
 from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
 from shared.errors import InvalidInput
-from shared.jobs import create_engine
+from shared.jobs import check_listening, create_engine
 from shared.settings import Settings, settings
 from shared.storage import open_store
 from shared.webhooks.addresses import Allowed
@@ -95,8 +96,10 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     if config.webhook_key is not None:
         Vault.of(config)
     url = config.database_url.get_secret_value()
+    listen_url = config.notifications_url or url
+    await run_in_threadpool(check_listening, listen_url)
     engine = create_engine(url, pool_size=CONNECTIONS // 2, max_overflow=CONNECTIONS // 2)
-    tailer = Tailer(engine, url, message)
+    tailer = Tailer(engine, listen_url, message)
     redis_url = config.streams_url or config.queue_url
     hub = None if redis_url is None else Hub(redis_url.get_secret_value())
     texts = TextService(config)

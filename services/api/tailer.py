@@ -14,7 +14,7 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
-from shared.errors import NotFound, Unreachable
+from shared.errors import InvalidInput, NotFound, Unreachable
 from shared.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
 from shared.jobs.states import ENDED
 
@@ -23,6 +23,9 @@ log = structlog.get_logger(__name__)
 PERIOD = 0.5
 """Seconds between two readings of one job: two progress messages a second at most, however fast it goes."""
 WAIT = 0.25
+REREAD_SECONDS = 10.0
+"""Each job that is followed is read this often, whether a notification came or not."""
+RECONNECT_SECONDS, REFUSED_SECONDS = 0.5, 30.0
 KEY_SECONDS = 2.0
 """Between two looks whether the keys of those who follow are still valid, as for sockets."""
 QUEUE_LIMIT = 1000
@@ -111,11 +114,15 @@ class Tailer:
                     self._mark_all()  # what was told while nobody listened
                     while not self._stopping.is_set():
                         self._mark(n.payload for n in listener.wait(WAIT))
+                        self._mark_old()
                         self._read_due()
                         self._close_invalid()
             except Unreachable as error:
                 log.warning("tailer_disconnected", error=error.message)
-                self._stopping.wait(1.0)
+                self._stopping.wait(RECONNECT_SECONDS)
+            except InvalidInput as error:  # a pooler was put in between since the start
+                log.error("tailer_refused", error=str(error))
+                self._stopping.wait(REFUSED_SECONDS)
             except Exception:
                 log.exception("tailer_failed")
                 self._stopping.wait(1.0)
@@ -124,6 +131,13 @@ class Tailer:
         with self._lock:
             for job in self._subscriptions:
                 self._due[job] = 0.0
+
+    def _mark_old(self) -> None:
+        old = time.monotonic() - REREAD_SECONDS
+        with self._lock:
+            for job in self._subscriptions:
+                if self._read.get(job, 0.0) <= old:
+                    self._due.setdefault(job, 0.0)
 
     def _mark(self, payloads: Iterator[str]) -> None:
         with self._lock:

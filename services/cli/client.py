@@ -7,7 +7,7 @@ import random
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, cast
 from uuid import uuid4
 
 import httpx2
@@ -40,6 +40,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
 """Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
 SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
+QUIET_SECONDS = 12.0
+"""A server pings an event stream every 15 s."""
 RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
 QUOTA = QuotaUsedUp.problem_type
@@ -149,12 +151,13 @@ class Client:
             yield response
 
     def events(self, job: str, after: int = 0, *, patience: float = 30.0) -> Iterator[dict[str, Any]]:
-        """Events of a job as they happen, from `after` on; ends when the job does or the connection breaks."""
+        """Events of a job as they happen, from `after` on; ends when the job does, when the connection breaks, or when
+        it carried nothing but pings for `QUIET_SECONDS`: then look at the job, and ask again."""
         headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
         with self.stream(f"/v1/jobs/{job}/events", headers, patience=patience) as response:
             if response.status_code == 204:
                 return
-            for event in httpx2.EventSource(response):
+            for event in httpx2.EventSource(cast("httpx2.Response", _UntilQuiet(response))):
                 if event.data:
                     yield json.loads(event.data)
 
@@ -193,6 +196,26 @@ class Client:
             response = self._http.request(method, path, **{**request, "headers": headers})
             span.set(**{"http.response.status_code": response.status_code})
             return response
+
+
+class _UntilQuiet:
+    """A response of server-sent events whose text ends at the first ping after `QUIET_SECONDS` without an event.
+
+    Pings say that the server lives, not that events reach it.
+    """
+
+    def __init__(self, response: httpx2.Response) -> None:
+        self.request, self.headers = response.request, response.headers
+        self._response = response
+
+    def iter_text(self) -> Iterator[str]:
+        heard = time.monotonic()
+        for chunk in self._response.iter_text():
+            if any(line and not line.startswith(":") for line in chunk.splitlines()):
+                heard = time.monotonic()
+            elif time.monotonic() - heard >= QUIET_SECONDS:
+                return
+            yield chunk
 
 
 def error_of(response: httpx2.Response) -> MareyError:

@@ -25,7 +25,7 @@ ANEW = 20
 COMPARISON = ("metric", "before", "after", "change", "95 % interval", "verdict")
 POLL = 1.0
 """Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
-PATIENCE = 60.0
+PATIENCE = 180.0
 """Seconds without a reachable server after which waiting gives up."""
 
 Bundle = Annotated[str, typer.Option("--bundle", "--model", help="Model, bundle or exact bundle that generates.")]

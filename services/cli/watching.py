@@ -10,7 +10,7 @@ from services.cli.client import Client
 from shared.errors import ItemsFailed, TimedOut, Unreachable
 
 ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
-PATIENCE = 60.0
+PATIENCE = 180.0
 """Seconds without a reachable server after which following gives up."""
 
 

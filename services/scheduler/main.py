@@ -23,9 +23,12 @@ from shared.jobs import (
     KEPT,
     Problem,
     abandoned_streams,
+    check_listening,
     create_engine,
     delete_expired,
     end_stream,
+    make_due,
+    outages,
     remove_stale_assets,
     remove_unused_prompts,
     rewrite_files,
@@ -62,7 +65,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     Neither database, queue nor store has to be there at the start: every part waits for what it needs.
 
     Raises:
-        InvalidInput: a setting is missing, or one of webhooks makes no sense.
+        InvalidInput: a setting is missing, one of webhooks makes no sense, or the database passes no notifications on.
     """
     if chosen.database_url is None or chosen.queue_url is None:
         raise InvalidInput(
@@ -78,10 +81,12 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
         stop_on_signals(stopping)
     database_url = chosen.database_url.get_secret_value()
     queue_url = chosen.queue_url.get_secret_value()
+    listen_url = chosen.notifications_url or database_url
+    check_listening(listen_url)
     engine = create_engine(database_url)
     app = create_app(queue_url)
     lists = redis_client(queue_url)
-    relay = Relay(engine, database_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
+    relay = Relay(engine, listen_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
     periodic = _periodic(engine, chosen, stopping)
     threads: list[threading.Thread] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
 
@@ -165,11 +170,19 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
             stopping=stopping,
             probe=probe,
             grace=chosen.lease_seconds,
+            outages=partial(outages, engine),
+            meanwhile=partial(make_due, engine),
         ),
         Periodic("retention", retain, seconds=chosen.retention_seconds, stopping=stopping, probe=probe),
         Periodic("stale_assets", remove_stale, seconds=STALE_ASSETS_SECONDS, stopping=stopping),
         Periodic(
-            "streams", end_abandoned, seconds=ABANDONED_EVERY, stopping=stopping, probe=probe, grace=ABANDONED_EVERY
+            "streams",
+            end_abandoned,
+            seconds=ABANDONED_EVERY,
+            stopping=stopping,
+            probe=probe,
+            grace=ABANDONED_EVERY,
+            outages=partial(outages, engine),
         ),
         Periodic("servers", server_check(engine, queue_url), seconds=CHECK_SECONDS, stopping=stopping),
         Periodic("evaluations", evaluations.round, seconds=chosen.evaluation_seconds, stopping=stopping),

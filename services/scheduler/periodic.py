@@ -16,8 +16,9 @@ log = logger(__name__)
 class Periodic(threading.Thread):
     """Calls `action` every `seconds` until `stopping`.
 
-    After an outage, `probe` is asked until it does not raise `Unreachable`; then `grace` seconds pass before the next
-    call, for others must first find the database again.
+    After an outage, `probe` is called until it does not raise `Unreachable`, then `meanwhile` once; then `grace`
+    seconds pass before the next call, for others must first find the database again. `outages` counts those that a
+    retry has hidden: with a `grace`, each round probes first, and one more than before is an outage like any other.
     """
 
     def __init__(
@@ -29,12 +30,16 @@ class Periodic(threading.Thread):
         stopping: threading.Event,
         probe: Callable[[], None] = lambda: None,
         grace: float = 0.0,
+        outages: Callable[[], int] = lambda: 0,
+        meanwhile: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__(name=name, daemon=True)
         self._action = action
         self._seconds = seconds
         self._probe = probe
         self._grace = grace
+        self._outages, self._meanwhile = outages, meanwhile
+        self._known_outages = outages()
         self._stopping = stopping
         self.away = False
         self._ticked = time.monotonic()
@@ -66,8 +71,12 @@ class Periodic(threading.Thread):
         Raises:
             Unreachable: what the action needs is away.
         """
-        if self.away:
+        if self.away or self._grace > 0:
             self._probe()
+        known, self._known_outages = self._known_outages, self._outages()
+        if self.away or self._known_outages != known:
+            self.away = True
+            self._meanwhile()
             self._stopping.wait(self._grace)
             self.away = False
         if not self._stopping.is_set():

@@ -18,7 +18,7 @@ import sqlalchemy as sa
 from celery import Celery
 
 from shared import metrics
-from shared.errors import Unreachable
+from shared.errors import InvalidInput, Unreachable
 from shared.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
 from shared.runtime.app import DRAIN, PUBLISH_RETRY
 from shared.runtime.logs import logger
@@ -29,6 +29,7 @@ BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1}
 DEFAULT_BATCH_SIZE = 32
 """Items of one claim, for counting the batches that wait; a wrong guess costs a hint, never an item."""
 
+REFUSED_SECONDS = 30.0
 LEAST_PAUSE = 0.05  # seconds between two rounds: a submit in many transactions notifies as often
 TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows that hints still reach it
 
@@ -39,7 +40,7 @@ class Relay(threading.Thread):
     def __init__(
         self,
         engine: sa.Engine,
-        database_url: str,
+        listen_url: str,
         lists: redis.Redis,
         publish: Callable[[str], None],
         *,
@@ -48,7 +49,7 @@ class Relay(threading.Thread):
     ) -> None:
         super().__init__(name="relay", daemon=True)
         self._engine = engine
-        self._database_url = database_url
+        self._listen_url = listen_url
         self._lists = lists
         self._publish = publish
         self._interval = interval
@@ -64,7 +65,7 @@ class Relay(threading.Thread):
         while not self._stopping.is_set():
             self._ticked = time.monotonic()  # also while the database is away: waiting for it is no standstill
             try:
-                with Listener(self._database_url, (QUEUE_CHANNEL,)) as listener:
+                with Listener(self._listen_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
                         self.round()
                         self._ticked = time.monotonic()
@@ -76,6 +77,10 @@ class Relay(threading.Thread):
             except Unreachable as error:
                 metrics.ROUNDS.labels(self.name, "waiting").inc()
                 log.warning("relay_waits", error=error.message)
+            except InvalidInput as error:  # a pooler was put in between since the start
+                metrics.ROUNDS.labels(self.name, "failed").inc()
+                log.error("relay_refused", error=str(error))
+                self._stopping.wait(REFUSED_SECONDS)
             except Exception:
                 metrics.ROUNDS.labels(self.name, "failed").inc()
                 log.exception("relay_failed")

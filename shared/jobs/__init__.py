@@ -92,7 +92,7 @@ from shared.jobs.lease_types import (
     WorkerBeat,
     WorkerRow,
 )
-from shared.jobs.listener import Listener, Notification
+from shared.jobs.listener import Listener, Notification, check_listening
 from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
 from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
@@ -128,7 +128,7 @@ from shared.jobs.streams import (
     told_prompts,
 )
 from shared.jobs.submit import submit
-from shared.jobs.sweep import sweep
+from shared.jobs.sweep import make_due, sweep
 from shared.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, Room, TenantRow, Usage
 from shared.jobs.tenants import (
     create_tenant,
@@ -305,6 +305,7 @@ __all__ = [
     "check_baseline",
     "check_comparable",
     "check_key",
+    "check_listening",
     "check_revision",
     "check_room",
     "claim",
@@ -365,6 +366,7 @@ __all__ = [
     "load_score",
     "load_texts",
     "lock_evaluation",
+    "make_due",
     "motions_of",
     "move_evaluation",
     "open_evaluations",

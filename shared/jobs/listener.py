@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass
 from uuid import uuid4
@@ -10,7 +11,7 @@ import psycopg
 import sqlalchemy as sa
 from psycopg import sql
 
-from shared.errors import InvalidInput
+from shared.errors import InvalidInput, Unreachable
 from shared.jobs.connections import DeadlineConnection, group_of, open_connection
 from shared.jobs.database import unreachable
 from shared.jobs.deadlines import ORDINARY, PING_SECONDS, PROBE_EVERY
@@ -22,6 +23,16 @@ class Notification:
 
     channel: str
     payload: str
+
+
+def check_listening(url: str) -> None:
+    """Connect once as a `Listener` does, for a server that starts. A database that is away is no error here.
+
+    Raises:
+        InvalidInput: notifications do not arrive.
+    """
+    with contextlib.suppress(Unreachable), Listener(url, ()):
+        pass
 
 
 class Listener:

@@ -32,18 +32,31 @@ def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
     """
     rules = rules or policy()
     total = SweepReport()
-    lease, item = schema.lease.c, schema.item.c
+    lease = schema.lease.c
     with transaction(engine) as conn:
         expired = conn.execute(sa.select(lease.job_id).where(lease.expires_at < CLOCK).distinct()).scalars().all()
-        due = conn.execute(sa.select(item.job_id).where(item.run_after <= CLOCK).distinct()).scalars().all()
     for job in expired:
         with transaction(engine) as conn:
             total = _added(total, _take_back(conn, job, rules))
-    for job in due:
-        with transaction(engine, BULK) as conn:
-            total = _added(total, SweepReport(items_due=_make_due_ready(conn, job)))
+    total = _added(total, SweepReport(items_due=make_due(engine)))
     with transaction(engine, BULK) as conn:
         return _added(total, SweepReport(stale_assets=_tidy(conn, rules)))
+
+
+def make_due(engine: sa.Engine) -> int:
+    """Make items ready whose pause before the next try is over; how many. `sweep` does this, too.
+
+    Raises:
+        Unreachable: the database does not answer.
+    """
+    item = schema.item.c
+    with transaction(engine) as conn:
+        due = conn.execute(sa.select(item.job_id).where(item.run_after <= CLOCK).distinct()).scalars().all()
+    items = 0
+    for job in due:
+        with transaction(engine, BULK) as conn:
+            items += _make_due_ready(conn, job)
+    return items
 
 
 def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:

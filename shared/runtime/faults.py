@@ -13,7 +13,7 @@ from shared.errors import MareyError, Unreachable
 
 T = TypeVar("T")
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.2, 5.0  # seconds between tries, doubling with jitter
+FIRST_PAUSE, LONGEST_PAUSE = 0.2, 2.0  # seconds between tries, doubling with jitter
 
 
 class HandlerError(MareyError):

@@ -17,6 +17,8 @@ from shared.runtime.watching import Work
 log = logger(__name__)
 
 LOOK_SECONDS = 1.0
+AGAIN_SECONDS = 1.0
+"""After a failed renewal the next comes this soon: a lease must outlast a connection that fell silent."""
 
 Renew = Callable[[UUID, Collection[UUID], bool], Answer]
 """Renews one lease in the database: its token, its open items, whether it progressed. Raises `Unreachable`."""
@@ -149,7 +151,7 @@ class Heartbeat(threading.Thread):
             if time.monotonic() < due:
                 self.look()
                 continue
-            self.beat()
+            renewed = self.beat()
             self._end_stuck()
             try:
                 self._present()
@@ -157,7 +159,7 @@ class Heartbeat(threading.Thread):
                 log.warning("presence_failed", error=error.message)
             except Exception:
                 log.exception("presence_failed")  # without this thread every lease here would run out
-            due = time.monotonic() + self._interval
+            due = time.monotonic() + (self._interval if renewed else min(self._interval, AGAIN_SECONDS))
 
     def close(self) -> None:
         """End the thread; leases still held run out by themselves."""
@@ -192,8 +194,9 @@ class Heartbeat(threading.Thread):
                 continue
             lease.learn(Answer(lost=False, gone=items - held))
 
-    def beat(self) -> None:
-        """Renew each lease once."""
+    def beat(self) -> bool:
+        """Renew each lease once; return False if the database did not answer for one of them."""
+        answered = True
         for token, lease in list(self._held.items()):
             items = lease.open
             if not items:
@@ -202,6 +205,7 @@ class Heartbeat(threading.Thread):
                 answer = self._renew(token, items, lease.take_progress())
             except Unreachable as error:
                 log.warning("heartbeat_failed", error=error.message)
+                answered = False
                 continue
             except Exception:
                 log.exception("heartbeat_failed")
@@ -211,3 +215,4 @@ class Heartbeat(threading.Thread):
                 if lease.open != items:  # not merely committed in between
                     with lease.work.bound():
                         log.info("items_taken_away", lost=answer.lost, items=len(answer.gone))
+        return answered

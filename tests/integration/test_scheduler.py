@@ -260,6 +260,31 @@ def test_after_an_outage_heartbeats_come_before_the_sweeper() -> None:
     assert order == ["act", "probe", "probe", "act"]
 
 
+def test_an_outage_that_a_retry_has_hidden_holds_the_sweeper_back_too() -> None:
+    """A silent connection was replaced before use: no call failed, but workers may not have found the way back yet."""
+    order: list[str] = []
+    outages = [0]
+
+    def probe() -> None:
+        order.append("probe")
+        if len(order) == 3:
+            outages[0] += 1
+
+    thread = Periodic(
+        "test",
+        lambda: order.append("act"),
+        seconds=0.0,
+        stopping=threading.Event(),
+        probe=probe,
+        grace=0.01,
+        outages=lambda: outages[0],
+        meanwhile=lambda: order.append("meanwhile"),
+    )
+    for _ in range(3):
+        thread.once()
+    assert order == ["probe", "act", "probe", "meanwhile", "act", "probe", "act"]
+
+
 def test_scheduler_returns_lost_leases_and_stops_when_told(
     engine: sa.Engine, database_url: str, queue_url: str, tmp_path: Path
 ) -> None:

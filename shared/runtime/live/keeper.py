@@ -50,7 +50,7 @@ TAKE_SECONDS = 0.5
 RECORD_SECONDS = 1.0
 READ_SECONDS = 0.1
 """Prompts are mostly read in milliseconds: each is waited for so long, then looked for every `LISTEN_SECONDS`."""
-CLOSE_PATIENCE = 60.0
+CLOSE_PATIENCE = 120.0
 STALL_SECONDS = 10.0
 QUEUE = "live"
 """What live workers are called among the workers."""

@@ -1,4 +1,5 @@
 import threading
+import time
 from collections.abc import Collection
 from uuid import UUID, uuid4
 
@@ -28,9 +29,11 @@ class Database:
         self.asked: list[tuple[set[UUID], bool]] = []
         self.answer = Answer(lost=False, gone=frozenset())
         self.away = False
+        self.asked_at: list[float] = []
 
     def renew(self, _token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
         self.asked.append((set(items), progressed))
+        self.asked_at.append(time.monotonic())
         if self.away:
             raise Unreachable("gone")
         return self.answer
@@ -101,6 +104,21 @@ def test_an_outage_of_the_database_gives_nothing_up(database: Database, heartbea
     database.away = False
     heartbeat.beat()
     assert len(database.asked) == 2
+
+
+def test_after_a_failed_renewal_the_next_comes_soon(database: Database) -> None:
+    """Not a whole interval later: a lease must outlast a connection that fell silent."""
+    heart = Heartbeat(database.renew, interval=1.5, stopping=threading.Event())
+    heart.hold(make_claim(1))
+    database.away = True
+    times: list[float] = []
+    database.asked_at = times
+    heart.start()
+    while len(times) < 3:
+        time.sleep(0.02)
+    heart.close()
+    heart.join(30)
+    assert times[2] - times[1] < 1.4
 
 
 def test_a_lease_let_go_is_not_renewed(database: Database, heartbeat: Heartbeat) -> None:
