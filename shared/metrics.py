@@ -43,6 +43,12 @@ RUNNING = Gauge("marey_running_items", "Items under a lease.", QUEUE, registry=A
 OLDEST = Gauge("marey_oldest_waiting_seconds", "Age of the oldest ready item.", QUEUE, registry=API)
 UNSERVED = Gauge("marey_unserved_seconds", "Longest time that ready items waited for any claim.", QUEUE, registry=API)
 WORKERS = Gauge("marey_live_workers", "Workers seen lately, by queue.", ("queue",), registry=API)
+SCHEDULERS = Gauge(
+    "marey_scheduler_silent_seconds",
+    "Time since a scheduler last made progress in all its parts, by host.",
+    ("host",),
+    registry=API,
+)
 STREAMS = Gauge("marey_streams", "Open live streams, by state.", ("state",), registry=API)
 WEBHOOKS_PENDING = Gauge("marey_webhooks_pending", "Deliveries still to be made.", registry=API)
 WEBHOOKS_OVERDUE = Gauge("marey_webhooks_overdue_seconds", "How late the next delivery is.", registry=API)

@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING, Literal
 from shared.errors import MareyError
 
 if TYPE_CHECKING:
+    from services.cli.place import Server
     from shared.bundles import Bundle
     from shared.settings import Settings
 
 SMALLEST_FREE, LITTLE_FREE = 2 * 2**30, 10 * 2**30
 """Bytes: Postgres stops at a full disk, and 1,000 motions take 200 MB."""
+ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
+"""Deadlines of a server's answers: a listing takes milliseconds, and a missed deadline of the database 5 s."""
 State = Literal["ok", "warn", "bad"]
 
 
@@ -110,11 +113,31 @@ def _server() -> Check:
     except MareyError as error:
         return broken("server", error)
     try:
-        with Client(server) as client:
+        with Client(server, timeout=ANSWER_SECONDS, attempts=2) as client:
             client.get("/v1/jobs", limit=1)
     except MareyError as error:
-        return broken("server", error)
+        return (_stalled(server, error) if isinstance(error, Unreachable) else None) or broken("server", error)
     return Check("server", "ok", server.url)
+
+
+def _stalled(server: Server, error: MareyError) -> Check | None:
+    """Say what hangs of a server that takes connections and does not answer; None where it is another error."""
+    import httpx2
+
+    if not isinstance(error.__cause__, httpx2.ReadTimeout):
+        return None
+    hint = "See its log, then restart it; `marey serve` and other supervisors restart what exits, not what hangs."
+    try:
+        answer = httpx2.get(f"{server.url}/livez", timeout=httpx2.Timeout(LIVE_SECONDS))
+    except httpx2.ReadTimeout:
+        message = f"{server.url} accepts connections, but answers nothing within {LIVE_SECONDS:g} s: it stalls"
+        return Check("server", "bad", message, hint)
+    except httpx2.HTTPError:
+        return None
+    if answer.status_code != httpx2.codes.OK:
+        return None
+    message = f"{server.url} answers /livez, but not /v1/jobs within {ANSWER_SECONDS:g} s: it stalls, or its database"
+    return Check("server", "bad", message, f"See the checks of the database on the server's machine. {hint}")
 
 
 def models(config: Settings) -> Iterator[Check]:

@@ -17,6 +17,7 @@ from shared.errors import MareyError, Unreachable
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
+    from shared.jobs import SchedulerRow
     from shared.settings import Settings
     from shared.storage import AssetStore
 
@@ -126,14 +127,34 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
 
 
 def scheduler(engine: sa.Engine) -> Check:
-    from shared.jobs import overdue_leases, transaction
+    """One works: it said so a moment ago, and leases that ran out are taken back."""
+    from shared.jobs import list_schedulers, overdue_leases, transaction
 
     with transaction(engine) as conn:
-        unswept = overdue_leases(conn, UNSWEPT)
+        unswept, known = overdue_leases(conn, UNSWEPT), list_schedulers(conn)
+    if known and not known[0].live:
+        message = f"no scheduler works: {_silence_of(known[0])}"
+        return Check("scheduler", "bad", message, f"See its log. {STALLED_HINT}")
     if unswept:
         message = f"{unswept} leases ran out over {UNSWEPT:g} s ago, and nobody took them back"
         return Check("scheduler", "bad", message, "Start `marey scheduler`, or see its log.")
-    return Check("scheduler", "ok", "no lease is overdue")
+    if not known:
+        return Check("scheduler", "warn", "none was heard of lately", "`marey serve` or `marey scheduler` starts one.")
+    if silent := [row for row in known if not row.live]:
+        return Check("scheduler", "warn", f"another works, but {_silence_of(silent[0])}", STALLED_HINT)
+    return Check("scheduler", "ok", f"{len(known)} at work, no lease is overdue")
+
+
+STALLED_HINT = (
+    "A scheduler that stalls exits by itself, and its supervisor starts another; if none does: `marey scheduler`."
+)
+
+
+def _silence_of(row: SchedulerRow) -> str:
+    return (
+        f"that on {row.host} (process {row.pid}) stalled or was killed; its last progress was "
+        f"{row.silence:.0f} s ago, at {row.seen:%H:%M:%S} UTC"
+    )
 
 
 def _queues(config: Settings) -> Iterator[Check]:

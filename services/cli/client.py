@@ -61,8 +61,9 @@ class Client:
     One idempotency key goes with every attempt of one `submit`, so a retry after a lost answer enqueues nothing twice.
     """
 
-    def __init__(self, server: Server, *, timeout: float = 30.0) -> None:
+    def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int = ATTEMPTS) -> None:
         self.server = server
+        self._attempts = attempts
         self._http = httpx2.Client(
             base_url=server.url,
             headers={"Authorization": f"Bearer {server.key}"},
@@ -163,7 +164,7 @@ class Client:
 
     def _send(self, method: str, path: str, *, repeatable: bool = True, **request: Any) -> httpx2.Response:
         pause = FIRST_PAUSE
-        for attempt in range(1, ATTEMPTS + 1):
+        for attempt in range(1, self._attempts + 1):
             try:
                 response = self._request(method, path, request)
             except httpx2.TransportError as error:
@@ -171,7 +172,7 @@ class Client:
                     raise final from error
                 never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
                 if (
-                    attempt == ATTEMPTS
+                    attempt == self._attempts
                     or isinstance(error, httpx2.UnsupportedProtocol)
                     or not (repeatable or never_sent)
                 ):
@@ -180,7 +181,8 @@ class Client:
             else:
                 if response.status_code < 400:
                     return _expected(response)
-                if response.status_code not in RETRIED or attempt == ATTEMPTS or not repeatable or _is_quota(response):
+                again = response.status_code in RETRIED and repeatable and not _is_quota(response)
+                if not again or attempt == self._attempts:
                     raise error_of(response)
                 wait = max(pause, _retry_after(response))
             time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311

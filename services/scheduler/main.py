@@ -3,26 +3,29 @@ harmless, and so is its death."""
 
 from __future__ import annotations
 
-import math
 import os
 import socket
 import threading
+from collections.abc import Sequence
 from functools import partial
 
 import sqlalchemy as sa
 
+from services.scheduler import parts as scheduler_parts
 from services.scheduler.evaluations import Evaluations
+from services.scheduler.parts import EXIT_STALLED, Part, end_stalled, note_progress, watch
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from services.scheduler.sending import Sender
 from services.scheduler.servers import CHECK_SECONDS, server_check
 from services.scheduler.webhooks import Deliverer
 from shared import metrics
-from shared.errors import InvalidInput
+from shared.errors import InvalidInput, Unreachable
 from shared.jobs import (
     KEPT,
     Problem,
     abandoned_streams,
+    beat_scheduler,
     check_listening,
     create_engine,
     delete_expired,
@@ -31,6 +34,7 @@ from shared.jobs import (
     outages,
     remove_stale_assets,
     remove_unused_prompts,
+    retire,
     rewrite_files,
     sweep,
     transaction,
@@ -56,6 +60,7 @@ NOBODY = Problem(
 STALE_ASSETS_SECONDS = 600.0  # assets half written by a dead worker wait an hour anyway
 ABANDONED_SECONDS = 900.0  # a stream waits this long for a worker, or for its worker's successor
 ABANDONED_EVERY = 30.0
+BEAT_SECONDS = 5.0
 STOP_SECONDS = 10.0
 
 
@@ -88,27 +93,62 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     lists = redis_client(queue_url)
     relay = Relay(engine, listen_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
     periodic = _periodic(engine, chosen, stopping)
-    threads: list[threading.Thread] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
-
-    def silence() -> float:
-        if not all(thread.is_alive() for thread in threads):
-            return math.inf
-        return max(relay.silence(), *(part.silence() for part in periodic))
-
-    for thread in threads:
-        thread.start()
-    log.info("started", parts=[thread.name for thread in threads])
+    parts: list[Part] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
+    beats = create_engine(database_url, pool_size=1)
+    name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
+    presence = Periodic("presence", Presence(beats, name, parts).tell, seconds=BEAT_SECONDS, stopping=stopping)
+    parts.append(presence)
+    note_progress(engine)
+    note_progress(beats)
+    for part in parts:
+        part.start()
+    log.info("started", parts=[part.name for part in parts])
+    teller = Teller(chosen.home, name, lambda: max(part.silence() for part in parts), stopping)
     if alone:
-        name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
-        threads.append(Teller(chosen.home, name, silence, stopping))
-        threads[-1].start()
-    stopping.wait()
-    for thread in threads:
-        thread.join(STOP_SECONDS)
+        teller.start()
+    if watch(parts, stopping):
+        if alone:
+            end_stalled()
+        stopping.set()
+        return EXIT_STALLED
+    for part in parts:
+        part.join(STOP_SECONDS)
+    if alone:
+        teller.join(STOP_SECONDS)
+    _retire(beats, name)
     app.close()
     lists.close()
+    beats.dispose()
     engine.dispose()
     return 0
+
+
+class Presence:
+    """Says in the database that this scheduler works, as long as it does: `marey doctor` and metrics read it."""
+
+    def __init__(self, engine: sa.Engine, name: str, parts: Sequence[Part]) -> None:
+        self._engine = engine
+        self._name = name
+        self._parts = parts
+
+    def tell(self) -> None:
+        """Renew the row, unless a part has made no progress for half of what is allowed.
+
+        Raises:
+            Unreachable: the database does not answer.
+        """
+        if any(part.stalled(scheduler_parts.STALL_SECONDS / 2) for part in self._parts):
+            return
+        with transaction(self._engine) as conn:
+            beat_scheduler(conn, self._name, host=socket.gethostname(), pid=os.getpid())
+
+
+def _retire(engine: sa.Engine, name: str) -> None:
+    try:
+        with transaction(engine) as conn:
+            retire(conn, name)
+    except Unreachable as error:
+        log.warning("not_retired", error=error.message)  # the row says by its age that nobody is there
 
 
 def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Deliverer]:

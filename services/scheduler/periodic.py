@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 
+from services.scheduler.parts import Part
 from shared import metrics
 from shared.errors import Unreachable
 from shared.runtime.logs import logger
@@ -13,7 +13,7 @@ from shared.runtime.logs import logger
 log = logger(__name__)
 
 
-class Periodic(threading.Thread):
+class Periodic(Part):
     """Calls `action` every `seconds` until `stopping`.
 
     After an outage, `probe` is called until it does not raise `Unreachable`, then `meanwhile` once; then `grace`
@@ -33,7 +33,7 @@ class Periodic(threading.Thread):
         outages: Callable[[], int] = lambda: 0,
         meanwhile: Callable[[], object] = lambda: None,
     ) -> None:
-        super().__init__(name=name, daemon=True)
+        super().__init__(name, pause=seconds, allowance=grace)
         self._action = action
         self._seconds = seconds
         self._probe = probe
@@ -42,15 +42,10 @@ class Periodic(threading.Thread):
         self._known_outages = outages()
         self._stopping = stopping
         self.away = False
-        self._ticked = time.monotonic()
-
-    def silence(self) -> float:
-        """Seconds for which a round is under way, or overdue; below 0 between two rounds."""
-        return time.monotonic() - self._ticked - self._seconds
 
     def run(self) -> None:
         while not self._stopping.wait(self._seconds):
-            self._ticked = time.monotonic()
+            self.progressed()
             try:
                 self.once()
                 outcome = "done"
@@ -63,7 +58,7 @@ class Periodic(threading.Thread):
                 outcome = "failed"
                 log.exception(f"{self.name}_failed")
             metrics.ROUNDS.labels(self.name, outcome).inc()
-            self._ticked = time.monotonic()
+            self.progressed()
 
     def once(self) -> None:
         """One round.

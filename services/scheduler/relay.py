@@ -17,6 +17,7 @@ import redis
 import sqlalchemy as sa
 from celery import Celery
 
+from services.scheduler.parts import Part
 from shared import metrics
 from shared.errors import InvalidInput, Unreachable
 from shared.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
@@ -34,7 +35,7 @@ LEAST_PAUSE = 0.05  # seconds between two rounds: a submit in many transactions 
 TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows that hints still reach it
 
 
-class Relay(threading.Thread):
+class Relay(Part):
     """One round each `interval` seconds and on each notification, until `stopping`."""
 
     def __init__(
@@ -47,7 +48,7 @@ class Relay(threading.Thread):
         interval: float,
         stopping: threading.Event,
     ) -> None:
-        super().__init__(name="relay", daemon=True)
+        super().__init__("relay", pause=interval)
         self._engine = engine
         self._listen_url = listen_url
         self._lists = lists
@@ -55,20 +56,15 @@ class Relay(threading.Thread):
         self._interval = interval
         self._stopping = stopping
         self._next_tick = 0.0
-        self._ticked = time.monotonic()
-
-    def silence(self) -> float:
-        """Seconds for which a round is under way, or overdue; below 0 between two rounds."""
-        return time.monotonic() - self._ticked - self._interval
 
     def run(self) -> None:
         while not self._stopping.is_set():
-            self._ticked = time.monotonic()  # also while the database is away: waiting for it is no standstill
+            self.progressed()  # also while the database is away: waiting for it is no standstill
             try:
                 with Listener(self._listen_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
                         self.round()
-                        self._ticked = time.monotonic()
+                        self.progressed()
                         metrics.ROUNDS.labels(self.name, "done").inc()
                         if listener.wait(self._interval):
                             self._stopping.wait(LEAST_PAUSE)

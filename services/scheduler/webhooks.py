@@ -13,6 +13,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
+from services.scheduler.parts import Part
 from services.scheduler.sending import Sender
 from shared import metrics
 from shared.errors import InvalidInput, Unreachable
@@ -51,7 +52,7 @@ OUTCOMES: dict[DeliveryState | None, str] = {
 Given = TypeVar("Given")
 
 
-class Deliverer(threading.Thread):
+class Deliverer(Part):
     """Looks every `interval` seconds, and whenever a try has ended, until `stopping`."""
 
     def __init__(
@@ -64,7 +65,7 @@ class Deliverer(threading.Thread):
         interval: float,
         stopping: threading.Event,
     ) -> None:
-        super().__init__(name="webhooks", daemon=True)
+        super().__init__("webhooks", pause=interval)
         self._engine = engine
         self._vault = vault
         self._sender = sender
@@ -82,6 +83,7 @@ class Deliverer(threading.Thread):
     async def _loop(self) -> None:
         asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(LOOKUPS, "webhooks-names"))
         while not self._stopping.is_set():
+            self.progressed()
             try:
                 for due in await self._blocking(self._claim):
                     self._under_way[asyncio.create_task(self._deliver(due))] = due

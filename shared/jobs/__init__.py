@@ -88,6 +88,7 @@ from shared.jobs.lease_types import (
     ItemFailure,
     NewMotion,
     NewText,
+    SchedulerRow,
     SweepReport,
     WorkerBeat,
     WorkerRow,
@@ -189,7 +190,7 @@ from shared.jobs.webhooks import (
     list_webhooks,
     rotate_secret,
 )
-from shared.jobs.workers import beat, list_workers, live_workers, retire
+from shared.jobs.workers import beat, beat_scheduler, list_schedulers, list_workers, live_workers, retire
 
 __all__ = [
     "BACKUP",
@@ -275,6 +276,7 @@ __all__ = [
     "Room",
     "ScheduleChange",
     "ScheduleRow",
+    "SchedulerRow",
     "ScoreRows",
     "Speed",
     "Stage",
@@ -297,6 +299,7 @@ __all__ = [
     "audit",
     "authenticate",
     "beat",
+    "beat_scheduler",
     "begin_assets",
     "cancel",
     "cancel_evaluation",
@@ -356,6 +359,7 @@ __all__ = [
     "list_jobs",
     "list_keys",
     "list_motions",
+    "list_schedulers",
     "list_schedules",
     "list_streams",
     "list_tenants",

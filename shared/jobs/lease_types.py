@@ -89,6 +89,23 @@ class WorkerRow:
 
 
 @dataclass(frozen=True)
+class SchedulerRow:
+    """A scheduler that said it works.
+
+    Attributes:
+        seen: when it last made progress in all its parts; `silence`: seconds since then, by the database's clock.
+        live: that was a moment ago.
+    """
+
+    id: str
+    host: str
+    pid: int
+    seen: datetime
+    silence: float
+    live: bool
+
+
+@dataclass(frozen=True)
 class AssetDigest:
     """Content to store: its digest and size."""
 

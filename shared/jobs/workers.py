@@ -7,8 +7,13 @@ from sqlalchemy.dialects.postgresql import insert
 
 from shared.jobs import schema
 from shared.jobs.journal import CLOCK, interval
-from shared.jobs.lease_types import WorkerBeat, WorkerRow
+from shared.jobs.lease_types import SchedulerRow, WorkerBeat, WorkerRow
 from shared.jobs.policy import Policy, policy
+
+SCHEDULER = "scheduler"
+"""Queue of the rows by which schedulers say that they work: they are no workers."""
+SCHEDULER_LIVE = 30.0
+"""Seconds after its last word for which a scheduler counts as working; it says so every 5 s."""
 
 
 def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
@@ -38,7 +43,9 @@ def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[st
     """How many workers live, by queue."""
     table = schema.worker.c
     rows = conn.execute(
-        sa.select(table.queue, sa.func.count().label("workers")).where(_live(rules or policy())).group_by(table.queue)
+        sa.select(table.queue, sa.func.count().label("workers"))
+        .where(_live(rules or policy()), table.queue != SCHEDULER)
+        .group_by(table.queue)
     )
     return {row.queue: row.workers for row in rows}
 
@@ -52,9 +59,37 @@ def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[Wo
             table.started_at.label("started"),
             table.seen_at.label("seen"),
             _live(rules or policy()).label("live"),
-        ).order_by(table.seen_at.desc(), table.id)
+        )
+        .where(table.queue != SCHEDULER)
+        .order_by(table.seen_at.desc(), table.id)
     )
     return [WorkerRow(**row) for row in rows.mappings()]
+
+
+def beat_scheduler(conn: sa.Connection, name: str, *, host: str, pid: int) -> None:
+    """Note that a scheduler works, and at its first word forget those that fell silent: this one is in their place."""
+    table = schema.worker.c
+    known = conn.execute(sa.select(table.id).where(table.id == name)).one_or_none()
+    if known is None:
+        silent = (table.queue == SCHEDULER) & (table.seen_at < CLOCK - interval(SCHEDULER_LIVE))
+        conn.execute(sa.delete(schema.worker).where(silent))
+    beat(conn, WorkerBeat(name, SCHEDULER, host, pid, device=""))
+
+
+def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
+    """Every scheduler that was not told to stop, that heard of last first."""
+    table = schema.worker.c
+    rows = conn.execute(
+        sa.select(
+            *(table.id, table.host, table.pid),
+            table.seen_at.label("seen"),
+            sa.func.extract("epoch", CLOCK - table.seen_at).cast(sa.Float).label("silence"),
+            (table.seen_at > CLOCK - interval(SCHEDULER_LIVE)).label("live"),
+        )
+        .where(table.queue == SCHEDULER)
+        .order_by(table.seen_at.desc(), table.id)
+    )
+    return [SchedulerRow(**row) for row in rows.mappings()]
 
 
 def _live(rules: Policy) -> sa.ColumnElement[bool]:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,10 +17,24 @@ import sqlalchemy as sa
 from pydantic import SecretStr
 
 from services.scheduler.main import scheduler_main
+from services.scheduler.parts import EXIT_STALLED, note_progress, watch
 from services.scheduler.periodic import Periodic
 from services.scheduler.relay import Relay, publisher
 from shared.errors import InvalidInput, Unreachable
-from shared.jobs import QUEUE_CHANNEL, WorkerBeat, beat, claim, pause, retire, transaction
+from shared.jobs import (
+    QUEUE_CHANNEL,
+    SchedulerRow,
+    WorkerBeat,
+    beat,
+    beat_scheduler,
+    claim,
+    list_schedulers,
+    list_workers,
+    live_workers,
+    pause,
+    retire,
+    transaction,
+)
 from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.app import DRAIN, create_app
 from shared.runtime.queue import redis_client
@@ -308,6 +325,117 @@ def test_scheduler_returns_lost_leases_and_stops_when_told(
         stopping.set()
         thread.join(20.0)
     assert not thread.is_alive()
+
+
+# --- a scheduler that stalls ---
+
+
+def run_alone(chosen: Settings, seconds: float) -> subprocess.Popen[str]:
+    """A scheduler process that exits when a part makes no progress for `seconds`."""
+    code = (
+        "import services.scheduler.main as main, services.scheduler.parts as parts, shared.settings as settings; "
+        f"parts.LOOK_SECONDS = {seconds / 4}; parts.STALL_SECONDS = {seconds}; main.BEAT_SECONDS = 0.2; "
+        "import sys; sys.exit(main.scheduler_main(settings.settings()))"
+    )
+    environment = {
+        **os.environ,
+        "MAREY_HOME": str(chosen.home),
+        "MAREY_DATABASE_URL": chosen.database_url.get_secret_value() if chosen.database_url else "",
+        "MAREY_QUEUE_URL": chosen.queue_url.get_secret_value() if chosen.queue_url else "",
+        "MAREY_STORE": str(chosen.home / "assets"),
+        "MAREY_SWEEP_SECONDS": "0.2",
+        "MAREY_LEASE_SECONDS": "2",
+        "MAREY_HEARTBEAT_SECONDS": "0.4",
+    }
+    return subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE, text=True)
+
+
+def test_a_scheduler_whose_part_hangs_exits_with_a_line_in_the_log(
+    engine: sa.Engine, database_url: str, queue_url: str, tmp_path: Path
+) -> None:
+    """What hangs is the sweeper, in a lock that another session holds; the relay goes on beside it."""
+    chosen = Settings(home=tmp_path, database_url=SecretStr(database_url), queue_url=SecretStr(queue_url))
+    with transaction(engine) as conn:
+        process = run_alone(chosen, seconds=4.0)
+        try:
+            wait(lambda: bool(schedulers(engine)), 60.0)
+            conn.execute(sa.text("LOCK TABLE lease IN ACCESS EXCLUSIVE MODE"))
+            _, log = process.communicate(timeout=120.0)
+        finally:
+            process.kill()
+            process.wait()
+    assert process.returncode == EXIT_STALLED, log
+    assert "scheduler_stalled" in log
+    assert "sweeper" in log.partition("scheduler_stalled")[2]
+    assert "relay" not in log.partition("scheduler_stalled")[2]
+    (row,) = schedulers(engine)
+    assert row.pid == process.pid  # doctor tells of it
+
+
+def test_a_scheduler_says_that_it_works_until_it_is_told_to_stop(
+    engine: sa.Engine, database_url: str, queue_url: str, tmp_path: Path
+) -> None:
+    with transaction(engine) as conn:
+        beat_scheduler(conn, "stalled", host="here", pid=1)
+        conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 minute'"))
+    chosen = Settings(home=tmp_path, database_url=SecretStr(database_url), queue_url=SecretStr(queue_url))
+    process = run_alone(chosen, seconds=60.0)
+    try:
+        wait(lambda: [row.pid for row in schedulers(engine)] == [process.pid], 60.0)
+        first = schedulers(engine)[0]
+        wait(lambda: schedulers(engine)[0].seen > first.seen, 60.0)
+        with transaction(engine) as conn:
+            assert list_workers(conn) == []
+            assert live_workers(conn) == {}
+    finally:
+        process.terminate()
+        process.communicate(timeout=60.0)
+    assert process.returncode == 0
+    assert schedulers(engine) == []
+
+
+def schedulers(engine: sa.Engine) -> list[SchedulerRow]:
+    with transaction(engine) as conn:
+        return list_schedulers(conn)
+
+
+def test_a_round_that_takes_long_is_no_stall_as_long_as_its_statements_are_answered(engine: sa.Engine) -> None:
+    note_progress(engine)
+    stopping, slow = threading.Event(), threading.Event()
+
+    def act() -> None:
+        while not stopping.is_set() and not slow.is_set():
+            with transaction(engine) as conn:
+                conn.execute(sa.text("SELECT pg_sleep(0.05)"))
+        stopping.wait()
+
+    part = Periodic("retention", act, seconds=0.01, stopping=stopping)
+    part.start()
+    found: list[bool] = []
+    watcher = threading.Thread(target=lambda: found.append(watch([part], stopping, seconds=2.0, look=0.5)))
+    watcher.start()
+    time.sleep(4.5)
+    assert watcher.is_alive()
+    slow.set()
+    watcher.join(30.0)
+    assert found == [True]
+    stopping.set()
+    part.join(10.0)
+
+
+def test_one_look_that_finds_every_part_silent_is_a_machine_that_slept() -> None:
+    stopping = threading.Event()
+    part = Periodic("part", lambda: None, seconds=0.05, stopping=stopping)
+    part.start()
+    found: list[bool] = []
+    watcher = threading.Thread(target=lambda: found.append(watch([part], stopping, seconds=1.0, look=0.2)))
+    watcher.start()
+    part._ticked -= 100.0
+    time.sleep(1.0)
+    stopping.set()
+    watcher.join(10.0)
+    part.join(10.0)
+    assert found == [False]
 
 
 def test_a_scheduler_without_database_says_what_to_set() -> None:

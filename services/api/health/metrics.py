@@ -16,6 +16,7 @@ from shared.jobs import (
     SEARCH,
     Outbox,
     QueueDepth,
+    list_schedulers,
     live_workers,
     open_stream_counts,
     outbox_state,
@@ -38,9 +39,11 @@ def render(engine: sa.Engine) -> bytes:
     with transaction(engine, SEARCH) as conn:
         depths, workers = queue_depths(conn), live_workers(conn)
         streams, outbox = open_stream_counts(conn), outbox_state(conn)
+        schedulers = {row.host: row.silence for row in reversed(list_schedulers(conn))}
     with _rendering:  # two scrapes at once would clear each other's gauges
         _show_queues(bounded(depths))
         _show(metrics.WORKERS, workers)
+        _show(metrics.SCHEDULERS, schedulers)
         _show(metrics.STREAMS, streams)
         _show_outbox(outbox)
         return generate_latest(metrics.API)
@@ -79,7 +82,7 @@ def _show_queues(depths: Iterable[QueueDepth]) -> None:
             metrics.UNSERVED.labels(row.queue, row.tenant).set(row.unserved)
 
 
-def _show(gauge: Gauge, values: Mapping[str, int]) -> None:
+def _show(gauge: Gauge, values: Mapping[str, float]) -> None:
     gauge.clear()
     for label, value in values.items():
         gauge.labels(label).set(value)

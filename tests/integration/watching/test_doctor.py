@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import socket
+import threading
+import time
 from datetime import UTC, datetime, timedelta
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 from pydantic import SecretStr
 
+from services.api.health.metrics import render
+from services.cli import checkup
 from services.cli import checkup_backing as backing
 from services.cli.checkup import Check, models
-from shared.jobs import WorkerBeat, beat, downgrade, transaction
+from shared.jobs import WorkerBeat, beat, beat_scheduler, downgrade, transaction
 from shared.runtime.queue import redis_client
 from shared.settings import Settings
 from shared.storage import FolderStore
@@ -51,10 +57,70 @@ def test_items_that_nobody_serves_are_told_with_the_worker_to_start(engine: sa.E
 def test_leases_that_nobody_takes_back_mean_that_no_scheduler_runs(engine: sa.Engine) -> None:
     submit_items(engine, 1)
     claim_some(engine, "text")
+    bad(backing.scheduler(engine), "none was heard of", "marey scheduler", state="warn")
+    with transaction(engine) as conn:
+        beat_scheduler(conn, "one", host="here", pid=1)
     assert backing.scheduler(engine).state == "ok"
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE lease SET expires_at = now() - interval '1 minute'"))
     bad(backing.scheduler(engine), "1 leases", "marey scheduler")
+
+
+def test_a_scheduler_that_stalls_is_told_with_its_last_progress(engine: sa.Engine) -> None:
+    with transaction(engine) as conn:
+        beat_scheduler(conn, "one", host="here", pid=17)
+        conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '40 seconds'"))
+    bad(backing.scheduler(engine), "on here (process 17)", "40 s ago", "marey scheduler")
+    assert backing.workers(engine).message == "none was heard of lately"
+    shown = render(engine).decode()
+    (line,) = [line for line in shown.splitlines() if line.startswith("marey_scheduler_silent_seconds{")]
+    assert 40.0 <= float(line.split()[1]) < 400.0
+    with transaction(engine) as conn:
+        conn.execute(
+            sa.text(
+                "INSERT INTO worker SELECT 'two', queue, 'there', 18, device, bundle, batch_key, "
+                "started_at, now() FROM worker"
+            )
+        )
+    bad(backing.scheduler(engine), "another works", "on here (process 17)", state="warn")
+
+
+def test_a_server_that_hangs_is_told_apart_from_one_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkup, "ANSWER_SECONDS", 0.3)
+    monkeypatch.setattr(checkup, "LIVE_SECONDS", 0.3)
+    with socket.create_server(("127.0.0.1", 0), backlog=16) as silent:
+        address = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        monkeypatch.setenv("MAREY_SERVER", address)
+        monkeypatch.setenv("MAREY_KEY", "k")
+        bad(checkup._server(), "accepts connections", "restart")
+    bad(checkup._server(), "does not answer", "marey serve")
+
+
+class HangingListings(BaseHTTPRequestHandler):
+    """Answers /livez, and nothing else before the test is over."""
+
+    def do_GET(self) -> None:
+        if self.path != "/livez":
+            time.sleep(2.0)
+            return
+        self.send_response(200)
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_server_whose_listings_hang_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkup, "ANSWER_SECONDS", 0.3)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), HangingListings)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    monkeypatch.setenv("MAREY_SERVER", f"http://127.0.0.1:{server.server_port}")
+    monkeypatch.setenv("MAREY_KEY", "k")
+    try:
+        bad(checkup._server(), "answers /livez, but not /v1/jobs", "restart")
+    finally:
+        server.shutdown()
+        server.server_close()
 
 
 @pytest.mark.parametrize(

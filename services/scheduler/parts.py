@@ -1,0 +1,91 @@
+"""The scheduler's threads, and what notices when one of them stalls.
+
+A part makes progress with each statement that its thread gets an answer to, and with each end of a round. Rounds may
+take hours (retention, garbage); one statement or one object may not. A part without progress for `STALL_SECONDS` hangs
+in something that no deadline ends: the process then exits, and its supervisor starts another.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import sqlalchemy as sa
+from sqlalchemy import event
+
+from shared.runtime.logs import logger
+
+log = logger(__name__)
+
+STALL_SECONDS = 180.0
+"""Three times the longest that a statement may take at the database, and far beyond the deadlines of calls."""
+LOOK_SECONDS = 5.0
+LOOKS = 3
+"""Looks that must agree: after SIGSTOP or a suspended machine the first finds every part silent."""
+EXIT_STALLED = 70  # EX_SOFTWARE
+
+
+class Part(threading.Thread):
+    """A thread of the scheduler.
+
+    Args:
+        name: as metrics and logs call it.
+        pause: seconds between two rounds.
+        allowance: seconds that a round may wait on purpose, beside `STALL_SECONDS`.
+    """
+
+    def __init__(self, name: str, *, pause: float, allowance: float = 0.0) -> None:
+        super().__init__(name=name, daemon=True)
+        self._pause = pause
+        self._allowance = allowance
+        self._ticked = time.monotonic()
+
+    def progressed(self) -> None:
+        """Note progress."""
+        self._ticked = time.monotonic()
+
+    def silence(self) -> float:
+        """Seconds without progress; below 0 between two rounds."""
+        return time.monotonic() - self._ticked - self._pause
+
+    def stalled(self, seconds: float) -> bool:
+        """Return True if there was no progress for `seconds`, or the thread has ended."""
+        return not self.is_alive() or self.silence() > seconds + self._allowance
+
+
+def note_progress(engine: sa.Engine) -> None:
+    """Let each statement of this engine that was answered count as progress of the part that sent it."""
+
+    @event.listens_for(engine, "after_cursor_execute")
+    def _answered(*_: Any) -> None:
+        part = threading.current_thread()
+        if isinstance(part, Part):
+            part.progressed()
+
+
+def watch(
+    parts: Sequence[Part],
+    stopping: threading.Event,
+    *,
+    seconds: float | None = None,
+    look: float | None = None,
+) -> bool:
+    """Wait until `stopping` is set; return True, after a line in the log, when a part has stalled before that."""
+    seconds, look = seconds or STALL_SECONDS, look or LOOK_SECONDS
+    agreed = 0
+    while not stopping.wait(look):
+        stalled = [part for part in parts if part.stalled(seconds)]
+        agreed = agreed + 1 if stalled else 0
+        if agreed == LOOKS:
+            for part in stalled:
+                log.error("scheduler_stalled", part=part.name, seconds=round(part.silence()), running=part.is_alive())
+            return not stopping.is_set()
+    return False
+
+
+def end_stalled() -> NoReturn:
+    """End this process without waiting for its threads: one of them hangs."""
+    os._exit(EXIT_STALLED)
