@@ -61,9 +61,9 @@ class Client:
     One idempotency key goes with every attempt of one `submit`, so a retry after a lost answer enqueues nothing twice.
     """
 
-    def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int = ATTEMPTS) -> None:
+    def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int | None = None) -> None:
         self.server = server
-        self._attempts = attempts
+        self._attempts = ATTEMPTS if attempts is None else attempts
         self._http = httpx2.Client(
             base_url=server.url,
             headers={"Authorization": f"Bearer {server.key}"},
