@@ -160,8 +160,11 @@ def goes_on(what: str, hint: str) -> Generator[None]:
         raise
 
 
-def confirm(question: str, *, yes: bool) -> None:
+def confirm(question: str, *, yes: bool, hint: str = "-y does it unasked.") -> None:
     """Nothing, if that may be done: by `--yes`, or because a person says so.
+
+    Args:
+        hint: what to do where there is no terminal.
 
     Raises:
         InvalidInput: there is no terminal to ask at.
@@ -170,7 +173,7 @@ def confirm(question: str, *, yes: bool) -> None:
     if yes:
         return
     if sys.stdin is None or not sys.stdin.isatty():
-        raise InvalidInput("this is asked at a terminal, and there is none", where=question, hint="-y does it unasked.")
+        raise InvalidInput("this is asked at a terminal, and there is none", where=question, hint=hint)
     try:
         agreed = typer.confirm(question, err=True)
     except typer.Abort:

@@ -141,6 +141,14 @@ def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
     return [_key(row) for row in rows.mappings()]
 
 
+def keys_named(conn: sa.Connection, tenant: str, name: str) -> list[ApiKey]:
+    """Valid keys of a tenant with this name, newest first: neither revoked nor expired."""
+    table = schema.api_key.c
+    valid = table.revoked_at.is_(None) & (table.expires_at.is_(None) | (table.expires_at > CLOCK))
+    found = _keys().where(table.tenant_id == tenant, table.name == name, valid)
+    return [_key(row) for row in conn.execute(found.order_by(table.id.desc())).mappings()]
+
+
 def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = OVERLAP) -> NewApiKey:
     """A new key in the place of another, with its name, scopes, rates and length of life; the old one works a while.
 

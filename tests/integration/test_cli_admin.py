@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import sqlalchemy as sa
+from typer.testing import _NamedTextIOWrapper
 
 from shared.errors import Unauthenticated
 from shared.jobs import authenticate, transaction
@@ -21,9 +22,9 @@ from tests.support.marey import Ran
 class Admin:
     """The command line of an operator."""
 
-    def __call__(self, *arguments: object) -> Ran:
+    def __call__(self, *arguments: object, stdin: str = "") -> Ran:
         """Run `marey admin …` to its end."""
-        return Command({})("admin", *arguments)
+        return Command({})("admin", *arguments, stdin=stdin)
 
     def json(self, *arguments: object) -> list[dict[str, Any]]:
         """What a command gives as JSON lines."""
@@ -93,6 +94,26 @@ def test_a_key_of_a_tenant_is_made_rotated_and_revoked(admin: Admin, engine: sa.
     assert verbs == ["key.revoke", "key.rotate", "key.create"]
     told = admin("audit").ok().out
     assert all(secret not in told for secret in (made["secret"], rotated.out.strip()))
+
+
+def test_a_name_in_use_is_asked_about_at_a_terminal_and_refused_elsewhere(
+    admin: Admin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (first,) = admin.json("keys", "create", "ci")
+    admin("keys", "create", "ci").refused(2, "already named 'ci'", first["id"], "--allow-duplicate")
+    admin("tenants", "create", "studio").ok()
+    (other,) = admin.json("keys", "create", "ci", "--tenant", "studio")  # of another tenant: no duplicate
+    assert len(admin.json("keys", "list")) == 2
+    (second,) = admin.json("keys", "create", "ci", "--allow-duplicate")
+    with monkeypatch.context() as terminal:
+        terminal.setattr(_NamedTextIOWrapper, "isatty", lambda _: True)
+        admin("keys", "create", "ci", stdin="n\n").refused(130, "Make another one?", "nothing was done")
+        admin("keys", "create", "ci", stdin="y\n").ok()
+    assert len(admin.json("keys", "list", "--tenant", "default")) == 3
+    for each in admin.json("keys", "list", "--tenant", "default"):
+        admin("keys", "revoke", each["id"]).ok()
+    (third,) = admin.json("keys", "create", "ci")  # a revoked key does not keep its name
+    assert len({first["id"], other["id"], second["id"], third["id"]}) == 4
 
 
 def test_the_audit_log_is_listed_by_tenant_verb_and_time_and_to_its_limit(admin: Admin, engine: sa.Engine) -> None:

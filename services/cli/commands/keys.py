@@ -39,9 +39,13 @@ def create(
         float | None, typer.Option("--days", help="It expires after so many days; never, if unset.")
     ] = None,
     rates: Rates = None,
+    allow_duplicate: Annotated[
+        bool, typer.Option("--allow-duplicate", help="Do not ask if a valid key of the tenant has this name.")
+    ] = False,
     as_json: console.Json = False,
 ) -> None:
     """Make a key and print it, this once."""
+    _confirm_name(tenant, name, yes=allow_duplicate)
     with connection() as conn:
         from shared.jobs import audit, create_key
 
@@ -101,6 +105,26 @@ def revoke(key: Key, tenant: Tenant = "default") -> None:
         revoked = revoke_key(conn, tenant, wanted)
         audit(conn, tenant, operator(), "key.revoke", wanted, name=revoked.name)
     console.say(f"{revoked.name} is revoked")
+
+
+def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:
+    """Ask before a second key gets a name: audit log, reviews and limits name keys by it.
+
+    Raises:
+        InvalidInput: the name is in use, and there is no terminal to ask at.
+    """
+    if yes:
+        return
+    with connection() as conn:
+        from shared.jobs import keys_named
+
+        taken = keys_named(conn, tenant, name)
+    if taken:
+        console.confirm(
+            f"A valid key of tenant {tenant} is already named {name!r} (id {taken[0].id}). Make another one?",
+            yes=False,
+            hint="Choose another name, `marey admin keys rotate ID` to replace that key, or use --allow-duplicate.",
+        )
 
 
 def _show_secret(made: NewApiKey, as_json: bool) -> None:
