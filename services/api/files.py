@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from typing import Annotated, Any
-from uuid import UUID
 
 from fastapi import Depends, Header, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
@@ -15,6 +14,7 @@ from fastapi.responses import RedirectResponse, StreamingResponse
 from services.api.context import Context
 from services.api.ranges import ByteRange, parse_range
 from services.api.schemas import View
+from shared.disposition import attachment, download_name
 from shared.jobs import asset_key
 from shared.storage import CHUNK, PRESIGN_SECONDS, AssetStore, Opened
 
@@ -51,8 +51,13 @@ class Part:
 AskedPart = Annotated[Part, Depends()]
 
 
-def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, part: Part) -> Response:
-    """The answer to a request for a file of `owner`; its ETag is its sha256. HEAD tells the whole file's size."""
+def file_response(shared: Context, tenant: str, stem: str, file: FileView, part: Part) -> Response:
+    """Answer a request for a file. Its ETag is its sha256; HEAD tells the whole file's size.
+
+    Args:
+        stem: name of the download, without its ending.
+    """
+    name = download_name(stem, file.format)
     etag = f'"{file.sha256}"'
     if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
         return Response(status_code=304, headers={"ETag": etag})
@@ -60,12 +65,12 @@ def file_response(shared: Context, tenant: str, owner: UUID, file: FileView, par
         "ETag": etag,
         "Accept-Ranges": "bytes",
         "Cache-Control": "private, immutable, max-age=86400",
-        "Content-Disposition": f'attachment; filename="{owner}.{file.format}"',
+        "Content-Disposition": attachment(name),
     }
     if part.request.method == "HEAD":  # also of a bucket, whose URLs are signed for GET alone
         return Response(headers={**headers, "Content-Length": str(file.size)}, media_type=file.media_type)
     object_key = asset_key(tenant, file.sha256)
-    url = shared.store.presign(object_key, filename=f"{owner}.{file.format}", media_type=file.media_type)
+    url = shared.store.presign(object_key, filename=name, media_type=file.media_type)
     if url is not None:
         return RedirectResponse(url, status_code=307, headers=_valid_for(PRESIGN_SECONDS))
     wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)

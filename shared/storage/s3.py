@@ -9,12 +9,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from urllib.parse import quote
 
 import urllib3
 from minio import Minio
 from minio.error import InvalidResponseError, MinioException, S3Error, ServerError
 
+from shared.disposition import attachment
 from shared.errors import Unreachable
 from shared.metrics import STORE_ERRORS
 from shared.storage.deadlines import Silence, open_pool
@@ -190,7 +190,7 @@ class S3Store:
             checked_key(key),
             expires=timedelta(seconds=seconds),
             response_headers={
-                "response-content-disposition": f"attachment; filename*=UTF-8''{quote(filename, safe='')}",
+                "response-content-disposition": attachment(filename),
                 "response-content-type": media_type,
             },
         )

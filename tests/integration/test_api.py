@@ -294,6 +294,8 @@ def test_a_file_comes_whole_with_its_sha256_as_etag(http: httpx2.Client, motion:
     assert (head.status_code, head.content) == (200, b"")
     for name in ("etag", "content-length", "content-type", "content-disposition", "accept-ranges"):
         assert head.headers[name] == response.headers[name]
+    seed = http.get(f"/v1/motions/{motion}").json()["seed"]
+    assert head.headers["content-disposition"] == f'attachment; filename="00000_a-person-walks_{seed}.npz"'
     assert http.head(f"/v1/motions/{motion}/files/glb").status_code == 404
     refused(http.get(f"/v1/motions/{motion}/files/glb"), 404, "not-found")
     refused(http.get(f"/v1/motions/{motion}/files/..%2f..%2fetc"), 404, "not-found")

@@ -91,7 +91,7 @@ def get_report(
     if file is None:
         message = f"there is no such report: the evaluation is {row.state}"
         raise NotFound(message, where=str(evaluation), hint=row.reason)
-    return file_response(shared, key.tenant, row.id, file, part)
+    return file_response(shared, key.tenant, f"{row.name or 'evaluation'}_{row.id}", file, part)
 
 
 @router.get("/{evaluation}/comparison")

@@ -1,12 +1,25 @@
-"""What a re-roll needs besides rows: the bundle, for the item must still be makeable on this server."""
+"""What motions need besides rows: names of their files, and for a re-roll the bundle, which must still be here."""
 
 from __future__ import annotations
+
+import re
 
 from services.api.catalogue import Catalogue
 from shared.errors import Conflict, MareyError
 from shared.items import Item
-from shared.jobs import ItemRow, NewItem
+from shared.jobs import ItemRow, MotionRow, NewItem
 from shared.offers import new_items
+
+WORDS = 48
+"""Characters of the prompt in the name of a file."""
+
+
+def file_stem(row: MotionRow) -> str:
+    """The name of a motion's downloads: its number in the job, its name or the prompt's first words, its seed."""
+    words = "-".join(re.findall(r"\w+", row.prompt.lower()))
+    if len(words) > WORDS:
+        words = words[: WORDS + 1].rpartition("-")[0] or words[:WORDS]
+    return f"{row.index:05}_{row.name or words or 'motion'}_{row.seed}"
 
 
 def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:

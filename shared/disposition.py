@@ -1,0 +1,30 @@
+"""The `Content-Disposition` header of a download (RFC 6266), with names of any language."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from urllib.parse import quote
+
+MOST_BYTES = 200
+"""Of a name without its ending, in UTF-8: file systems allow 255 with it."""
+_UNSAFE = re.compile(r'[\x00-\x1f\x7f-\x9f/\\:*?"<>|\ud800-\udfff]')
+_PLAIN = re.compile(r"[^A-Za-z0-9!#$&+.^_`~ -]")
+"""Not for a quoted string that every client reads alike."""
+
+
+def download_name(stem: str, ending: str) -> str:
+    """A file name that every system takes: no separators, no control characters, at most 255 bytes."""
+    clean = _UNSAFE.sub("-", unicodedata.normalize("NFC", stem)).strip(" .") or "file"
+    return f"{clean.encode()[:MOST_BYTES].decode(errors='ignore').rstrip(' .')}.{ending}"
+
+
+def attachment(filename: str) -> str:
+    """The header's value: the name in ASCII for old clients and, if it holds more, percent-encoded (RFC 8187)."""
+    folded = unicodedata.normalize("NFKD", filename).encode("ascii", "ignore").decode()
+    plain = _PLAIN.sub("_", folded)
+    if plain == filename:
+        return f'attachment; filename="{plain}"'
+    if not plain.partition(".")[0].strip(" _-"):
+        plain = f"file.{plain.rpartition('.')[2]}"
+    return f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(filename, safe='')}"
