@@ -29,6 +29,7 @@ from pydantic import (
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from shared.errors import InvalidInput
+from shared.origins import check_origins
 from shared.rates import check_rates
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -156,6 +157,9 @@ class Settings(BaseSettings):
     host: str = "127.0.0.1"
     port: Port = 8400
     allowed_hosts: Names = ["127.0.0.1", "localhost", "[::1]"]
+    cors_origins: Names = []
+    """Origins of web pages that may use the API from a browser, as `["https://app.example.com"]`, exactly; also for
+    WebSockets. None by default."""
     idle_seconds: Seconds = 20.0
     """A connection to the API that asks for nothing for so long is closed, and so is one whose request has no whole
     head by then."""
@@ -273,6 +277,14 @@ class Settings(BaseSettings):
         except InvalidInput as error:
             raise ValueError(f"{error.message}. {error.hint}") from error
         return values
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _exact_origins(cls, values: list[str]) -> list[str]:
+        try:
+            return check_origins(values)
+        except InvalidInput as error:
+            raise ValueError(f"{error.message}. {error.hint}") from error
 
     @field_validator("heartbeat_seconds")
     @classmethod

@@ -32,6 +32,7 @@ from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
+from services.api.origins import OriginGuard
 from services.api.process import prepare_process
 from services.api.queries import known_query
 from services.api.rates import Rates
@@ -76,8 +77,10 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
     for router in routers:
         app.include_router(router)
     app.add_middleware(UpgradeGuard)
-    app.add_middleware(HostGuard, allowed=config.allowed_hosts)
+    app.add_middleware(HostGuard, allowed=config.allowed_hosts, origins=config.cors_origins)
     app.add_middleware(BodyGuard, patience=Patience(config.body_seconds, config.body_pause_seconds))
+    if config.cors_origins:
+        app.add_middleware(OriginGuard, origins=config.cors_origins)
     app.add_middleware(Trace)
     app.add_middleware(Measure)
     app.openapi = lambda: openapi(app)

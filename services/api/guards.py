@@ -11,18 +11,21 @@ from starlette.websockets import WebSocketClose
 
 from services.api.problems import problem_response
 from shared.errors import MareyError, Refused, UpgradeMissing
+from shared.origins import origin_of
 
 
 class HostGuard:
     """Answers only requests for hosts it is known by: a web page that rebinds its name to this port gets nothing.
 
-    A page of any host may open a socket, unlike a request: browsers leave it to the server to look at where the page is
-    from. Who is no browser says nothing of that.
+    A page of any origin may open a socket, unlike a request: browsers leave it to the server to check the page's
+    origin. Allowed are pages of this server's own hosts and of the origins that may read its answers. Clients that are
+    no browsers send no origin.
     """
 
-    def __init__(self, app: ASGIApp, allowed: Sequence[str]) -> None:
+    def __init__(self, app: ASGIApp, allowed: Sequence[str], origins: Sequence[str] = ()) -> None:
         self.app = app
         self.allowed = frozenset(host.lower() for host in allowed)
+        self.origins = frozenset(origins)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on, or refuse."""
@@ -33,15 +36,18 @@ class HostGuard:
             await _refuse(error, scope, receive, send)
 
     def _objection(self, scope: Scope) -> MareyError | None:
-        if scope["type"] not in ("http", "websocket") or "*" in self.allowed:
+        if scope["type"] not in ("http", "websocket"):
             return None
         headers = Headers(scope=scope)
         host = _without_port(headers.get("host", "")).lower()
-        if host not in self.allowed:
+        if host not in self.allowed and "*" not in self.allowed:
             return _foreign("this server does not answer for that host", host)
         origin = headers.get("origin")
-        if scope["type"] == "websocket" and origin is not None and _host_of(origin) not in self.allowed:
-            return _foreign("this server opens no sockets for pages of that host", origin)
+        if scope["type"] != "websocket" or origin is None or origin_of(origin) in self.origins:
+            return None
+        own = _host_of(origin)
+        if not own or own not in self.allowed | {host}:
+            return _foreign("this server opens no sockets for pages of that origin", origin, "MAREY_CORS_ORIGINS")
         return None
 
 
@@ -76,8 +82,8 @@ def _host_of(origin: str) -> str:
         return ""
 
 
-def _foreign(message: str, where: str) -> Refused:
-    return Refused(message, where=where[:100], hint="MAREY_ALLOWED_HOSTS names those it does.")
+def _foreign(message: str, where: str, setting: str = "MAREY_ALLOWED_HOSTS") -> Refused:
+    return Refused(message, where=where[:100], hint=f"{setting} names those it does.")
 
 
 async def _refuse(error: MareyError, scope: Scope, receive: Receive, send: Send) -> None:

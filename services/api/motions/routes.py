@@ -13,7 +13,6 @@ from services.api.audit import note
 from services.api.auth import Reader, Submitter
 from services.api.context import Connection, Shared, deadline
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.api.motions import service
 from services.api.motions.schemas import (
     MotionDetailView,
     MotionView,
@@ -23,7 +22,7 @@ from services.api.motions.schemas import (
     RerollView,
     ReviewFilter,
 )
-from services.api.motions.service import made_again
+from services.api.motions.service import file_stem, made_again
 from services.api.problems import RESPONSES
 from services.api.schemas import Cursor, FreeText, Limit, PageView
 from shared import jobs
@@ -127,4 +126,4 @@ def get_file(
     if file is None:
         made = ", ".join(f.format for f in row.files)
         raise NotFound(f"the motion was not made as {format}", where=str(motion), hint=f"It has {made}.")
-    return file_response(shared, key.tenant, service.file_stem(row), file, part)
+    return file_response(shared, key.tenant, file_stem(row), file, part)
