@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
-from typing import BinaryIO
+from functools import partial
+from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
+from anyio import CapacityLimiter, to_thread
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -16,8 +18,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from services.api.problems import problem_response
 from shared.errors import InvalidInput, MareyError, TooLarge, TooSlow
 from shared.items import MAX_BODY_BYTES
-from shared.spool import Spool
+from shared.spool import IN_MEMORY, Spool
 
+if TYPE_CHECKING:
+    from services.api.context import Context
+
+Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20
 """Bytes of any body but those that hold many prompts."""
 NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
@@ -25,6 +31,8 @@ PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
 """Where such bodies go; their routes read them, once they know who sends them."""
 MIN_RATE = 4096
 """Bytes a second, on average, below which a body is too slow: half of what a modem did."""
+INCOMING = "marey.incoming"
+"""Key of the scope of a request whose route reads the body itself."""
 LINGER_SECONDS = 2.0
 SILENT_SECONDS = 0.25
 LINGER_BYTES = 2**20
@@ -80,6 +88,15 @@ class Incoming:
                 hint="Send it again, in parts if the line is slow.",
             ) from None
 
+    @asynccontextmanager
+    async def paused(self) -> AsyncGenerator[None]:
+        """Do not count the time of the block: the client waits for us."""
+        before = time.monotonic()
+        try:
+            yield
+        finally:
+            self._began += time.monotonic() - before
+
     async def linger(self) -> None:
         """Throw away what still comes: not more than a limit, not for long, and not once the client falls silent."""
         before = self._received
@@ -115,6 +132,7 @@ class BodyGuard:
         incoming = Incoming(scope, receive, self.patience)
         answer = _Answer(incoming, send)
         if _holds_prompts(scope):
+            scope[INCOMING] = incoming
             await self.app(scope, incoming, answer)
             return
         try:
@@ -153,8 +171,8 @@ class _Answer:
         await self._send(message)
 
 
-async def read_body(request: Request, limit: int = MAX_BODY_BYTES) -> bytes:
-    """The body of a request; by default one that holds many prompts.
+async def read_body(request: Request, limit: int) -> bytes:
+    """The body of a request.
 
     Raises:
         TooLarge, TooSlow, InvalidInput: as `_parts`.
@@ -162,18 +180,67 @@ async def read_body(request: Request, limit: int = MAX_BODY_BYTES) -> bytes:
     return b"".join([part async for part in _parts(request, limit)])
 
 
+class KeptBody:
+    """A body that is here as a whole, and the threads in which it may be read."""
+
+    def __init__(self, file: BinaryIO, threads: CapacityLimiter | None) -> None:
+        self.file = file
+        self._threads = threads
+
+    async def run(self, function: Callable[..., Result], *arguments: object) -> Result:
+        """Run a function in a thread; one of few where the body is large, so that the threads of others stay free."""
+        return await to_thread.run_sync(partial(function, *arguments), limiter=self._threads)
+
+
 @asynccontextmanager
-async def kept_body(request: Request) -> AsyncGenerator[BinaryIO]:
+async def kept_body(request: Request, shared: Context, tenant: str) -> AsyncGenerator[KeptBody]:
     """The body of a request that holds many prompts, in a file once it is long; the file is gone after the block.
+
+    A long body waits until there is room for it before it is read. One that does not say its length takes as much as
+    the longest.
 
     Raises:
         TooLarge, TooSlow, InvalidInput: as `_parts`.
-        Unreachable: there is no room for the file.
+        Overloaded: there is no room for it now.
+        Unreachable: the file cannot be written.
     """
-    with Spool("body", NO_ROOM) as spool:
+    async with AsyncExitStack() as stack:
+        incoming: Incoming = request.scope[INCOMING]
+        spool = stack.enter_context(Spool("body", NO_ROOM))
+        large = False
+
+        async def take(size: int) -> None:
+            nonlocal large
+            large = True
+            async with incoming.paused():
+                await stack.enter_async_context(shared.body_room.take(tenant, size))
+
+        declared = _declared(request, MAX_BODY_BYTES)
+        if declared > IN_MEMORY:
+            await take(declared)
         async for part in _parts(request, MAX_BODY_BYTES):
+            if not large and len(spool) + len(part) > IN_MEMORY:
+                await take(MAX_BODY_BYTES)
             spool.write(part)
-        yield spool.rewound()
+        yield KeptBody(spool.rewound(), shared.large_threads if large else None)
+
+
+def _declared(request: Request, limit: int) -> int:
+    """The length that a request declares; 0 = none.
+
+    Raises:
+        TooLarge: it is over `limit`.
+        InvalidInput: it is not a number, or the body is compressed.
+    """
+    declared = request.headers.get("content-length", "0")
+    if not declared.isdecimal():
+        raise InvalidInput("is not a number", where="Content-Length")
+    encoding = request.headers.get("content-encoding", "identity")
+    if encoding.strip().lower() != "identity":
+        raise InvalidInput(f"{encoding[:40]!r} is not taken", where="Content-Encoding", hint="Send the body as it is.")
+    if int(declared) > limit:
+        raise _too_large(limit)
+    return int(declared)
 
 
 async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
@@ -184,14 +251,7 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
         TooSlow: it does not come fast enough.
         InvalidInput: the length it declares is not a number, it is compressed, or the client left in its middle.
     """
-    declared = request.headers.get("content-length", "0")
-    if not declared.isdecimal():
-        raise InvalidInput("is not a number", where="Content-Length")
-    encoding = request.headers.get("content-encoding", "identity")
-    if encoding.strip().lower() != "identity":
-        raise InvalidInput(f"{encoding[:40]!r} is not taken", where="Content-Encoding", hint="Send the body as it is.")
-    if int(declared) > limit:
-        raise _too_large(limit)
+    _declared(request, limit)
     size = 0
     try:
         async for part in request.stream():

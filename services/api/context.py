@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, TypeVar
 
 import sqlalchemy as sa
+from anyio import CapacityLimiter
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from services.api.body_room import BodyRoom
 from services.api.catalogue import Catalogue
 from services.api.health.readiness import Readiness
 from services.api.rates import Rates
@@ -19,6 +21,8 @@ from services.api.texts.service import TextService
 from shared.jobs import Deadline, transaction
 from shared.settings import Settings
 from shared.storage import AssetStore
+
+LARGE_THREADS = 2
 
 
 @dataclass
@@ -36,6 +40,10 @@ class Context:
     """None where no Redis is named."""
     seen_ready: bool = False
     """A worker has had its model loaded: from then on `/readyz` no longer asks for one."""
+    body_room: BodyRoom = field(default_factory=BodyRoom)
+    """For bodies too long for memory."""
+    large_threads: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(LARGE_THREADS))
+    """In which such bodies are read and written on; the threads of other requests stay free."""
     readiness: Readiness = field(init=False)
     """What `/readyz` says."""
 

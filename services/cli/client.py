@@ -24,6 +24,7 @@ from shared.errors import (
     InvalidInput,
     MareyError,
     NotFound,
+    Overloaded,
     QuotaUsedUp,
     Refused,
     TimedOut,
@@ -38,6 +39,10 @@ from shared.tls import trusting_context
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
 """Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
+BUSY_SECONDS = 60.0
+"""Waited in all, for a server that answers but has no room for the request now; at least `ATTEMPTS` are made."""
+SUBMIT_BUSY_SECONDS = 900.0
+"""The same for a submit: large ones are read one after the other."""
 SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
 QUIET_SECONDS = 12.0
@@ -92,7 +97,8 @@ class Client:
 
     def post_new(self, path: str, body: Any) -> Any:
         """POST what is made once however often it is sent: with an idempotency key, which goes with every retry."""
-        return _json(self._send("POST", path, json=body, headers={"Idempotency-Key": str(uuid4())}))
+        key = {"Idempotency-Key": str(uuid4())}
+        return _json(self._send("POST", path, patience=SUBMIT_BUSY_SECONDS, json=body, headers=key))
 
     def post_once(self, path: str, body: Any) -> Any:
         """POST what must not be done twice; the answer's JSON. Tried again only while no connection comes about."""
@@ -122,7 +128,8 @@ class Client:
         }
         query = _given({**params, "validate_only": validate_only or None})
         timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
-        return _json(self._send("POST", "/v1/jobs", params=query, content=items, headers=headers, timeout=timeout))
+        sent = {"params": query, "content": items, "headers": headers, "timeout": timeout}
+        return _json(self._send("POST", "/v1/jobs", patience=SUBMIT_BUSY_SECONDS, **sent))
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
         """Every element of a listing, page after page."""
@@ -162,17 +169,28 @@ class Client:
                 if event.data:
                     yield json.loads(event.data)
 
-    def _send(self, method: str, path: str, *, repeatable: bool = True, **request: Any) -> httpx2.Response:
-        pause = FIRST_PAUSE
-        for attempt in range(1, self._attempts + 1):
+    def _send(
+        self, method: str, path: str, *, repeatable: bool = True, patience: float | None = None, **request: Any
+    ) -> httpx2.Response:
+        """Send until there is an answer.
+
+        Args:
+            repeatable: nothing goes wrong where the request is carried out twice.
+            patience: seconds to wait in all while the server says that it is busy; None = a minute.
+        """
+        pause, failures, refusals, waited = FIRST_PAUSE, 0, 0, 0.0
+        if patience is None or self._attempts < ATTEMPTS:
+            patience = BUSY_SECONDS if self._attempts >= ATTEMPTS else 0.0
+        while True:
             try:
                 response = self._request(method, path, request)
             except httpx2.TransportError as error:
                 if (final := _final(self.server, error)) is not None:
                     raise final from error
+                failures += 1
                 never_sent = isinstance(error, httpx2.ConnectError | httpx2.ConnectTimeout)
                 if (
-                    attempt == self._attempts
+                    failures == self._attempts
                     or isinstance(error, httpx2.UnsupportedProtocol)
                     or not (repeatable or never_sent)
                 ):
@@ -181,13 +199,17 @@ class Client:
             else:
                 if response.status_code < 400:
                     return _expected(response)
-                again = response.status_code in RETRIED and repeatable and not _is_quota(response)
-                if not again or attempt == self._attempts:
-                    raise error_of(response)
                 wait = max(pause, _retry_after(response))
+                if _is_busy(response):  # it answers: that is no failure
+                    refusals, waited = refusals + 1, waited + wait
+                    again = refusals < self._attempts or waited < patience
+                else:
+                    failures += 1
+                    again = failures < self._attempts
+                if response.status_code not in RETRIED or not again or not repeatable or _is_quota(response):
+                    raise error_of(response)
             time.sleep(wait * random.uniform(0.8, 1.2))  # noqa: S311
             pause = min(pause * 2, LONGEST_PAUSE)
-        raise AssertionError("unreachable: the last attempt returns or raises")
 
     def _request(self, method: str, path: str, request: Mapping[str, Any]) -> httpx2.Response:
         """One attempt, as a span where traces are on; the server goes on from it."""
@@ -231,6 +253,8 @@ def error_of(response: httpx2.Response) -> MareyError:
     if kind == InvalidItems.problem_type:
         problems = [Problem(p.get("line"), p.get("field"), p["message"]) for p in problem.get("problems", [])]
         return InvalidItems(problems, total=problem.get("total"))
+    if kind == Overloaded.problem_type:
+        return Overloaded(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     if kind in (Busy.problem_type, QUOTA):
         return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
@@ -243,6 +267,13 @@ def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
         f"the object store answered {response.status_code} to a URL that was signed for it",
         where=str(response.request.url.copy_with(query=None)),
         hint="Signed URLs work for minutes: is the clock of the server, or of the store, wrong?",
+    )
+
+
+def _is_busy(response: httpx2.Response) -> bool:
+    """The server works, and has no room for this request now: a rate, or too many large ones at once."""
+    return response.status_code == Busy.status or (
+        response.status_code == Overloaded.status and f"{TYPE_PREFIX}{Overloaded.problem_type}" in response.text
     )
 
 

@@ -15,7 +15,6 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from services.api.jobs.service import MAX_VALUES
 from shared.errors import NotFound
 from shared.jobs import WorkerBeat, beat, transaction
 from shared.spool import IN_MEMORY
@@ -135,9 +134,14 @@ def test_too_many_items_and_too_large_a_body_are_413(http: httpx2.Client) -> Non
     refused(http.patch(f"/v1/jobs/{job['id']}", content=b" " * (2**20 + 1)), 413, "too-large")
 
 
-def test_a_document_of_far_too_many_values_is_refused_before_it_is_read(http: httpx2.Client) -> None:
-    body = b'{"items": [' + b"{}," * (MAX_VALUES // 2 + 1) + b"{}]}"
-    refused(http.post("/v1/jobs", content=body), 413, "too-large")
+def test_a_document_of_far_too_many_items_or_with_a_huge_one_is_refused(http: httpx2.Client) -> None:
+    refused(http.post("/v1/jobs", content=b'{"items": [' + b"{}," * 2_000_000 + b"{}]}"), 413, "too-large")
+    huge = b'{"prompt": "' + b"a" * 2**20 + b'"}'
+    problem = refused(http.post("/v1/jobs", content=b'{"items": [' + huge + b"]}"), 413, "too-large")
+    assert problem["where"] == "items, element 1"
+    lines = {"Content-Type": "application/x-ndjson"}
+    problem = refused(http.post("/v1/jobs", content=b"\n" + huge, headers=lines), 413, "too-large")
+    assert problem["where"] == "line 2"
 
 
 def test_a_long_body_that_cannot_be_kept_is_a_503_and_no_job(

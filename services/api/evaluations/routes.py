@@ -6,11 +6,10 @@ from typing import Annotated, Any, Literal
 from uuid import UUID
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import read_body
+from services.api.bodies import kept_body
 from services.api.context import Connection, Shared, deadline
 from services.api.evaluations import service
 from services.api.evaluations.comparison import ComparisonView, compare_runs
@@ -39,8 +38,8 @@ async def begin_evaluation(
     idempotency_key: IdempotencyKey = None,
 ) -> EvaluationDetailView:
     """Plan an evaluation: its motions are made in the background, then measured. All bad prompts are told at once."""
-    body = await read_body(request)
-    view, replayed = await run_in_threadpool(service.create, shared, key, body, idempotency_key)
+    async with kept_body(request, shared, key.tenant) as body:
+        view, replayed = await body.run(service.create, shared, key, body.file, idempotency_key)
     response.headers["Location"] = f"/v1/evaluations/{view.id}"
     if replayed:
         response.headers["Idempotency-Replayed"] = "true"

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, BinaryIO
 
 import sqlalchemy as sa
 
 from services.api.audit import note
 from services.api.context import Context
+from services.api.documents import Document
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
-from services.api.jobs.service import Fields, read_fields, read_object, request_sha256
+from services.api.jobs.service import Fields, read_fields, request_sha256
 from shared import jobs
 from shared.errors import InvalidInput, NotFound
 from shared.evaluating import Plan, plan_evaluation
-from shared.evaluation_prompts import EvaluationPrompt, read_prompts
+from shared.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
 from shared.items import CHECKS, InvalidItems, Problem
 from shared.settings import Settings
 
@@ -45,22 +45,34 @@ class Asked:
             raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
 
 
-def read_asked(model: type[Fields], document: Mapping[str, Any]) -> tuple[Fields, Asked]:
+def prompts_document(body: BinaryIO, *, at: tuple[str, ...] = ("prompts",), hint: str = HINT) -> Document:
+    """A body whose prompts stand at a path."""
+    return Document(body, at, hint=hint, limit=MAX_PROMPTS)
+
+
+def read_asked(model: type[Fields], values: Mapping[str, Any], document: Document) -> tuple[Fields, Asked]:
     """The fields of a body, which are those of an evaluation and more, and what they ask for.
+
+    Args:
+        values: what stands beside the prompts in `document`; and at their place, if that is no list.
 
     Raises:
         InvalidItems: with the problems of all fields, or of all prompts.
         InvalidInput: neither a split nor prompts, or both.
     """
-    values = dict(document)
-    raws = values.pop("prompts", None)
-    fields = read_fields(model, values)
+    if document.is_cut:  # its other fields may stand behind
+        read_prompts(document.elements(), where="prompts")
+    others = dict(values)
+    other = others.pop("prompts", None)
+    fields = read_fields(model, others)
+    if other is not None:
+        raise InvalidInput("is not a list", where="prompts", hint=HINT)
     assert isinstance(fields, EvaluationFields)
-    return fields, _asked(fields, raws)
+    return fields, _asked(fields, document)
 
 
 def create(
-    shared: Context, key: jobs.ApiKey, body: bytes, idempotency_key: str | None
+    shared: Context, key: jobs.ApiKey, body: BinaryIO, idempotency_key: str | None
 ) -> tuple[EvaluationDetailView, bool]:
     """Plan an evaluation, or answer the one that an earlier request with this key and body has planned; whether so.
 
@@ -68,7 +80,8 @@ def create(
         InvalidItems, InvalidInput, InvalidBundle, Refused: see `read_asked` and `Asked.planned`.
         IdempotencyMismatch: the key was used with another request.
     """
-    fields, asked = read_asked(NewEvaluationBody, read_object(body, hint=HINT))
+    document = prompts_document(body)
+    fields, asked = read_asked(NewEvaluationBody, document.fields(), document)
     plan = asked.planned(shared.config)
     with jobs.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
@@ -79,7 +92,7 @@ def create(
             name=fields.name,
             comment=fields.comment,
             idempotency_key=idempotency_key,
-            body_sha256=request_sha256("evaluations", io.BytesIO(body)) if idempotency_key else None,
+            body_sha256=request_sha256("evaluations", body) if idempotency_key else None,
         )
         made = jobs.create_evaluation(conn, new)
         assert made is not None  # only one of a schedule can be there already
@@ -105,15 +118,11 @@ def detail(conn: sa.Connection, row: jobs.EvaluationRow) -> EvaluationDetailView
     return EvaluationDetailView.detail(row, jobs.evaluation_events(conn, row.id), jobs.evaluation_waits_for(conn, row))
 
 
-def _asked(fields: EvaluationFields, raws: object) -> Asked:
-    if (raws is None) == (fields.split is None):
-        what = "both are given" if raws is not None else "neither is given"
+def _asked(fields: EvaluationFields, document: Document) -> Asked:
+    if document.has_list == (fields.split is not None):
+        what = "both are given" if document.has_list else "neither is given"
         raise InvalidInput(f"an evaluation has a split or prompts, and {what}", where="split, prompts", hint=HINT)
-    prompts = None
-    if raws is not None:
-        if not isinstance(raws, list):
-            raise InvalidInput("is not a list", where="prompts", hint=HINT)
-        prompts = read_prompts(enumerate(raws, 1), where="prompts")
+    prompts = read_prompts(document.elements(), where="prompts") if fields.split is None else None
     source = (fields.split if prompts is None else fields.source) or OWN_PROMPTS
     if prompts is not None and source in jobs.BUNDLE_SOURCES:
         raise InvalidInput(f"{source!r} is what the evaluator's own prompts are called", where="source")

@@ -6,7 +6,6 @@ from typing import Annotated, Any, BinaryIO
 from uuid import UUID
 
 from fastapi import APIRouter, Header, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from fastapi.sse import EventSourceResponse
 
@@ -90,14 +89,14 @@ async def submit_job(
         "fail_early": fail_early,
         "keep_days": keep_days,
     }
-    async with kept_body(request) as body:
-        submission = await run_in_threadpool(_read, kind, body, fields, shared)
+    async with kept_body(request, shared, key.tenant) as body:
+        submission = await body.run(_read, kind, body.file, fields, shared)
         if validate_only:
-            return await run_in_threadpool(_check, shared, key, submission)
+            return await body.run(_check, shared, key, submission)
         sha256 = None
         if idempotency_key:
-            sha256 = await run_in_threadpool(service.request_sha256, str(request.url.query), body)
-        return await run_in_threadpool(_write, shared, key, submission, idempotency_key, sha256)
+            sha256 = await body.run(service.request_sha256, str(request.url.query), body.file)
+        return await body.run(_write, shared, key, submission, idempotency_key, sha256)
 
 
 def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) -> service.Submission:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -12,17 +11,16 @@ from typing import Any, BinaryIO, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from services.api.catalogue import Catalogue
+from services.api.documents import MAX_VALUE, Document
 from services.api.jobs.schemas import JobFields
 from shared.errors import InvalidInput, MareyError, TooLarge
-from shared.items import MAX_ITEMS, InvalidItems, Item, Problem, read_items, read_json
+from shared.items import InvalidItems, Item, Problem, read_items, read_json
 from shared.jobs import NewItem
 from shared.offers import Offer, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
 Raws = Callable[[], Iterator[tuple[int, object]]]
 """What a body holds, with its lines, from its beginning at each call."""
-MAX_VALUES = 40 * MAX_ITEMS
-"""Of a JSON document: an item with all fields and twenty tags has fewer."""
 
 
 @dataclass(frozen=True)
@@ -55,47 +53,37 @@ def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Subm
     Raises:
         InvalidItems: with the problems of all lines.
         InvalidInput: there are none.
-        TooLarge: more than 100,000 items.
+        TooLarge: more than 100,000 items, or a line of more than `MAX_VALUE` bytes.
     """
+    return _checked(fields, lambda: _lines(body), catalogue)
 
-    def raws() -> Iterator[tuple[int, object]]:
-        body.seek(0)
-        return ((number, read_json(line)) for number, line in enumerate(body, 1) if line.strip())
 
-    return _checked(fields, raws, catalogue)
+def _lines(body: BinaryIO) -> Iterator[tuple[int, object]]:
+    body.seek(0)
+    number = 0
+    while line := body.readline(MAX_VALUE + 1):
+        number += 1
+        if len(line) > MAX_VALUE:
+            hint = "Write one item a line."
+            raise TooLarge(f"is over {MAX_VALUE:,} bytes", where=f"line {number}", hint=hint)
+        if line.strip():
+            yield number, read_json(line)
 
 
 def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
-    """A job as one JSON object with `items`.
+    """A job as one JSON object with `items`. The body stays in use.
 
     Raises:
         InvalidItems: with the problems of all items.
         InvalidInput: the object itself is wrong.
-        TooLarge: more than 100,000 items.
+        TooLarge: more than 100,000 items, or one of more than `MAX_VALUE` characters.
     """
-    document = read_object(body.read(), hint='Write {"items": [{"prompt": "…"}]}.')
-    raws = document.pop("items", None)
-    if not isinstance(raws, list) or not raws:
-        raise InvalidInput("is missing, empty or not a list", where="items", hint='Write {"items": [{"prompt": "…"}]}.')
-    return _checked(job_fields(document), lambda: enumerate(raws, 1), catalogue)
-
-
-def read_object(body: bytes, *, hint: str | None = None) -> dict[str, Any]:
-    """A body that is a JSON object.
-
-    Raises:
-        InvalidInput: it is none.
-        TooLarge: it holds more values than any real one, each of which takes many times its bytes in memory.
-    """
-    if sum(map(body.count, (b",", b"[", b"{"))) > MAX_VALUES:
-        raise TooLarge(f"the body holds over {MAX_VALUES:,} values", where="body", hint="Send it in several requests.")
-    try:
-        document = json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
-    if not isinstance(document, dict):
-        raise InvalidInput("the body is not a JSON object", where="body", hint=hint)
-    return document
+    hint = 'Write {"items": [{"prompt": "…"}]}.'
+    document = Document(body, ("items",), hint=hint)
+    fields = document.fields()
+    if not document.has_list or next(document.elements(), None) is None:
+        raise InvalidInput("is missing, empty or not a list", where="items", hint=hint)
+    return _checked(job_fields(fields), document.elements, catalogue)
 
 
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from uuid import UUID
 
 from fastapi import APIRouter, Request, Response
-from fastapi.concurrency import run_in_threadpool
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import read_body
+from services.api.bodies import kept_body
 from services.api.context import Connection, Shared
 from services.api.evaluations.routes import body_of
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView
@@ -26,8 +25,8 @@ router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONS
 @router.post("", status_code=201, openapi_extra=body_of("NewScheduleBody"))
 async def create_schedule(request: Request, response: Response, shared: Shared, key: Submitter) -> ScheduleView:
     """Plan evaluations that come again. Each run looks up the bundles by the names given here, exact or not."""
-    body = await read_body(request)
-    view = await run_in_threadpool(service.create, shared, key, body)
+    async with kept_body(request, shared, key.tenant) as body:
+        view = await body.run(service.create, shared, key, body.file)
     response.headers["Location"] = f"/v1/schedules/{view.id}"
     return view
 
@@ -48,8 +47,8 @@ def get_schedule(schedule: UUID, conn: Connection, key: Reader) -> ScheduleView:
 @router.patch("/{schedule}", openapi_extra=body_of("SchedulePatch"))
 async def change_schedule(schedule: UUID, request: Request, shared: Shared, key: Operator) -> ScheduleView:
     """Change what is given. After a pause, and with new times, it is next due at its next time from now."""
-    body = await read_body(request)
-    return await run_in_threadpool(service.change, shared, key, schedule, body)
+    async with kept_body(request, shared, key.tenant) as body:
+        return await body.run(service.change, shared, key, schedule, body.file)
 
 
 @router.delete("/{schedule}", status_code=204)

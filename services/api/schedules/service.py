@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from typing import BinaryIO
 from uuid import UUID
 
 from services.api.audit import note
 from services.api.context import Context
 from services.api.evaluations.schemas import AskedFields
-from services.api.evaluations.service import read_asked, stored
-from services.api.jobs.service import read_fields, read_object
+from services.api.evaluations.service import prompts_document, read_asked, stored
+from services.api.jobs.service import read_fields
 from services.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
 from shared import jobs
 from shared.errors import InvalidInput
@@ -16,13 +17,14 @@ from shared.errors import InvalidInput
 HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
 
 
-def create(shared: Context, key: jobs.ApiKey, body: bytes) -> ScheduleView:
+def create(shared: Context, key: jobs.ApiKey, body: BinaryIO) -> ScheduleView:
     """A new schedule.
 
     Raises:
         InvalidItems, InvalidInput, InvalidBundle, Refused: of its times, or as for an evaluation that could not run.
     """
-    fields, asked = read_asked(NewScheduleBody, read_object(body, hint=HINT))
+    document = prompts_document(body, hint=HINT)
+    fields, asked = read_asked(NewScheduleBody, document.fields(), document)
     plan = asked.planned(shared.config)
     with jobs.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
@@ -39,19 +41,20 @@ def create(shared: Context, key: jobs.ApiKey, body: bytes) -> ScheduleView:
         return ScheduleView.of(jobs.get_schedule(conn, key.tenant, made))
 
 
-def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: bytes) -> ScheduleView:
+def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: BinaryIO) -> ScheduleView:
     """Change a schedule.
 
     Raises:
         NotFound: there is no such schedule.
         InvalidItems, InvalidInput, InvalidBundle, Refused: as `create`.
     """
-    document = read_object(body, hint='Write {"paused": true}.')
-    request = document.pop("request", None)
+    document = prompts_document(body, at=("request", "prompts"), hint='Write {"paused": true}.')
+    values = document.fields()
+    request = values.pop("request", None)
     if request is not None and not isinstance(request, dict):
         raise InvalidInput("is not an object", where="request", hint=HINT)
-    fields = read_fields(ScheduleFields, document)
-    asked = None if request is None else read_asked(AskedFields, request)[1]
+    fields = read_fields(ScheduleFields, values)
+    asked = None if request is None else read_asked(AskedFields, request, document)[1]
     plan = None if asked is None else asked.planned(shared.config)
     with jobs.transaction(shared.engine) as conn:
         changed = None

@@ -13,7 +13,7 @@ import pytest
 from services.cli import client as client_module
 from services.cli.client import Client
 from services.cli.place import Server
-from shared.errors import Busy, Conflict, InvalidInput, NotFound, Refused, Unreachable
+from shared.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
 from shared.items import InvalidItems
 
 
@@ -135,7 +135,33 @@ def test_what_must_not_be_done_twice_is_sent_once(scripted: Scripted) -> None:
 
 def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(client_module, "ATTEMPTS", 1)
+    monkeypatch.setattr(client_module, "BUSY_SECONDS", 0.0)
     client, _ = scripted((429, problem("busy", hint="Stop one.")))
     with client, pytest.raises(Busy, match=r"no\n  Stop one\.") as caught:
         client.get("/v1/jobs")
     assert caught.value.exit_code == 5
+
+
+def test_a_server_that_is_busy_is_waited_for_longer_than_one_that_is_broken(
+    scripted: Scripted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(client_module, "LONGEST_PAUSE", 0.001)
+    busy = (503, problem("overloaded"))
+    client, script = scripted(*[busy] * 12, (200, {"id": "job"}))
+    with client:
+        assert client.submit([{"prompt": "walk"}]) == {"id": "job"}
+    assert len({key for _, key, _ in script.asked}) == 1, "one idempotency key for all attempts"
+    assert len(script.asked) == 13
+    client, script = scripted(*[(503, problem("unreachable"))] * 12)
+    with client, pytest.raises(Unreachable):
+        client.submit([{"prompt": "walk"}])
+    assert len(script.asked) == client_module.ATTEMPTS
+
+
+def test_a_server_that_stays_busy_is_given_up(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client_module, "BUSY_SECONDS", 0.001)
+    client, script = scripted(*[(503, problem("overloaded"))] * 12)
+    with client, pytest.raises(Overloaded) as refused:
+        client.get("/v1/jobs")
+    assert refused.value.exit_code == 4
+    assert len(script.asked) == client_module.ATTEMPTS

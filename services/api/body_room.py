@@ -1,0 +1,109 @@
+"""Room for large bodies: how many bytes of them one process keeps in files at the same time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+
+from shared.errors import Overloaded
+from shared.items import MAX_BODY_BYTES
+
+ROOM_BYTES = 3 * MAX_BODY_BYTES
+"""In files of the temporary folder. In docker-compose.yml that is in memory: 256 MB, of the 1 GiB of the container."""
+TENANT_BYTES = 2 * MAX_BODY_BYTES
+"""Of one tenant: another always finds room."""
+WAIT_SECONDS = 10.0
+WAITING = 32
+"""Requests that wait at the same time; their clients have sent nothing but what fits into the buffers of a socket."""
+RETRY_SECONDS = 5
+
+
+@dataclass(eq=False)
+class _Waiter:
+    tenant: str
+    size: int
+    turn: asyncio.Future[None] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
+
+
+class BodyRoom:
+    """Gives out bytes, first come, first served; on the event loop alone.
+
+    A request whose tenant has all it may have is passed by the requests of others.
+    """
+
+    def __init__(self, total: int = ROOM_BYTES, tenant: int = TENANT_BYTES, *, seconds: float = WAIT_SECONDS) -> None:
+        self._total, self._tenant, self._seconds = total, tenant, seconds
+        self._used = 0
+        self._by_tenant: Counter[str] = Counter()
+        self._waiting: deque[_Waiter] = deque()
+
+    @property
+    def used(self) -> int:
+        """Bytes that are given out."""
+        return self._used
+
+    @asynccontextmanager
+    async def take(self, tenant: str, size: int) -> AsyncGenerator[None]:
+        """Hold `size` bytes during the block; waits for them.
+
+        Raises:
+            Overloaded: there is no room within `seconds`, or too many wait already.
+        """
+        await self._wait(tenant, size)
+        try:
+            yield
+        finally:
+            self._used -= size
+            self._by_tenant[tenant] -= size
+            if not self._by_tenant[tenant]:
+                del self._by_tenant[tenant]
+            self._admit()
+
+    async def _wait(self, tenant: str, size: int) -> None:
+        if len(self._waiting) >= WAITING:
+            raise _overloaded()
+        waiter = _Waiter(tenant, size)
+        self._waiting.append(waiter)
+        self._admit()
+        try:
+            async with asyncio.timeout(self._seconds):
+                await asyncio.shield(waiter.turn)
+        except TimeoutError:
+            if not waiter.turn.done():
+                self._forget(waiter)
+                raise _overloaded() from None
+        except asyncio.CancelledError:
+            if waiter.turn.done():  # it was given, and nobody takes it
+                self._used -= size
+                self._by_tenant[tenant] -= size
+            self._forget(waiter)
+            raise
+
+    def _forget(self, waiter: _Waiter) -> None:
+        if waiter in self._waiting:
+            self._waiting.remove(waiter)
+        self._admit()  # it may have stood before others
+
+    def _admit(self) -> None:
+        """Give room to those who wait, in their order."""
+        for waiter in tuple(self._waiting):
+            if self._by_tenant[waiter.tenant] + waiter.size > self._tenant:
+                continue
+            if self._used + waiter.size > self._total:
+                return
+            self._waiting.remove(waiter)
+            self._used += waiter.size
+            self._by_tenant[waiter.tenant] += waiter.size
+            waiter.turn.set_result(None)
+
+
+def _overloaded() -> Overloaded:
+    return Overloaded(
+        "other large requests are being read",
+        where="body",
+        hint="Send it again after the seconds of `Retry-After`.",
+        seconds=RETRY_SECONDS,
+    )

@@ -1,0 +1,235 @@
+"""JSON bodies with one long list, read from a file piece by piece: memory does not grow with the list.
+
+Every value is decoded by Python's own `json`, which a whole body would be read with too. So the same is accepted, and
+what is refused is told in the same words with the same line and column. Only the object around the list, and the list's
+commas, are read here.
+"""
+
+from __future__ import annotations
+
+import codecs
+import json
+import re
+from collections.abc import Iterator
+from json.decoder import JSONDecodeError
+from typing import Any, BinaryIO
+
+from shared.errors import InvalidInput, TooLarge
+from shared.items import MAX_ITEMS
+
+MAX_VALUE = 2**20
+"""Characters of one element, and of all other fields together."""
+PIECE = 2**20
+"""Bytes that are read at a time."""
+NEAR_END = 16
+"""Characters: a literal or an escape that is cut off is told of where it begins, this much before the end at most."""
+BLANK = re.compile(r"[ \t\n\r]*")
+_decoder = json.JSONDecoder()
+
+
+class Document:
+    """A JSON object in a file, with a list at a path, such as `items` or `request.prompts`.
+
+    Args:
+        body: the file; read from its beginning by each call.
+        path: names that lead to the list.
+        hint: what to do about a body that is another thing than an object.
+        limit: elements after which `fields` reads no further: the list is too long, which its reader will say.
+    """
+
+    def __init__(
+        self, body: BinaryIO, path: tuple[str, ...], *, hint: str | None = None, limit: int = MAX_ITEMS
+    ) -> None:
+        self._body, self._path, self._hint, self._limit = body, path, hint, limit
+        self.has_list = False
+        """There is a list at the path. Known after `fields`, as the next."""
+        self.is_cut = False
+        """It has more than `limit` elements, and what follows it was not read."""
+
+    def fields(self) -> dict[str, Any]:
+        """Everything but the list: what stands beside it, and at its place if that is no list.
+
+        Raises:
+            InvalidInput: it is no JSON, no object, or names the list twice.
+            TooLarge: an element, or all the rest, is over `MAX_VALUE` characters.
+        """
+        found: dict[str, Any] = {}
+        for number, _ in self._read(found):
+            if number > self._limit:
+                self.is_cut = True
+                break
+        return found
+
+    def elements(self) -> Iterator[tuple[int, object]]:
+        """The elements of the list with their numbers, from 1; raises as `fields`."""
+        return self._read({})
+
+    def _read(self, fields: dict[str, Any]) -> Iterator[tuple[int, object]]:
+        self.has_list = False
+        window = _Window(self._body)
+        if window.skip() != "{":
+            window.value("body")
+            window.end()
+            raise InvalidInput("the body is not a JSON object", where="body", hint=self._hint)
+        yield from self._object(window, self._path, fields)
+        window.end()
+
+    def _object(self, window: _Window, path: tuple[str, ...], fields: dict[str, Any]) -> Iterator[tuple[int, object]]:
+        window.step()
+        closed, seen = window.skip() == "}", False
+        while not closed:
+            if window.skip() != '"':
+                raise window.error("Expecting property name enclosed in double quotes")
+            name = str(window.field())
+            if window.skip() != ":":
+                raise window.error("Expecting ':' delimiter")
+            window.step()
+            begins = window.skip()
+            if name == path[0] and seen:
+                raise InvalidInput("is given twice", where=".".join(self._path), hint="Give it once.")
+            seen = seen or name == path[0]
+            if name == path[0] and len(path) == 1 and begins == "[":
+                self.has_list = True
+                yield from self._list(window)
+            elif name == path[0] and len(path) > 1 and begins == "{":
+                fields[name] = {}
+                yield from self._object(window, path[1:], fields[name])
+            else:
+                fields[name] = window.field()
+            closed = window.skip() == "}"
+            if not closed:
+                window.comma()
+        window.step()
+
+    def _list(self, window: _Window) -> Iterator[tuple[int, object]]:
+        window.step()
+        closed, number = window.skip() == "]", 0
+        while not closed:
+            window.skip()
+            number += 1
+            yield number, window.value(f"{'.'.join(self._path)}, element {number}")
+            closed = window.skip() == "]"
+            if not closed:
+                window.comma()
+        window.step()
+
+
+class _Window:
+    """The text of a file around the place that is read, always with `MAX_VALUE` characters ahead or all that is left.
+    What lies behind is forgotten but for the number of its lines."""
+
+    def __init__(self, body: BinaryIO) -> None:
+        body.seek(0)
+        encoding = json.detect_encoding(body.read(4))  # as `json.loads` of bytes
+        body.seek(0)
+        self._body = body
+        self._decode = codecs.getincrementaldecoder(encoding)("surrogatepass").decode
+        self._bytes = 0  # read so far
+        self._text, self._at, self._whole = "", 0, False
+        self._gone, self._lines, self._line = 0, 0, 0  # characters, newlines, and where the last of these lines begins
+        self._fields = 0  # characters of all fields so far
+
+    def skip(self) -> str:
+        """Go to the next character that is not blank; empty at the end."""
+        while True:
+            self._fill()
+            found = BLANK.match(self._text, self._at)
+            assert found is not None
+            self._at = found.end()
+            if self._at < len(self._text):
+                return self._text[self._at]
+            if self._whole:
+                return ""
+
+    def step(self) -> None:
+        """Go on behind the character that `skip` found."""
+        self._at += 1
+
+    def comma(self) -> None:
+        """Go on behind a comma; raises InvalidInput where there is none."""
+        if self.skip() != ",":
+            raise self.error("Expecting ',' delimiter")
+        self._at += 1
+
+    def end(self) -> None:
+        """Raise InvalidInput if anything but blanks is left."""
+        if self.skip():
+            raise self.error("Extra data")
+
+    def field(self) -> object:
+        """A value that is no element of the list, or a name; raises as `value`."""
+        before = self._gone + self._at
+        found = self.value("body")
+        self._fields += self._gone + self._at - before
+        if self._fields > MAX_VALUE:
+            raise _too_large("body")
+        return found
+
+    def value(self, where: str) -> object:
+        """The value that begins here.
+
+        Raises:
+            InvalidInput: it is no JSON.
+            TooLarge: it has over `MAX_VALUE` characters.
+        """
+        self._fill()
+        try:
+            found, end = _decoder.raw_decode(self._text, self._at)
+        except JSONDecodeError as error:
+            cut = error.msg.startswith("Unterminated") or error.pos >= len(self._text) - NEAR_END
+            if cut and not self._whole:
+                raise _too_large(where) from None
+            raise self.error(error.msg, error.pos) from None
+        except (ValueError, RecursionError) as error:
+            raise InvalidInput(f"the body is not JSON: {error}", where="body") from error
+        if end - self._at > MAX_VALUE or (end == len(self._text) and not self._whole):
+            raise _too_large(where)
+        self._at = end
+        return found
+
+    def error(self, message: str, at: int | None = None) -> InvalidInput:
+        """The error for what is no JSON, as `json` tells it of a whole text."""
+        at = self._at if at is None else at
+        line = self._lines + self._text.count("\n", 0, at) + 1
+        newline = self._text.rfind("\n", 0, at)
+        column = at - newline if newline >= 0 else self._gone + at - self._line + 1
+        place = f"line {line} column {column} (char {self._gone + at})"
+        return InvalidInput(f"the body is not JSON: {message}: {place}", where="body")
+
+    def _fill(self) -> None:
+        if self._whole or len(self._text) - self._at > MAX_VALUE:
+            return
+        self._forget()
+        parts = [self._text]
+        ahead = len(self._text)
+        while not self._whole and ahead <= MAX_VALUE:
+            read = self._body.read(PIECE)
+            self._whole = not read
+            try:
+                parts.append(self._decode(read, final=self._whole))
+            except UnicodeDecodeError as error:  # its object begins with what the decoder kept of the piece before
+                raise _undecodable(error, self._bytes - (len(error.object) - len(read))) from None
+            self._bytes += len(read)
+            ahead += len(parts[-1])
+        self._text = "".join(parts)
+
+    def _forget(self) -> None:
+        newline = self._text.rfind("\n", 0, self._at)
+        if newline >= 0:
+            self._lines += self._text.count("\n", 0, self._at)
+            self._line = self._gone + newline + 1
+        self._gone += self._at
+        self._text, self._at = self._text[self._at :], 0
+
+
+def _undecodable(error: UnicodeDecodeError, before: int) -> InvalidInput:
+    """The error as Python tells it of the whole; `before` bytes stand before its object."""
+    start, last = before + error.start, before + error.end - 1
+    one = f"byte 0x{error.object[error.start]:02x} in position {start}"
+    place = one if start == last else f"bytes in position {start}-{last}"
+    message = f"{error.encoding!r} codec can't decode {place}: {error.reason}"
+    return InvalidInput(f"the body is not JSON: {message}", where="body")
+
+
+def _too_large(where: str) -> TooLarge:
+    return TooLarge(f"is over {MAX_VALUE:,} characters", where=where, hint="Is a quote or a bracket missing?")
