@@ -72,7 +72,7 @@ def _write(path: Path, items: int, lines: bool) -> int:
     """A body of the size that was measured before: prompts of some sixty words."""
     filler = "and then turns to the left and waves with the right hand "
     item: dict[str, Any] = {"name": "", "seconds": 4.0, "seed": 0, "model": BUNDLE, "tags": ["crowd", "take 1"]}
-    room = MEGABYTES * 2**20 // ITEMS - len(json.dumps(item)) - 60
+    room = MEGABYTES * 2**20 // ITEMS - len(json.dumps(item)) - 12
     with path.open("w", encoding="utf-8") as stream:
         stream.write("" if lines else '{"name": "large", "items": [')
         for number in range(items):

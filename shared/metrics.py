@@ -34,6 +34,7 @@ FAST = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 
 HTTP_REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", "route", "status"), registry=API)
 HTTP_SECONDS = Histogram("marey_http_seconds", "Time to the end of an answer.", ("method", "route"), registry=API)
 SOCKETS = Gauge("marey_open_sockets", "Clients that watch a live stream.", registry=API)
+EVENT_STREAMS = Gauge("marey_open_event_streams", "Clients that follow a job.", registry=API)
 
 # --- the API: how the tables stand, asked at each scrape ---
 

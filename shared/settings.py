@@ -171,6 +171,14 @@ class Settings(BaseSettings):
     """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
     is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
 
+    sockets_per_tenant: int = Field(default=100, ge=1, le=100_000)
+    """Sockets of live streams that one tenant may have open at one API process, of 200."""
+    sockets_per_key: int = Field(default=50, ge=1, le=100_000)
+    """The same of one key."""
+    event_streams: int = Field(default=4000, ge=1, le=100_000)
+    """Streams of server-sent events that may be open at one API process."""
+    event_streams_per_tenant: int = Field(default=2000, ge=1, le=100_000)
+    event_streams_per_key: int = Field(default=1000, ge=1, le=100_000)
     text_url: TextService | None = None
     """Where the text service (`marey text serve`) answers the API; `marey serve` brings its own."""
     text_key: SecretStr | None = None

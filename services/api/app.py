@@ -104,7 +104,9 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     engine = create_engine(url, pool_size=CONNECTIONS // 2, max_overflow=CONNECTIONS // 2)
     tailer = Tailer(engine, listen_url, message)
     redis_url = config.streams_url or config.queue_url
-    hub = None if redis_url is None else Hub(redis_url.get_secret_value())
+    hub = None
+    if redis_url is not None:
+        hub = Hub(redis_url.get_secret_value(), tenant=config.sockets_per_tenant, key=config.sockets_per_key)
     texts = TextService(config)
     shared = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), texts, hub)
     app.state.context = shared

@@ -14,11 +14,13 @@ from starlette.requests import HTTPConnection
 from services.api.body_room import BodyRoom
 from services.api.catalogue import Catalogue
 from services.api.health.readiness import Readiness
+from services.api.places import Places, Shares
 from services.api.rates import Rates
 from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
 from services.api.texts.service import TextService
 from shared.jobs import Deadline, transaction
+from shared.metrics import EVENT_STREAMS
 from shared.settings import Settings
 from shared.storage import AssetStore
 
@@ -47,8 +49,14 @@ class Context:
     readiness: Readiness = field(init=False)
     """What `/readyz` says."""
 
+    event_streams: Places = field(init=False)
+    """Open streams of server-sent events."""
+
     def __post_init__(self) -> None:
         self.readiness = Readiness(self)
+        config = self.config
+        shares = Shares(config.event_streams, config.event_streams_per_tenant, config.event_streams_per_key)
+        self.event_streams = Places("event streams", shares, EVENT_STREAMS)
 
 
 async def context(asked: HTTPConnection) -> Context:

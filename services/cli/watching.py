@@ -7,7 +7,7 @@ from typing import Any
 
 from services.cli import console
 from services.cli.client import Client
-from shared.errors import ItemsFailed, TimedOut, Unreachable
+from shared.errors import Busy, ItemsFailed, TimedOut, Unreachable
 
 ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
 PATIENCE = 180.0
@@ -43,6 +43,10 @@ def watch_job(client: Client, job: str, *, timeout: float | None = None, quiet: 
                     reachable = time.monotonic()
                     _patience(deadline, job)
                     bar.update(task, completed=_ended(event["data"]), description=_caption(state, event["data"]))
+                state = client.get(f"/v1/jobs/{job}")
+                reachable = time.monotonic()
+            except Busy as error:  # its key has all the streams it may have: look now and then instead
+                time.sleep(min(error.seconds, _patience(deadline, job)))
                 state = client.get(f"/v1/jobs/{job}")
                 reachable = time.monotonic()
             except Unreachable:

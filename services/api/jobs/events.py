@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from contextlib import ExitStack
 from uuid import UUID
 
-from fastapi.sse import KEEPALIVE_COMMENT, format_sse_event
+from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
+from starlette.types import Receive, Scope, Send
 
 from services.api.jobs.schemas import EventView
+from services.api.places import Places
+from services.api.problems import problem_response
 from services.api.tailer import Tailer
-from shared.errors import InvalidInput
+from shared.errors import Busy, InvalidInput
 from shared.jobs import ApiKey, EventRow
 
 PING_SECONDS = 15.0
@@ -29,6 +33,28 @@ def last_event_id(header: str | None, after: int) -> int:
     if not header.isascii() or not header.isdecimal() or int(header[:20]) > MAX_SEQ:
         raise InvalidInput(f"{header[:40]!r} is not the id of an event", where="Last-Event-ID")
     return int(header)
+
+
+class EventStream(EventSourceResponse):
+    """A stream that holds one of the places of its key while it is sent, however it ends.
+
+    The place is taken when the answer begins, so that a request that is dropped before never holds one; where there is
+    none, the answer is a problem.
+    """
+
+    def __init__(self, places: Places, key: ApiKey, content: AsyncIterator[bytes]) -> None:
+        super().__init__(content, headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
+        self._places, self._key = places, key
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer."""
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(self._places.take(self._key))
+            except Busy as error:
+                await problem_response(error)(scope, receive, send)
+            else:
+                await super().__call__(scope, receive, send)
 
 
 async def stream_events(tailer: Tailer, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[bytes]:

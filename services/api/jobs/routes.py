@@ -7,7 +7,6 @@ from uuid import UUID
 
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
-from fastapi.sse import EventSourceResponse
 
 from services.api import schemas
 from services.api.audit import note
@@ -16,7 +15,7 @@ from services.api.bodies import kept_body
 from services.api.context import Connection, Context, Shared, deadline
 from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
-from services.api.jobs.events import MAX_SEQ, last_event_id, stream_events
+from services.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
 from services.api.jobs.schemas import (
     CheckedView,
     ErasureView,
@@ -320,8 +319,7 @@ def list_events(
     seq = last_event_id(last, after)
     if row.state in ENDED and seq >= row.event_seq:
         return Response(status_code=204)
-    headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
-    return EventSourceResponse(stream_events(shared.tailer, key, job, seq), headers=headers)
+    return EventStream(shared.event_streams, key, stream_events(shared.tailer, key, job, seq))
 
 
 SCHEMAS = (NewJobBody, NewItemBody)

@@ -44,7 +44,7 @@ async def let_in(websocket: WebSocket, stream: str, shared: Context) -> None:
             hub = service.hub_of(shared)
             secret = key_of(websocket.headers.get("authorization"), offered)
             visit = await hub.call(lambda: _admit(shared, secret, stream, websocket.query_params))
-            with hub.place():
+            with hub.places.take(visit.key):
                 await Session(wire, hub, shared, visit).run()
         except MareyError as error:
             await wire.refuse(error)

@@ -3,13 +3,12 @@
 # pyright: reportMissingTypeStubs=false
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
-from shared.errors import Busy
+from services.api.places import Places, Shares
 from shared.metrics import SOCKETS as SOCKETS_OPEN
 from shared.runtime.queue import redis_client
 
@@ -19,7 +18,6 @@ SOCKETS = 200
 """Open at once in one process: each waits for its frames in a thread of its own."""
 CALLS = 16
 """Threads for all that answers at once; the database's pool holds 20, and the routes want some."""
-RETRY_SECONDS = 5
 
 
 class Hub:
@@ -27,14 +25,15 @@ class Hub:
 
     Args:
         url: of the Redis that holds the frames.
+        tenant, key: sockets that one of them may have open.
     """
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, *, tenant: int = SOCKETS, key: int = SOCKETS) -> None:
         # The sockets would use twice as many as redis-py's own 100 connections.
         self.redis = redis_client(url, max_connections=2 * SOCKETS)
         self._reads = CapacityLimiter(SOCKETS)
         self._calls = CapacityLimiter(CALLS)
-        self._places = SOCKETS
+        self.places = Places("sockets", Shares(SOCKETS, tenant, key), SOCKETS_OPEN)
 
     async def wait(self, read: Callable[[], Answer]) -> Answer:
         """What a read that waits gives; for one at a time of each socket. Who goes away does not wait for it."""
@@ -43,23 +42,6 @@ class Hub:
     async def call(self, function: Callable[[], Answer]) -> Answer:
         """What a function that answers soon gives: of Redis, or of the database."""
         return await to_thread.run_sync(function, limiter=self._calls)
-
-    @contextmanager
-    def place(self) -> Generator[None]:
-        """One of the sockets that may be open at once.
-
-        Raises:
-            Busy: all are.
-        """
-        if not self._places:
-            raise Busy(f"{SOCKETS} sockets are open at this process, and no more may be", seconds=RETRY_SECONDS)
-        self._places -= 1
-        SOCKETS_OPEN.inc()
-        try:
-            yield
-        finally:
-            self._places += 1
-            SOCKETS_OPEN.dec()
 
     def close(self) -> None:
         """Give the connections back."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from typing import Any
 from uuid import uuid4
 
@@ -89,6 +90,25 @@ def test_one_socket_too_many_is_asked_to_come_later(
         while True:  # the place is free as soon as the server has seen that the client went
             with watching(url, stream, secret) as third:
                 if json.loads(third.connection.recv(timeout=PATIENCE))["type"] == "stream":
+                    break
+
+
+def test_a_key_has_a_share_of_the_sockets_and_leaves_the_rest_to_others(
+    config: Settings, api: LiveApi, stream: str, secret: str
+) -> None:
+    other = new_key(api, "read")
+    with ApiThread(beside(config, sockets_per_key=1)) as url:
+        with watching(url, stream, secret) as viewer:
+            viewer.until("stream")
+            with watching(url, stream, secret) as second:
+                code, reason = second.closed()
+                assert (code, reason) == (1013, "this key has 1 sockets open, its share")
+            with watching(url, stream, other) as third:
+                third.until("stream")
+            viewer.connection.socket.shutdown(socket.SHUT_RDWR)  # it does not say goodbye
+        while True:
+            with watching(url, stream, secret) as again:
+                if json.loads(again.connection.recv(timeout=PATIENCE))["type"] == "stream":
                     break
 
 

@@ -1,0 +1,81 @@
+"""How many sockets and event streams may be open at one process, with a share for each tenant and key."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from uuid import UUID
+
+from prometheus_client import Gauge
+
+from shared.errors import Busy
+from shared.jobs import ApiKey
+
+RETRY_SECONDS = 5
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Places of one process, and how many of them one tenant and one key may hold."""
+
+    total: int
+    tenant: int
+    key: int
+
+
+class Places:
+    """Counts what is open; on the event loop alone.
+
+    Besides its share a tenant may hold no more places than are free. So a tenant that has none always finds one: with
+    `n` tenants that take all they can, one in `n + 1` places stays free.
+    """
+
+    def __init__(self, what: str, shares: Shares, gauge: Gauge | None = None) -> None:
+        """`what` is counted, in the plural, for messages."""
+        self._what, self._shares, self._gauge = what, shares, gauge
+        self._tenants: Counter[str] = Counter()
+        self._keys: Counter[UUID] = Counter()
+
+    @property
+    def taken(self) -> int:
+        """Places that are taken now."""
+        return self._tenants.total()
+
+    @contextmanager
+    def take(self, key: ApiKey) -> Generator[None]:
+        """Hold one place during the block.
+
+        Raises:
+            Busy: the key or its tenant has its share, or no place is free.
+        """
+        self._check(key)
+        self._count(key, 1)
+        try:
+            yield
+        finally:
+            self._count(key, -1)
+
+    def _check(self, key: ApiKey) -> None:
+        shares, free = self._shares, self._shares.total - self.taken
+        if self._keys[key.id] >= shares.key:
+            raise self._busy(f"this key has {shares.key} {self._what} open, its share", "key")
+        of_tenant = self._tenants[key.tenant]
+        if of_tenant >= shares.tenant:
+            raise self._busy(f"the tenant has {shares.tenant} {self._what} open, its share", "tenant")
+        if of_tenant >= free:
+            whose = f"the tenant has {of_tenant} {self._what} open and {free} are free for others"
+            raise self._busy(whose if of_tenant else f"no more {self._what} may be open at this process", "server")
+
+    def _busy(self, message: str, whose: str) -> Busy:
+        hint = "Close one, or try again after the seconds of `Retry-After`."
+        return Busy(message, where=f"{self._what} of the {whose}", hint=hint, seconds=RETRY_SECONDS)
+
+    def _count(self, key: ApiKey, by: int) -> None:
+        for table, name in ((self._tenants, key.tenant), (self._keys, key.id)):
+            table[name] += by
+            if not table[name]:
+                del table[name]
+        if self._gauge is not None:
+            self._gauge.inc(by)
