@@ -73,7 +73,8 @@ class Reader:
 
 def main() -> None:
     """Print both tables."""
-    with platform() as cluster:
+    shares = ("", "_PER_TENANT", "_PER_KEY")
+    with platform(**{f"MAREY_EVENT_STREAMS{share}": str(3 * CLIENTS[-1]) for share in shares}) as cluster:
         server = cluster.serve()
         print("| clients | all connected | median | 99th | last | CPU a change | memory a client | connections |")
         print("|---|---|---|---|---|---|---|---|")

@@ -76,6 +76,7 @@ class Document:
 
     def _object(self, window: _Window, path: tuple[str, ...], fields: dict[str, Any]) -> Iterator[tuple[int, object]]:
         window.step()
+        listed, deeper = path[0], path[1:]
         closed, seen = window.skip() == "}", False
         while not closed:
             if window.skip() != '"':
@@ -85,15 +86,15 @@ class Document:
                 raise window.error("Expecting ':' delimiter")
             window.step()
             begins = window.skip()
-            if name == path[0] and seen:
+            if name == listed and seen:
                 raise InvalidInput("is given twice", where=".".join(self._path), hint="Give it once.")
-            seen = seen or name == path[0]
-            if name == path[0] and len(path) == 1 and begins == "[":
+            seen = seen or name == listed
+            if name == listed and not deeper and begins == "[":
                 self.has_list = True
                 yield from self._list(window)
-            elif name == path[0] and len(path) > 1 and begins == "{":
+            elif name == listed and deeper and begins == "{":
                 fields[name] = {}
-                yield from self._object(window, path[1:], fields[name])
+                yield from self._object(window, deeper, fields[name])
             else:
                 fields[name] = window.field()
             closed = window.skip() == "}"

@@ -6,12 +6,15 @@ from collections import Counter
 from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 from uuid import UUID
 
 from prometheus_client import Gauge
 
 from shared.errors import Busy
 from shared.jobs import ApiKey
+
+Name = TypeVar("Name", str, UUID)
 
 RETRY_SECONDS = 5
 
@@ -73,9 +76,14 @@ class Places:
         return Busy(message, where=f"{self._what} of the {whose}", hint=hint, seconds=RETRY_SECONDS)
 
     def _count(self, key: ApiKey, by: int) -> None:
-        for table, name in ((self._tenants, key.tenant), (self._keys, key.id)):
-            table[name] += by
-            if not table[name]:
-                del table[name]
+        _add(self._tenants, key.tenant, by)
+        _add(self._keys, key.id, by)
         if self._gauge is not None:
             self._gauge.inc(by)
+
+
+def _add(table: Counter[Name], name: Name, by: int) -> None:
+    """Count, and forget what is at 0."""
+    table[name] += by
+    if not table[name]:
+        del table[name]
