@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import platform
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from shared.errors import MareyError
+from shared.private_home import FOLDER_MODE, is_open
 
 if TYPE_CHECKING:
     from services.cli.place import Server
@@ -86,10 +88,15 @@ def _home() -> Check:
     from services.cli.place import home
 
     folder = home()
+    with contextlib.suppress(OSError):  # what hinders is told by the check
+        folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
     try:
         check_folder(folder, hint="Make it writable for this user, or set MAREY_HOME to another folder.")
     except MareyError as error:
         return broken("home", error)
+    if is_open(folder):
+        hint = f"Run `chmod 700 {folder}`; `marey serve` closes it, with what is in it, when it starts."
+        return Check("home", "warn", f"{folder} is open to other users", hint)
     return free_space("home", folder)
 
 

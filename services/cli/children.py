@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from services.cli import console
+from shared.private_home import open_private
 
 if TYPE_CHECKING:
     from shared.settings import Settings
@@ -85,7 +86,7 @@ class Child:
         """Start it. It gets SIGTERM when we die, however we die."""
         if self.log is not None:
             self.log_from = self.log.stat().st_size if self.log.exists() else 0
-        with contextlib.nullcontext() if self.log is None else self.log.open("ab") as output:
+        with contextlib.nullcontext() if self.log is None else open_private(self.log, "ab") as output:
             self.process = subprocess.Popen(
                 [*_death_signal(), *self.command],
                 env=self.environment,

@@ -85,7 +85,7 @@ def _server(home: Path) -> Iterator[None]:
     """`marey serve` on a free port, as a child, until the end of the block."""
     for name in ("MAREY_SERVER", "MAREY_DATABASE_URL", "MAREY_QUEUE_URL", "MAREY_STORE"):
         os.environ.pop(name, None)
-    home.mkdir(parents=True, exist_ok=True)
+    home.mkdir(mode=0o700, parents=True, exist_ok=True)
     (home / "server.json").unlink(missing_ok=True)
     log = home / "serve.log"
     with log.open("wb") as output:

@@ -13,7 +13,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from io import TextIOWrapper
+from typing import IO
 
 from services.cli import console
 from services.cli.children import Child, marey, metrics_port, stop_all
@@ -23,6 +23,7 @@ from services.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of,
 from shared.errors import Conflict, InvalidInput, MareyError
 from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
 from shared.jobs.types import DEFAULT_TENANT
+from shared.private_home import make_private, open_private
 from shared.runtime.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
 from shared.settings import Settings
 from shared.storage import open_store
@@ -31,6 +32,8 @@ from shared.webhooks.vault import Vault, key_file
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")
 TICK = 0.2
+WARNINGS = 5
+"""Paths of a home that was open to other users which are told one by one."""
 LOG_LIMIT = 10 * 2**20
 KEYS = (
     "{url}/live and other clients want a key: `marey admin keys create NAME` makes one. "
@@ -95,7 +98,7 @@ class Supervisor:
                 self._stop()
 
     def _start(self) -> None:
-        (self.home / "logs").mkdir(exist_ok=True)
+        (self.home / "logs").mkdir(mode=0o700, exist_ok=True)
         database_url, queue_url = self._start_backings()
         engine = create_engine(database_url)
         upgrade(engine)
@@ -207,8 +210,8 @@ class Supervisor:
             InvalidInput: the home cannot be written.
         """
         try:
-            self.home.mkdir(mode=0o700, parents=True, exist_ok=True)
-            stream = (self.home / "lock").open("a+", encoding="utf-8")
+            opened = make_private(self.home)
+            stream = open_private(self.home / "lock", "a+", encoding="utf-8")
         except OSError as error:
             raise InvalidInput(
                 f"cannot be written: {error.strerror}", where=str(self.home), hint="Set MAREY_HOME to another folder."
@@ -218,12 +221,16 @@ class Supervisor:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise Conflict(self._who(stream), where=str(self.home), hint=_WHO_HINT) from None
+            for warning in opened[:WARNINGS]:
+                console.say(warning)
+            if len(opened) > WARNINGS:
+                console.say(f"… and {len(opened) - WARNINGS} more files and folders of this home")
             stream.truncate(0)
             stream.write(json.dumps({"pid": os.getpid()}))
             stream.flush()
             yield
 
-    def _who(self, stream: TextIOWrapper) -> str:
+    def _who(self, stream: IO[str]) -> str:
         server = read_server(self.home)
         if server is not None:
             return f"a server runs here already: {server.url}, process {server.pid}"

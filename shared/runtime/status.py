@@ -19,6 +19,7 @@ from pathlib import Path
 import psutil
 
 from shared.errors import MareyError
+from shared.private_home import open_private
 from shared.settings import settings
 
 TELL_SECONDS = 3.0
@@ -59,9 +60,10 @@ def read_status(home: Path, name: str) -> WorkerStatus | None:
 def write_status(home: Path, name: str, status: WorkerStatus) -> None:
     """Replace the status of the worker `name`."""
     path = status_file(home, name)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     temporary = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
-    temporary.write_text(json.dumps(asdict(status)), encoding="utf-8")
+    with open_private(temporary, "w", encoding="utf-8") as stream:
+        stream.write(json.dumps(asdict(status)))
     temporary.replace(path)
 
 

@@ -35,6 +35,12 @@ def wait_for(what: Callable[[], object], seconds: float = 60) -> None:
         time.sleep(0.1)
 
 
+def open_to_others(home: Path) -> list[str]:
+    """What of a home another user could read, if its folder let him in."""
+    paths = [home, *(path for path in home.rglob("*") if not path.is_socket())]
+    return [str(path) for path in paths if path.lstat().st_mode & 0o077]
+
+
 @pytest.fixture
 def alone(models: Path, short_home: Path) -> Marey:
     """The command line of a server that a test may break."""
@@ -42,6 +48,10 @@ def alone(models: Path, short_home: Path) -> Marey:
 
 
 def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Marey) -> None:
+    (alone.home / "logs").mkdir(parents=True, exist_ok=True)
+    (alone.home / "logs" / "api.log").touch()
+    for path in (alone.home, alone.home / "logs", alone.home / "logs" / "api.log"):
+        path.chmod(0o755)  # a home that was open before
     with serving(alone) as server:
         job = alone.submit("-f", "-", stdin="\n".join(map(json.dumps, slow_items())))
         with alone.client() as client:
@@ -58,6 +68,7 @@ def test_whatever_is_killed_every_prompt_of_a_job_becomes_one_motion(alone: Mare
             assert succeeded() == COUNT
             motions = list(client.pages(f"/v1/jobs/{job}/motions"))
             assert len({motion["item"] for motion in motions}) == len(motions) == COUNT
+        assert open_to_others(alone.home) == []
         server.stop()
         assert not (alone.home / "server.json").exists()
 

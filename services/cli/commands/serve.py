@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from shared.errors import InvalidInput
+from shared.private_home import UMASK
 
 
 def serve(
@@ -26,6 +27,7 @@ def serve(
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
+    os.umask(UMASK)
     from services.cli.extras import needs_extra
     from services.cli.ports import try_port
     from services.cli.roles.serving import default_roles, parse_roles
@@ -61,6 +63,7 @@ def worker(
     ] = None,
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
+    os.umask(UMASK)
     from services.cli.extras import needs_extra
     from services.cli.roles.serving import SHOWS, parse_roles, role_of
 
@@ -91,6 +94,7 @@ def worker(
 
 def scheduler() -> None:
     """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
+    os.umask(UMASK)
     from services.cli.extras import needs_extra
 
     try:
@@ -103,6 +107,7 @@ def scheduler() -> None:
 
 def api() -> None:
     """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
+    os.umask(UMASK)
     from services.cli.extras import needs_extra
 
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +10,7 @@ import typer
 
 from services.cli import console, options
 from services.cli.commands.submit import read_prompts
+from shared.private_home import UMASK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,6 +49,7 @@ def serve(
     ] = None,
 ) -> None:
     """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is the secret that both share."""
+    os.umask(UMASK)
     from services.cli.extras import needs_extra
 
     try:

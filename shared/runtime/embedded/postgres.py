@@ -14,11 +14,11 @@ import psycopg
 from psycopg import sql
 
 from shared.errors import Conflict
+from shared.private_home import make_private
 from shared.runtime.embedded.server import (
     STOP_SECONDS,
     EmbeddedServer,
     StartFailed,
-    make_private,
     make_socket_folder,
     need,
     socket_folder,

@@ -16,13 +16,14 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from io import TextIOWrapper
 from pathlib import Path
+from typing import IO
 
 import psutil
 import psycopg
 
-from shared.errors import Conflict, InvalidInput, MareyError
+from shared.errors import Conflict, MareyError
+from shared.private_home import open_private
 
 SOCKET_LIMIT = 100  # bytes of a socket's path; the kernel takes 107, macOS 103
 START_SECONDS = 30.0
@@ -44,7 +45,7 @@ class EmbeddedServer:
     process: subprocess.Popen[bytes]
     log: Path
     stop_signal: signal.Signals
-    _lock: TextIOWrapper | None = field(repr=False)
+    _lock: IO[str] | None = field(repr=False)
 
     def alive(self) -> bool:
         """Whether the process runs."""
@@ -106,24 +107,6 @@ def need(package: str) -> Path:
     return Path(spec.submodule_search_locations[0])
 
 
-def make_private(home: Path) -> None:
-    """Make the home, ours alone.
-
-    Raises:
-        InvalidInput: it cannot be made, or not be written.
-    """
-    try:
-        home.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=home):
-            pass
-    except OSError as error:
-        raise InvalidInput(
-            f"the folder of the embedded servers cannot be written ({error.strerror or error})",
-            where=str(home),
-            hint="Make it writable for this user, free some space, or set MAREY_HOME to another folder.",
-        ) from error
-
-
 def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
     """Make the folder, ours alone: trust authentication rests on that.
 
@@ -138,13 +121,13 @@ def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
     folder.chmod(0o700)
 
 
-def take_lock(path: Path, name: str) -> TextIOWrapper:
+def take_lock(path: Path, name: str) -> IO[str]:
     """Lock a server's folder for this process, which stays its owner while the file is open.
 
     Raises:
         Conflict: another process runs that server.
     """
-    file = path.open("a+", encoding="utf-8")
+    file = open_private(path, "a+", encoding="utf-8")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
@@ -188,7 +171,7 @@ def spawn(
             where="PATH",
             hint="Install util-linux, or set MAREY_DATABASE_URL and MAREY_QUEUE_URL to servers of your own.",
         )
-    with log.open("ab") as output:
+    with open_private(log, "ab") as output:
         return subprocess.Popen(
             [*prefix, *command],
             stdin=subprocess.DEVNULL,

@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 
 from shared.errors import Conflict
+from shared.private_home import make_private
 from shared.runtime.embedded.server import (
     STOP_SECONDS,
     EmbeddedServer,
-    make_private,
     make_socket_folder,
     need,
     socket_folder,
