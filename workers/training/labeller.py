@@ -21,7 +21,7 @@ from pathlib import Path
 import torch
 
 from shared.errors import InvalidInput, MareyError
-from shared.text.encoders import find_weights
+from shared.text.fetching import need_weights
 from shared.text.light import WordStates
 from shared.text.light_network import LightConfig
 from shared.text.roles import Frame
@@ -202,7 +202,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         gold, *others = [read_gold(file) for file in options.gold]
         more = [example for other in others for example in other]
-        minilm = find_weights("minilm")
+        minilm = need_weights("minilm")
         recipe = prepare(options, [*gold, *more], minilm)
         result = None
         if options.folds:

