@@ -15,6 +15,8 @@ import threading
 import time
 import weakref
 from collections.abc import Generator
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, NoReturn, TypeVar
 
 import psycopg
@@ -35,11 +37,25 @@ TURN_SECONDS = 1.0
 """A caller waits so long for another that already tries whether a silent server answers again."""
 
 SET_UP = """
-    SELECT pooled, set_config('timezone', 'UTC', false),
+    SELECT pooled, clock_timestamp(), set_config('timezone', 'UTC', false),
         CASE WHEN NOT pooled THEN set_config('statement_timeout', statement, false) END,
         CASE WHEN NOT pooled THEN set_config('idle_in_transaction_session_timeout', idle, false) END
     FROM (SELECT pg_backend_pid() <> %s AS pooled, %s AS statement, %s AS idle) AS session
 """
+
+END_SESSIONS = """
+    SELECT count(pg_terminate_backend(activity.pid))
+    FROM pg_stat_activity AS activity, unnest(%s::int[], %s::timestamptz[]) AS lost (pid, seen)
+    WHERE activity.pid = lost.pid AND activity.backend_start <= lost.seen AND activity.usename = current_user
+"""
+
+
+@dataclass(frozen=True)
+class Session:
+    """A process of the server: its number may be used again, by one that starts later than `seen`."""
+
+    pid: int
+    seen: datetime
 
 
 def milliseconds(deadline: Deadline) -> tuple[str, str]:
@@ -58,6 +74,7 @@ class ConnectionGroup:
         self._lock = threading.Lock()
         self._connections: weakref.WeakSet[DeadlineConnection] = weakref.WeakSet()
         self._probing = threading.Lock()
+        self._lost: list[Session] = []
         self.silent = False
         """A deadline was missed, and nothing was heard since."""
         self.misses = 0
@@ -77,10 +94,33 @@ class ConnectionGroup:
         with self._lock:
             self.silent = True
             self.misses += 1
-            silent = [one for one in self._connections if not one.heard_lately()]
+            silent = [one for one in self._connections if not (one.closed or one.heard_lately())]
+            self._lost += [one.session for one in silent if one.session is not None]
         for one in silent:
             one.shut_down()
         log.warning("database_silent", seconds=seconds, connections_closed=len(silent))
+
+    def end_lost(self, connection: DeadlineConnection) -> None:
+        """End the sessions of closed silent connections on the server, which may not have noticed.
+
+        Such a session would keep its locks until a timeout of the server, a COPY that waits for data for ever (no
+        timeout of Postgres applies to it), and its place among `max_connections` until the network gives it up.
+        """
+        with self._lock:
+            lost, self._lost = self._lost, []
+        if not lost:
+            return
+        values = ([one.pid for one in lost], [one.seen for one in lost])
+        try:
+            (ended,) = connection.execute(END_SESSIONS, values).fetchone() or (0,)
+        except psycopg.Error as error:
+            with self._lock:
+                self._lost += lost
+            log.warning("lost_sessions_not_ended", sessions=len(lost), error=type(error).__name__)
+            if connection.closed:
+                raise
+        else:
+            log.info("lost_sessions_ended", sessions=ended)
 
     def answered(self) -> None:
         """The server answered."""
@@ -122,6 +162,8 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
     """Seconds of silence after which a call is given up."""
     deadline: Deadline = ORDINARY
     """The limits that the server's session was set up with."""
+    session: Session | None = None
+    """Its session on the server; None where a pooler hides it."""
     pooled: bool = False
     """A pooler (PgBouncer) stands between: the session's state is not ours."""
     _heard: float = 0.0
@@ -145,13 +187,14 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         sets the limits of each transaction. The time zone is the exception: poolers keep it for each client.
         """
         self.deadline = deadline
-        autocommit, self.autocommit = self.autocommit, True
         values = (self.pgconn.backend_pid, *milliseconds(deadline))
-        pooled, *_ = self.execute(SET_UP, values).fetchone() or (True,)
-        self.pooled = bool(pooled)
+        row = self.execute(SET_UP, values).fetchone()
+        assert row is not None
+        self.pooled, now, *_ = row
         if self.pooled:
             self.prepare_threshold = None
-        self.autocommit = autocommit
+        else:
+            self.session = Session(self.pgconn.backend_pid, now)
 
     def heard_lately(self) -> bool:
         """Return True if the server answered on this connection within the last `HEARD_LATELY` seconds."""
@@ -249,7 +292,10 @@ def open_connection(group: ConnectionGroup, deadline: Deadline, *arguments: Any,
         raise
     try:
         connection.join(group)
+        autocommit, connection.autocommit = connection.autocommit, True
         connection.set_up(deadline)
+        group.end_lost(connection)
+        connection.autocommit = autocommit
     except BaseException:
         connection.close()
         raise

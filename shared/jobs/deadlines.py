@@ -47,7 +47,7 @@ ORDINARY = Deadline("ordinary", statement=10.0, idle=8.0)
 """All calls that name no other kind: milliseconds, or the wait for the lock of a job that somebody else changes."""
 SEARCH = Deadline("search", statement=30.0, idle=8.0)
 """Listings, searches, aggregates: they read many rows, and hold no locks that others wait for."""
-BULK = Deadline("bulk", statement=60.0, idle=60.0)
+BULK = Deadline("bulk", statement=60.0, idle=30.0)
 """Up to 100,000 items in one transaction: submit, cancel, retry, erase, delete, restore. A COPY is fed meanwhile."""
 MAINTENANCE = Deadline("maintenance", statement=60.0, idle=60.0)
 """Garbage collection and retention: they lock an asset's row while the object store deletes it."""

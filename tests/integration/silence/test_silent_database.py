@@ -173,6 +173,39 @@ def test_one_missed_deadline_ends_the_calls_of_other_threads_and_drops_idle_conn
     other.dispose()
 
 
+def test_locks_of_a_lost_connection_are_free_as_soon_as_the_process_is_back(
+    behind: sa.Engine, proxy: StallingProxy, engine: sa.Engine
+) -> None:
+    """Here a COPY that waits for data, which no timeout of Postgres ends."""
+    with transaction(engine) as conn:
+        conn.execute(sa.text("CREATE TABLE copied (word text)"))
+
+    def copy() -> None:
+        with transaction(behind) as conn:
+            conn.execute(sa.text("LOCK TABLE copied"))
+            driver = conn.connection.driver_connection
+            assert isinstance(driver, psycopg.Connection)
+            with driver.cursor().copy("COPY copied FROM STDIN") as rows:
+                rows.write_row(("one",))
+                proxy.stall()
+                rows.write(b"two\n" * 20_000)
+
+    took(copy)
+    assert _locks(engine) > 0
+    with transaction(behind):
+        pass
+    until = time.monotonic() + SLACK
+    while _locks(engine) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert _locks(engine) == 0
+
+
+def _locks(engine: sa.Engine) -> int:
+    query = "SELECT count(*) FROM pg_locks WHERE relation = 'copied'::regclass AND mode = 'AccessExclusiveLock'"
+    with transaction(engine) as conn:
+        return conn.execute(sa.text(query)).scalar_one()
+
+
 def test_a_living_server_raises_no_alarm_and_keeps_what_it_answers(proxied: str, proxy: StallingProxy) -> None:
     """A slow statement ends by the server's limit; connections in use survive the alarm of another one."""
     engine = create_engine(proxied, deadline=QUICK)
