@@ -39,8 +39,8 @@ class Part(threading.Thread):
 
     def __init__(self, name: str, *, pause: float, allowance: float = 0.0) -> None:
         super().__init__(name=name, daemon=True)
-        self._pause = pause
-        self._allowance = allowance
+        self._between_rounds = pause
+        self._allowed_wait = allowance
         self._ticked = time.monotonic()
 
     def progressed(self) -> None:
@@ -49,11 +49,11 @@ class Part(threading.Thread):
 
     def silence(self) -> float:
         """Seconds without progress; below 0 between two rounds."""
-        return time.monotonic() - self._ticked - self._pause
+        return time.monotonic() - self._ticked - self._between_rounds
 
     def stalled(self, seconds: float) -> bool:
         """Return True if there was no progress for `seconds`, or the thread has ended."""
-        return not self.is_alive() or self.silence() > seconds + self._allowance
+        return not self.is_alive() or self.silence() > seconds + self._allowed_wait
 
 
 def note_progress(engine: sa.Engine) -> None:
