@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from shared.expected import read_expected
 from shared.items import CHECKS, Problem, checked, read_fields
 
 COLUMNS = ("prompt", "seconds", "expected")
+PromptCheck = Callable[[Mapping[str, Any], int | None], Iterable[Problem]]
 MIN_PROMPTS = 2
 """What is measured over a set (how real it looks, how varied, which prompt fits which motion) has no value for one."""
 MAX_PROMPTS = 10_000
@@ -36,16 +37,26 @@ class EvaluationPrompt:
 
 
 def read_prompts(
-    raws: Iterable[tuple[int | None, object]], *, where: str | None = None
+    raws: Iterable[tuple[int | None, object]], *, where: str | None = None, check: PromptCheck | None = None
 ) -> tuple[EvaluationPrompt, ...]:
     """All prompts, or one error with all problems.
+
+    Args:
+        check: gives what else is wrong with the fields of a prompt that can be used.
 
     Raises:
         InvalidItems: at least one is wrong.
         InvalidInput: fewer than `MIN_PROMPTS`.
         TooLarge: more than `MAX_PROMPTS`.
     """
-    prompts = tuple(checked(_counted(raws, where), _read, where=where))
+
+    def read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[Problem]]:
+        values, problems = read_fields(raw, _CHECKS, line)
+        if check is not None:
+            problems += check(values, line)
+        return (None, problems) if problems else (EvaluationPrompt(**values), [])
+
+    prompts = tuple(checked(_counted(raws, where), read, where=where))
     if len(prompts) < MIN_PROMPTS:
         raise InvalidInput(
             "there is a single prompt in it, and nothing can be measured over one",
@@ -72,11 +83,6 @@ def _counted(raws: Iterable[tuple[int | None, object]], where: str | None) -> It
         if number == MAX_PROMPTS:
             raise TooLarge(f"more than {MAX_PROMPTS:,} prompts, the limit of an evaluation", where=where)
         yield row
-
-
-def _read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[Problem]]:
-    values, problems = read_fields(raw, _CHECKS, line)
-    return (None, problems) if problems else (EvaluationPrompt(**values), [])
 
 
 def _expected(value: object) -> str:

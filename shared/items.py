@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
@@ -51,9 +52,10 @@ SETTINGS = {
 whole."""
 
 MAX_NAME = 100
-NAME = re.compile(rf"[^\W_][\w .()+=@,-]{{0,{MAX_NAME - 1}}}", re.ASCII)
-"""A name becomes a file name on the client: plain characters, no separators, no leading dot or dash."""
-RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+NAME = re.compile(rf"[^\W_][^/\\]{{0,{MAX_NAME - 1}}}")
+"""A name begins with a letter or digit of any script and holds no separators; characters that do not show are refused
+besides. The client derives the file name from it (`services.cli.names`)."""
+RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
 """Names that Windows keeps for devices."""
 MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
 
@@ -98,12 +100,19 @@ class InvalidItems(InvalidInput):
 
     problem_type = "invalid-items"
 
-    def __init__(self, problems: Iterable[Problem], *, where: str | None = None, total: int | None = None) -> None:
+    def __init__(
+        self,
+        problems: Iterable[Problem],
+        *,
+        where: str | None = None,
+        total: int | None = None,
+        hint: str = "Correct them and try again.",
+    ) -> None:
         found = list(problems)
         self.total = len(found) if total is None else total
         self.problems = tuple(found[:MAX_PROBLEMS])
         count = "1 problem" if self.total == 1 else f"{self.total} problems"
-        super().__init__(f"{count} in the input; none of it is used", where=where, hint="Correct them and try again.")
+        super().__init__(f"{count} in the input; none of it is used", where=where, hint=hint)
 
     def __str__(self) -> str:
         lines = [f"  {problem}" for problem in self.problems]
@@ -115,9 +124,10 @@ class InvalidItems(InvalidInput):
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A line that could not even be parsed; `read_item` refuses it with this message."""
+    """A line that could not even be parsed, or a part of it; `read_item` refuses it with this message."""
 
     message: str
+    field: str | None = None
 
 
 def read_json(line: str | bytes) -> object:
@@ -137,11 +147,23 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
         raw: what a JSON line or an element of `items` holds, or `Unreadable`.
         line: where it stood, for the problems.
     """
+    values, problems = read_values(raw, line)
+    return (None, problems) if problems else (Item(**values), [])
+
+
+def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], list[Problem]]:
+    """The fields of an item that can be used, and all that is wrong with it; see `read_item`."""
     values, problems = read_fields(raw, CHECKS, line)
     seed, variants = values.get("seed"), values.get("variants", 1)
     if seed is not None and seed + variants - 1 > MAX_SEED:
         problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
-    return (None, problems) if problems else (Item(**values), [])
+    return values, problems
+
+
+def names_model(values: Mapping[str, Any], problems: Iterable[Problem]) -> bool:
+    """Return True if it is known which model an item is for, so that its other fields can be held against the ranges
+    of the model, whatever else is wrong with it."""
+    return bool(values) and all(problem.field != "model" for problem in problems)
 
 
 def read_fields(
@@ -155,7 +177,7 @@ def read_fields(
         line: where it stood, for the problems.
     """
     if isinstance(raw, Unreadable):
-        return {}, [Problem(line, None, raw.message)]
+        return {}, [Problem(line, raw.field, raw.message)]
     if not isinstance(raw, Mapping):
         return {}, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
     given = cast("Mapping[object, object]", raw)
@@ -177,8 +199,16 @@ def read_fields(
     return values, problems
 
 
-def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None = None) -> Iterator[Item]:
+def read_items(
+    raws: Iterable[tuple[int | None, object]],
+    *,
+    where: str | None = None,
+    check: Callable[[Mapping[str, Any], int | None], Iterable[Problem]] | None = None,
+) -> Iterator[Item]:
     """Items as they are read, as `checked` gives them.
+
+    Args:
+        check: gives what else is wrong with the usable fields of an item; called where `names_model`.
 
     Raises:
         InvalidItems: at least one is wrong.
@@ -189,17 +219,29 @@ def read_items(raws: Iterable[tuple[int | None, object]], *, where: str | None =
 
     def read(raw: object, line: int | None) -> tuple[Item | None, list[Problem]]:
         nonlocal count
-        item, problems = read_item(raw, line)
+        values, problems = read_values(raw, line)
+        if check is not None and names_model(values, problems):
+            problems += check(values, line)
+        item = None if problems else Item(**values)
         count += 1 if item is None else item.variants
-        if count > MAX_ITEMS:  # what is far too long is not read to its end
-            raise TooLarge(
-                f"is over the limit of {MAX_ITEMS:,} motions (prompts times variants) a job",
-                where=where if line is None else ", ".join(filter(None, (where, f"line {line}"))),
-                hint="Submit them as several jobs.",
-            )
+        check_count(count, line, where)
         return item, problems
 
     return checked(raws, read, where=where)
+
+
+def check_count(count: int, line: int | None, where: str | None) -> None:
+    """Check that a job may have so many motions; what is far too long is not read to its end.
+
+    Raises:
+        TooLarge: it may not.
+    """
+    if count > MAX_ITEMS:
+        raise TooLarge(
+            f"is over the limit of {MAX_ITEMS:,} motions (prompts times variants) a job",
+            where=where if line is None else ", ".join(filter(None, (where, f"line {line}"))),
+            hint="Submit them as several jobs.",
+        )
 
 
 def checked(
@@ -231,15 +273,15 @@ def checked(
 
 
 def _name(value: object) -> str:
-    text = _text(value)
+    text = check_text(_text(value))
+    text = re.sub(r"[^\S ]", " ", unicodedata.normalize("NFC", text)).strip()
     if len(text) > MAX_NAME:
         raise InvalidInput(f"has {len(text)} characters; file names take up to {MAX_NAME} of it")
     if RESERVED.fullmatch(text):
         raise InvalidInput(f"{text!r} cannot be a file name: Windows keeps it for a device")
-    if not NAME.fullmatch(text) or text.endswith((".", " ")) or ".." in text:
+    if not NAME.fullmatch(text) or text.endswith(".") or ".." in text or not is_printable(text):
         raise InvalidInput(
-            f"{text[:60]!r} cannot be a file name: use A-Z a-z 0-9 space _ . ( ) + = @ , - "
-            "and begin with a letter or digit"
+            f"{text[:60]!r} cannot be a file name: begin with a letter or digit, use no / \\ .. and no dot at the end"
         )
     return text
 
@@ -249,6 +291,11 @@ def _seconds(value: object) -> float:
     if not MIN_SECONDS <= number <= MAX_SECONDS:
         raise InvalidInput(f"{number:g} is outside {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
     return number
+
+
+def outside_range(seconds: float, low: float, high: float, bundle: str) -> str:
+    """The message about a length that a bundle cannot make."""
+    return f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {bundle}"
 
 
 def _seed(value: object) -> int:

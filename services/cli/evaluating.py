@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import quote
 
 import typer
 
 from services.cli import console
-from shared.errors import InvalidInput, ItemsFailed, NotFound, Regressed, TimedOut, Unreachable
+from services.cli.options import ExtraColumns
+from shared.characters import escape
+from shared.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
+from shared.evaluation_prompts import PromptCheck
+from shared.items import InvalidItems, Problem, outside_range
 
 if TYPE_CHECKING:
     from services.cli.client import Client
@@ -43,6 +49,10 @@ Split = Annotated[
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Of sampling; may be repeated.")
 ]
+Extra = Annotated[
+    ExtraColumns,
+    typer.Option("--extra-columns", help="Columns of the CSV that are not known: refuse or ignore them."),
+]
 Repeats = Annotated[
     int | None,
     typer.Option("--repeats", help="Motions of each prompt; none given = 1, and repeats draw pools out of the same."),
@@ -69,6 +79,9 @@ class Asked:
     repeats: int | None
     seed: int | None
     baseline: str | None
+    extra_columns: ExtraColumns = ExtraColumns.REFUSE
+    lines: list[int | None] = field(default_factory=list[int | None], init=False)
+    """Of the file's prompts, once they are read."""
 
     def body(self) -> dict[str, Any]:
         """The request, with the prompts of a file.
@@ -91,7 +104,10 @@ class Asked:
     def _prompts(self) -> dict[str, Any]:
         if self.split in SPLITS:
             return {"split": self.split}
-        from services.cli.rows import evaluation_prompts_from_file
+        from services.cli.rows import read_evaluation_prompts
+
+        if self.extra_columns is ExtraColumns.TAG:
+            raise InvalidInput("prompts of an evaluation have no tags", where="--extra-columns", hint="Choose ignore.")
 
         if self.split != "-" and not Path(self.split).suffix and not Path(self.split).exists():
             raise NotFound(
@@ -99,9 +115,53 @@ class Asked:
                 where=f"--split {self.split}",
                 hint=f"Splits are {', '.join(SPLITS)}; a file of prompts ends in .csv, .jsonl or .txt.",
             )
-        prompts = evaluation_prompts_from_file(self.split)
-        source = "stdin" if self.split == "-" else Path(self.split).name
+        prompts, lines = read_evaluation_prompts(
+            self.split, extra_columns=self.extra_columns.value, check=_range_check(self.bundle)
+        )
+        self.lines.extend(lines)
+        source = "stdin" if self.split == "-" else escape(Path(self.split).name, lines=False)
         return {"prompts": [prompt.as_json() for prompt in prompts], "source": source}
+
+    @contextmanager
+    def in_source(self) -> Generator[None]:
+        """In here a server's `InvalidItems` about the prompts names the file and its lines."""
+        from services.cli.rows import located
+        from services.cli.text_files import where_of
+
+        try:
+            yield
+        except InvalidItems as error:
+            if not self.lines:
+                raise
+            raise InvalidItems(
+                located(error.problems, self.lines), where=where_of(self.split), total=error.total
+            ) from None
+
+
+def _range_check(bundle: str) -> PromptCheck:
+    """Holds lengths against the range of a bundle, which the server is asked for at the first of them; where it does
+    not tell, it checks them when it gets them."""
+    found: list[dict[str, Any] | None] = []
+
+    def model() -> dict[str, Any] | None:
+        from services.cli.client import Client
+
+        if not found:
+            try:
+                with Client.here() as client:
+                    found.append(client.get(f"/v1/models/{quote(bundle, safe='')}"))
+            except MareyError:
+                found.append(None)
+        return found[0]
+
+    def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+        seconds = values.get("seconds")
+        known = None if seconds is None else model()
+        if known is not None and not known["min_seconds"] <= seconds <= known["max_seconds"]:
+            message = outside_range(seconds, known["min_seconds"], known["max_seconds"], known["name"])
+            yield Problem(line, "seconds", message)
+
+    return check
 
 
 def watch_evaluation(

@@ -50,6 +50,22 @@ def check_folder(folder: Path, hint: str = "Choose another folder.") -> Path:
     return folder
 
 
+def make_folders(folder: Path, paths: Iterable[Path]) -> None:
+    """The folders in which the files of a fetch lie.
+
+    Raises:
+        InvalidInput: one cannot be made, or a link in the folder leads out of it.
+    """
+    root = folder.resolve()
+    for parent in sorted({path.parent for path in paths} - {folder}):
+        if not parent.resolve().is_relative_to(root):
+            raise InvalidInput("is a link that leads out of the folder", where=str(parent), hint="Remove the link.")
+        try:
+            parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidInput(f"cannot be made: {error.strerror}", where=str(parent)) from error
+
+
 def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
 ) -> list[tuple[dict[str, Any], list[Download]]]:  # fmt: skip
     """Which files of which items go where.
@@ -85,6 +101,8 @@ def naming(item: dict[str, Any]) -> Naming:
         model=item["model"],
         job=item["job"],
         tags=item["tags"],
+        bundle=item["bundle"],
+        prompt=slug(item["prompt"]),
     )
 
 

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import csv
-import io
 import os
 import re
 import secrets
 import stat
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from services.cli.rows import TAG_SEPARATOR
+from services.cli.csv_cells import join_tags, restore, write_csv
 from shared.errors import Conflict, InvalidInput
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"
 """Lines that manifests of the folder once had and no longer have, while their files lie there; there is none else."""
-PLAIN = re.compile(r"[^\W_][^/\\:\x00-\x1f]*")
-"""Names that stay in their folder, as `names.file_name` makes them."""
-COLUMNS = (
+PLAIN = re.compile(r"([^/\\:.\x00-\x1f][^/\\:\x00-\x1f]*/)*[^/\\:.\x00-\x1f][^/\\:\x00-\x1f]*")
+"""Paths that stay in their folder, as `names.file_name` makes them: no part begins with a dot."""
+RAW_COLUMNS = (
     *("index", "name", "tags", "prompt", "seed", "state", "review", "npz", "bvh", "licence", "variant", "model"),
     *("bundle", "frames", "fps", "error", "comment", "replaces", "motion", "item", "job"),
 )
-"""Of the file. `npz` and `bvh` are names of files beside it; `comment` is the review's."""
+"""Of files of earlier releases, whose cells hold the text as it is."""
+COLUMNS = (*RAW_COLUMNS, "seconds")
+"""Of the file, whose cells are those of `csv_cells`. `npz` and `bvh` are paths of files from its folder; `comment` is
+the review's; `seconds` is the length that was asked for."""
+NUMBERS = frozenset({"index", "seed", "variant", "frames", "fps", "seconds"})
 Row = dict[str, str]
 
 
@@ -44,9 +48,10 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     review = motion.get("review") or {}
     values = {
         **{name: item[name] for name in ("index", "name", "prompt", "seed", "state", "variant", "model", "bundle")},
+        "seconds": item["seconds"],
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
         **files,
-        "tags": f"{TAG_SEPARATOR} ".join(item["tags"]),
+        "tags": join_tags(item["tags"]),
         "review": review.get("verdict"),
         "comment": review.get("comment"),
         "error": (item["error"] or {}).get("message"),
@@ -96,6 +101,9 @@ def remove_left(folder: Path, left: Iterable[Path]) -> None:
             path.unlink(missing_ok=True)
         except OSError as error:
             raise InvalidInput(f"cannot be removed: {error.strerror}", where=str(path)) from error
+        with suppress(OSError):  # sub-folders that are not empty stay
+            for parent in path.relative_to(folder).parents[:-1]:
+                (folder / parent).rmdir()
     _record(folder, _known(folder / RECORD, overwrite=True), _known(folder / NAME, overwrite=True))
 
 
@@ -103,7 +111,7 @@ def _record(folder: Path, earlier: Iterable[Row], now: Iterable[Row]) -> list[tu
     """Write down which earlier lines have a file here that no line names now; these files, each with its line."""
     named = {name.casefold() for row in now for name in _files(row)}
     found = {name: row for row in earlier for name in _files(row) if name.casefold() not in named}
-    left = [(row, name) for name, row in found.items() if _is_file(folder / name)]
+    left = [(row, name) for name, row in found.items() if _is_file(folder, name)]
     if left:
         _write(folder / RECORD, list({tuple(_files(row)): row for row, _ in left}.values()))
     else:
@@ -127,26 +135,20 @@ def _files(row: Row) -> list[str]:
     return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
 
 
-def _is_file(path: Path) -> bool:
-    """Whether this is a file itself, not a link to one."""
+def _is_file(folder: Path, name: str) -> bool:
+    """Return True if this is a file of the folder: no link to one, and not behind a link that leads out of it."""
+    path = folder / name
     try:
-        return stat.S_ISREG(path.lstat().st_mode)
+        inside = path.parent.resolve().is_relative_to(folder.resolve())
+        return inside and stat.S_ISREG(path.lstat().st_mode)
     except OSError:
         return False
 
 
 def _write(path: Path, rows: Iterable[Row]) -> None:
-    content = _format(rows)
+    content = write_csv(COLUMNS, rows, numbers=NUMBERS)
     if not path.exists() or path.read_bytes() != content:
         _replace(path, content)
-
-
-def _format(rows: Iterable[Row]) -> bytes:
-    buffer = io.StringIO(newline="")
-    writer = csv.DictWriter(buffer, COLUMNS)
-    writer.writeheader()
-    writer.writerows(rows)
-    return buffer.getvalue().encode()
 
 
 def _read(path: Path) -> list[Row]:
@@ -154,8 +156,10 @@ def _read(path: Path) -> list[Row]:
     try:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.DictReader(stream, strict=True)
-            if tuple(reader.fieldnames or ()) == COLUMNS:
-                return [{name: row[name] or "" for name in COLUMNS} for row in reader]
+            columns = tuple(reader.fieldnames or ())
+            if columns in (COLUMNS, RAW_COLUMNS):
+                text = restore if columns == COLUMNS else str
+                return [{name: text(row.get(name) or "") for name in COLUMNS} for row in reader]
     except FileNotFoundError:
         return []
     except (UnicodeDecodeError, csv.Error):

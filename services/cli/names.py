@@ -1,21 +1,33 @@
-"""Names of written files: `{index:05}_{name or slug}_{seed}.{ext}`, and never a path that leaves its folder."""
+"""Paths of written files: `{index:05}_{name or slug}_{seed}.{ext}`, in sub-folders if the template has them.
+
+A name may be any text; the path that is derived from it is one that every file system takes, and never leads out of its
+folder. Names of ASCII letters, digits and `_ .()+=@,-` stand in it as they are.
+"""
 
 from __future__ import annotations
 
 import re
 import string
 import unicodedata
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
+from shared.characters import MARKS, is_printable
 from shared.errors import InvalidInput
-from shared.items import NAME, RESERVED
+from shared.items import RESERVED
 
 DEFAULT_TEMPLATE = "{index:05}_{name}_{seed}"
 MAX_SLUG = 48
-FIELDS = ("index", "name", "seed", "variant", "model", "job", "tags")
-TAG = re.compile(r"tag\[[\w-]{1,64}\]")
-"""`{tag[shot]}` is `010` where the item has the tag `shot=010`."""
+MAX_BYTES = 240
+"""Of a name without its ending, in UTF-8. File systems take 255, of which `.npz` and, while a file comes, `.part` are
+nine."""
+MAX_FOLDERS = 8
+FIELDS = ("index", "name", "prompt", "seed", "variant", "model", "bundle", "job", "tags")
+_TAG = re.compile(r"tag\[([\w -]{1,64})\]")
+_LONG_NUMBER = re.compile(r"[0-9]{4}")
+"""Of a format: `{index:9999}` would be a width."""
+_UNSAFE = re.compile(r'[<>:"/\\|?*]')
+"""Separators, and what Windows does not take."""
 
 
 @dataclass(frozen=True)
@@ -29,22 +41,22 @@ class Naming:
     model: str
     job: str
     tags: Sequence[str] = ()
+    bundle: str = ""
+    prompt: str = ""
+    """A slug of it."""
 
 
-class _Values(dict[str, str]):
-    """Values of tags such as `shot=010`, by their key."""
+@dataclass(frozen=True)
+class _Field:
+    """A field of a template: one of `FIELDS`, or the value of the tag `key=…`."""
 
-    def __missing__(self, key: str) -> str:
-        raise InvalidInput(
-            f"an item has no tag {key}=…, which the file names want", where="--name-template", hint=_HINT
-        )
+    name: str
+    spec: str = ""
+    key: str | None = None
 
 
-class _AnyValue(dict[str, str]):
-    """While a template is looked at, every tag has a value."""
-
-    def __missing__(self, _: str) -> str:
-        return "tag"
+_Component = tuple[str | _Field, ...]
+"""Of a path: texts and fields, one after the other."""
 
 
 def slug(text: str, limit: int = MAX_SLUG) -> str:
@@ -56,47 +68,54 @@ def slug(text: str, limit: int = MAX_SLUG) -> str:
     return words or "motion"
 
 
+def safe_component(text: str) -> str:
+    """The text as a name that every file system takes, with an ending behind it or as a folder.
+
+    Unicode is NFC; separators, control characters and what Windows does not take become `_`; a name of a device, a dot
+    or a dash at the beginning gets `_` in front.
+    """
+    text = unicodedata.normalize("NFC", text)
+    text = "".join(c if is_printable(c) else " " if unicodedata.category(c) == "Zs" else "_" for c in text)
+    text = _UNSAFE.sub("_", re.sub("[\u200e\u200f]", "", text)).strip(" ").rstrip(". ")
+    return f"_{text}" if not text or text[0] in ".-~" or RESERVED.fullmatch(text) else text
+
+
 def check_template(template: str) -> str:
-    """The template, if it makes one plain file name from each item.
+    """The template, if it makes a path inside its folder from each item.
 
     Raises:
         InvalidInput: it names an unknown field, or could leave the folder.
     """
-    try:
-        fields = [name for _, name, _, _ in string.Formatter().parse(template) if name is not None]
-    except ValueError as error:
-        raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
-    unknown = [name for name in fields if name not in FIELDS and not TAG.fullmatch(name)]
-    if unknown:
-        raise InvalidInput(f"{unknown[0]!r} is not a field of a template", where="--name-template", hint=_HINT)
-    _file_name(template, Naming(1, "name", 0, 0, "hgm3", "job"), "npz", _AnyValue())
+    _path(_parse(template), template, Naming(1, "name", 0, 0, "hgm3", "job", (), "hgm3", "prompt"), None)
     return template
 
 
 def file_name(template: str, naming: Naming, extension: str) -> str:
-    """The file name of one motion.
+    """The path of one motion's file from its folder, with `/` between its parts.
 
     Raises:
-        InvalidInput: what comes out is not a plain file name, or the item lacks a tag.
+        InvalidInput: the item lacks a tag, or the template is as in `check_template`.
     """
-    return _file_name(template, naming, extension, _Values(values_of(naming.tags)))
+    return f"{_path(_parse(template), template, naming, values_of(naming.tags))}.{extension}"
 
 
 class FileNames:
-    """File names of one run, of which no two motions have the same."""
+    """Paths of the files of one run, of which no two motions have the same."""
 
     def __init__(self, template: str) -> None:
         self._template = template
+        self._components = _parse(template)
         self._owners: dict[str, Hashable] = {}
 
     def of(self, motion: Hashable, naming: Naming, extension: str) -> str:
-        """The file name of a motion, which is told from the others by `motion`.
+        """The path of a motion's file, which is told from the others by `motion`.
 
         Raises:
             InvalidInput: as `file_name`; or another motion has it, also where systems do not tell cases apart.
         """
-        name = file_name(self._template, naming, extension)
-        if self._owners.setdefault(name.casefold(), motion) != motion:
+        stem = _path(self._components, self._template, naming, values_of(naming.tags))
+        name = f"{stem}.{extension}"
+        if self._owners.setdefault(_as_compared(name), motion) != motion:
             raise InvalidInput(
                 f"two motions would be written to {name}", where="--name-template", hint="Put {index} and {seed} in."
             )
@@ -109,19 +128,110 @@ def values_of(tags: Sequence[str]) -> dict[str, str]:
     return {key.strip(): value.strip() for key, _, value in pairs}
 
 
-def _file_name(template: str, naming: Naming, extension: str, values: dict[str, str]) -> str:
+def _as_compared(path: str) -> str:
+    """The path as systems compare it that tell neither cases nor spellings of one letter apart."""
+    return unicodedata.normalize("NFC", "".join(c for c in path if c not in MARKS).casefold())
+
+
+def _parse(template: str) -> list[_Component]:
+    """The components of a template's path.
+
+    Raises:
+        InvalidInput: it is no template, names an unknown field, or is no path inside a folder.
+    """
+    components: list[list[str | _Field]] = [[]]
     try:
-        stem = template.format(**{**vars(naming), "tags": "_".join(naming.tags), "tag": values})
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"{template!r} is not a template: {error}", where="--name-template", hint=_HINT) from error
-    if not NAME.match(stem) or "/" in stem or "\\" in stem or ".." in stem or not stem.isprintable():
-        raise InvalidInput(f"{stem!r} is not a plain file name", where="--name-template", hint=_HINT)
-    if len(stem) > 200 or RESERVED.fullmatch(stem) or set(stem) & set('<>:"|?*'):
-        raise InvalidInput(f"{stem[:80]!r} is not a file name on every system", where="--name-template", hint=_HINT)
-    return f"{stem}.{extension}"
+        for literal, name, spec, conversion in string.Formatter().parse(template):
+            first, *others = literal.split("/")
+            components[-1].append(first)
+            components += [[other] for other in others]
+            if name is not None:
+                components[-1].append(_field(name, spec or "", conversion))
+    except ValueError as error:
+        raise _invalid(f"{template!r} is not a template: {error}") from error
+    found: list[_Component] = [tuple(part for part in component if part) for component in components]
+    if not all(found):
+        raise _invalid(f"{template!r} is not a path inside the folder: it begins or ends with / or has two of them")
+    if len(found) > MAX_FOLDERS + 1:
+        raise _invalid(f"{template!r} has more than {MAX_FOLDERS} folders")
+    return found
+
+
+def _field(name: str, spec: str, conversion: str | None) -> _Field:
+    if conversion:
+        raise _invalid(f"{name + '!' + conversion!r} is not a field of a template")
+    tag = _TAG.fullmatch(name)
+    if tag or (name == "tag" and spec):
+        return _Field("tag", spec if tag else "", tag[1] if tag else spec.strip())
+    if name not in FIELDS:
+        raise _invalid(f"{name!r} is not a field of a template")
+    if "{" in spec or _LONG_NUMBER.search(spec):
+        raise _invalid(f"{spec!r} is not a format of a template")
+    return _Field(name, spec)
+
+
+def _path(components: Sequence[_Component], template: str, naming: Naming, tags: Mapping[str, str] | None) -> str:
+    """The path without its ending.
+
+    Args:
+        tags: values by key; None = the template itself is looked at: every tag has a value, and nothing but values may
+            need to be made safe.
+    """
+    made: list[str] = []
+    for component in components:
+        texts: list[str] = []
+        cuttable: list[int] = []
+        for part in component:
+            if isinstance(part, _Field):
+                cuttable.append(len(texts))
+                texts.append(_formatted(part, template, naming, tags))
+            else:
+                texts.append(part)
+        written = "".join(texts)
+        safe = safe_component(_fitted(texts, cuttable))
+        if tags is None and safe != unicodedata.normalize("NFC", written):
+            raise _invalid(f"{written!r} is not a plain file name")
+        made.append(safe)
+    return "/".join(made)
+
+
+def _formatted(field: _Field, template: str, naming: Naming, tags: Mapping[str, str] | None) -> str:
+    if field.key is not None:
+        value: object = "tag" if tags is None else tags.get(field.key)
+        if value is None:
+            raise _invalid(f"an item has no tag {field.key}=…, which the file names want")
+    elif field.name == "tags":
+        value = "_".join(naming.tags)
+    else:
+        value = getattr(naming, field.name)
+    try:
+        return format(value, field.spec)
+    except ValueError as error:
+        raise _invalid(f"{template!r} is not a template: {error}") from error
+
+
+def _fitted(texts: list[str], cuttable: Sequence[int]) -> str:
+    """All texts in one, the longest of the cuttable ones shortened until they fit into `MAX_BYTES`.
+
+    Raises:
+        InvalidInput: they cannot.
+    """
+    texts = [unicodedata.normalize("NFC", text) for text in texts]
+    while (over := len("".join(texts).encode("utf-8", "replace")) - MAX_BYTES) > 0:
+        longest = max(cuttable, key=lambda i: len(texts[i].encode("utf-8", "replace")), default=None)
+        size = 0 if longest is None else len(texts[longest].encode("utf-8", "replace"))
+        if longest is None or size < 2:
+            raise _invalid(f"{''.join(texts)[:80]!r}… is longer than a file name may be")
+        kept = texts[longest].encode("utf-8", "replace")[: max(size - over, 1)].decode("utf-8", "ignore")
+        texts[longest] = kept.rstrip(f" .{MARKS}")
+    return "".join(texts)
+
+
+def _invalid(message: str) -> InvalidInput:
+    return InvalidInput(message, where="--name-template", hint=_HINT)
 
 
 _HINT = (
-    f"Fields are {', '.join('{' + f + '}' for f in FIELDS)} and {{tag[shot]}} for the value of a tag shot=…; "
-    f"the default is {DEFAULT_TEMPLATE!r}. No folders in it."
+    f"Fields are {', '.join('{' + f + '}' for f in FIELDS)} and {{tag:shot}} for the value of a tag shot=…; / makes "
+    f"folders; the default is {DEFAULT_TEMPLATE!r}."
 )

@@ -26,6 +26,14 @@ class InputFormat(StrEnum):
     TXT = "txt"
 
 
+class ExtraColumns(StrEnum):
+    """What happens to columns of a CSV that are not known."""
+
+    REFUSE = "refuse"
+    TAG = "tag"
+    IGNORE = "ignore"
+
+
 Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="What the person does.")]
 PromptFile = Annotated[
     str | None,
@@ -36,13 +44,20 @@ PromptFile = Annotated[
 PromptFormat = Annotated[
     InputFormat | None, typer.Option("--input-format", help="Format of -f where its ending does not tell.")
 ]
+Extra = Annotated[
+    ExtraColumns,
+    typer.Option(
+        "--extra-columns", help="CSV columns that are not known: an error, a tag column=value of the row, or ignored."
+    ),
+]
 Formats = Annotated[list[FileFormat] | None, typer.Option("--format", help="File format; may be repeated.")]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; made if it is not there.")]
 Template = Annotated[
     str,
     typer.Option(
         "--name-template",
-        help="File names, of {index} {name} {seed} {variant} {model} {job} {tags}, and {tag[shot]} for shot=….",
+        help="File names, of {index} {name} {prompt} {seed} {variant} {model} {bundle} {job} {tags}, and {tag:shot} "
+        "for shot=…; / makes folders.",
     ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that hold something else.")]

@@ -4,36 +4,125 @@ from __future__ import annotations
 
 import csv
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
-from services.cli.text_files import GZIP_ENDING, open_text, where_of
+from services.cli.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
+from services.cli.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
 from shared.errors import InvalidInput
 from shared.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
-from shared.evaluation_prompts import EvaluationPrompt, read_prompts
+from shared.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
 from shared.items import (
     CHECKS,
     COLUMNS,
     MAX_BODY_BYTES,
+    MAX_PROBLEMS,
     OUTPUT_FPS,
     InvalidItems,
     Item,
     Problem,
-    Unreadable,
-    read_items,
+    check_count,
+    names_model,
     read_json,
+    read_values,
 )
 
 Format = Literal["csv", "jsonl", "txt"]
-Rows = Iterator[tuple[int | None, object]]
-Lines = Iterator[tuple[int, str]]
-"""With their numbers, from 1."""
-
-TAG_SEPARATOR = ";"
-
-
+STAND_IN = "a person walks"
+"""Prompt of an item whose own cannot be used, where its other fields are checked."""
 NO_DEFAULTS: Mapping[str, object] = MappingProxyType({})
+
+
+class PromptReader:
+    """Items of a file or of arguments, read once, with the line of each and with all problems.
+
+    Iterating gives an item for each row, also for rows with problems where their fields can be held against the ranges
+    of a model: such an item has only those fields. Look at `total` before using the items.
+
+    Attributes:
+        where: what messages call the source.
+        lines: of each item that was given.
+        total: problems found.
+    """
+
+    def __init__(self, raws: Rows, where: str) -> None:
+        self.where = where
+        self.lines: list[int | None] = []
+        self.total = 0
+        self._raws = raws
+        self._problems: list[Problem] = []
+
+    def __iter__(self) -> Iterator[Item]:
+        """The items.
+
+        Raises:
+            InvalidInput: there are none.
+            InvalidFile, NotFound, TooLarge: as `open_text`; over `MAX_ITEMS` motions.
+        """
+        count = 0
+        try:
+            for line, raw in self._raws:
+                values, problems = read_values(raw, line)
+                self.add(problems)
+                count += 1 if problems else values.get("variants", 1)
+                check_count(count, line, self.where)
+                if problems and not names_model(values, problems):
+                    continue
+                self.lines.append(line)
+                yield _stand_in(values) if problems else Item(**values)
+        except UnreadableLine as error:
+            if not self.total:
+                raise
+            self.add([Problem(error.line, None, f"{error.message}; the lines below it were not read. {error.hint}")])
+        if not self.lines and not self.total:
+            raise InvalidInput("there is no prompt in it", where=self.where, hint="Give at least one prompt.")
+
+    def add(self, problems: Iterable[Problem]) -> None:
+        """Add problems of lines of the source."""
+        for problem in problems:
+            self.total += 1
+            if len(self._problems) < MAX_PROBLEMS:
+                self._problems.append(problem)
+
+    def located(self, problems: Iterable[Problem]) -> list[Problem]:
+        """Problems of the items, which are counted from 1 as they were given, with their lines in the source."""
+        return located(problems, self.lines)
+
+    @contextmanager
+    def in_source(self) -> Generator[None]:
+        """In here a server's `InvalidItems` about the items becomes `error`: with the source and its lines."""
+        try:
+            yield
+        except InvalidItems as error:
+            if all(problem.line is None for problem in error.problems):
+                raise
+            self.add(self.located(error.problems))
+            self.total += error.total - len(error.problems)
+            raise self.error() from None
+
+    def error(self, *, hint: str | None = None) -> InvalidItems:
+        """All problems, by line."""
+        found = sorted(self._problems, key=lambda problem: problem.line or 0)
+        extra = any("is not a known column" in problem.message for problem in found)
+        hints = [EXTRA_HINT if extra else "Correct them and try again.", *([hint] if hint else [])]
+        return InvalidItems(found, where=self.where, total=self.total, hint=" ".join(hints))
+
+
+def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Problem]:
+    """Problems whose lines count what was read from a file, with the lines of the file."""
+    return [
+        replace(problem, line=lines[problem.line - 1]) if 0 < (problem.line or 0) <= len(lines) else problem
+        for problem in problems
+    ]
+
+
+def _stand_in(values: Mapping[str, Any]) -> Item:
+    """An item with the fields that depend on its model."""
+    own = {name: values[name] for name in ("model", "seconds", "settings") if name in values}
+    return Item(prompt=values.get("prompt", STAND_IN), **own)
 
 
 def defaults_of(
@@ -71,38 +160,94 @@ def defaults_of(
     return found
 
 
-def items_from_prompts(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> Iterator[Item]:
+def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
     """Items of prompts given as arguments; a problem names the number of the argument."""
-    return read_items(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), where="PROMPT")
+    return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT")
 
 
-def items_from_file(
-    path: str, file_format: Format | None = None, defaults: Mapping[str, object] = NO_DEFAULTS
-) -> Iterator[Item]:
-    """Items of a file, or of stdin for `-`, as they are read; they count only once all are (`shared.items.checked`).
+def read_file(
+    path: str,
+    file_format: Format | None = None,
+    defaults: Mapping[str, object] = NO_DEFAULTS,
+    extra_columns: ExtraColumns = "refuse",
+) -> PromptReader:
+    """Items of a file, or of stdin for `-`.
 
     Args:
         path: `.csv` with a header line, `.jsonl` with an object a line, `.txt` with a prompt a line, each also packed
             as `.gz`, or `-`.
         file_format: for `-` and other endings; stdin is otherwise guessed from its first line.
         defaults: fields of a line where it says nothing itself.
+        extra_columns: what happens to columns of a table that are not known.
+    """
+    lines = rows_of_file(path, file_format, extra_columns=extra_columns)
+    return PromptReader(((number, _completed(raw, defaults)) for number, raw in lines), where_of(path))
+
+
+def items_from_prompts(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> Iterator[Item]:
+    """Items of `read_arguments`, which count only once all are read."""
+    return right_items(read_arguments(prompts, defaults))
+
+
+def items_from_file(
+    path: str, file_format: Format | None = None, defaults: Mapping[str, object] = NO_DEFAULTS
+) -> Iterator[Item]:
+    """Items of a file (`read_file`), which count only once all are read.
 
     Raises:
-        InvalidItems: with every problem of every line.
+        InvalidItems: after the last one, with every problem of every line.
         InvalidFile: not UTF-8, or not of that format at all.
         TooLarge: over `MAX_BODY_BYTES` of text, or over `MAX_ITEMS` motions; it is not read further.
         NotFound, InvalidInput: no such file, or no way to tell its format.
     """
-    lines = rows_of_file(path, file_format)
-    return read_items(((number, _completed(raw, defaults)) for number, raw in lines), where=where_of(path))
+    return right_items(read_file(path, file_format, defaults))
+
+
+def right_items(reader: PromptReader) -> Iterator[Item]:
+    """The items of a reader, which count only once all are read.
+
+    Raises:
+        InvalidItems: after the last one, with every problem of every line.
+    """
+    for item in reader:
+        if not reader.total:
+            yield item
+    if reader.total:
+        raise reader.error()
 
 
 def evaluation_prompts_from_file(path: str) -> tuple[EvaluationPrompt, ...]:
-    """Prompts of an evaluation; columns `prompt`, `seconds` and `expected`. Raises as `items_from_file`."""
-    return read_prompts(rows_of_file(path, columns=EVALUATION_COLUMNS), where=where_of(path))
+    """Prompts of an evaluation; see `read_evaluation_prompts`."""
+    return read_evaluation_prompts(path)[0]
 
 
-def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence[str] = COLUMNS) -> Rows:
+def read_evaluation_prompts(
+    path: str, *, extra_columns: ExtraColumns = "refuse", check: PromptCheck | None = None
+) -> tuple[tuple[EvaluationPrompt, ...], list[int | None]]:
+    """Prompts of an evaluation, and the line of each; columns `prompt`, `seconds` and `expected`.
+
+    Args:
+        check: gives what else is wrong with the fields of a row that can be used.
+
+    Raises:
+        InvalidItems, InvalidFile, TooLarge, NotFound, InvalidInput: as `items_from_file`.
+    """
+    lines: list[int | None] = []
+
+    def counted() -> Rows:
+        for line, raw in rows_of_file(path, columns=EVALUATION_COLUMNS, extra_columns=extra_columns):
+            lines.append(line)
+            yield line, raw
+
+    return read_prompts(counted(), where=where_of(path), check=check), lines
+
+
+def rows_of_file(
+    path: str,
+    file_format: Format | None = None,
+    columns: Sequence[str] = COLUMNS,
+    extra_columns: ExtraColumns = "refuse",
+) -> Rows:
     """The lines of a file with their numbers, as they are read; only that a table has known columns is checked.
 
     Raises:
@@ -113,7 +258,7 @@ def rows_of_file(path: str, file_format: Format | None = None, columns: Sequence
         chosen, first = (file_format or _by_ending(path), []) if file_format or path != "-" else _guess(lines)
         lines = itertools.chain(first, lines)
         if chosen == "csv":
-            yield from _csv(lines, where_of(path), columns)
+            yield from csv_rows(lines, columns, extra_columns)
         else:
             yield from _jsonl(lines) if chosen == "jsonl" else _txt(lines)
 
@@ -150,93 +295,23 @@ def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
     """The format, by the first line that is not blank, and what was read to see it."""
     read: list[tuple[int, str]] = []
     for number, line in lines:
-        if line.strip():
+        if not is_blank(line):
             read.append((number, line))
             break
     first = read[0][1].strip()[:1000] if read else ""  # a header, or it is none
     if first.startswith("{"):
         return "jsonl", read
-    return ("csv" if "prompt" in next(csv.reader([first]), []) else "txt"), read
-
-
-def _csv(lines: Lines, where: str, columns: Sequence[str]) -> Rows:
-    at = 0
-
-    def counted() -> Iterator[str]:
-        nonlocal at
-        for at, line in lines:  # noqa: B007 (the reader has no number for the line that a guess has skipped)
-            yield line
-
-    reader = csv.reader(counted(), strict=True)
-    header: list[str] | None = None
-    while True:
-        line = at + 1
-        try:
-            cells = next(reader, None)
-        except csv.Error as error:
-            yield line, Unreadable(f"is not CSV: {_csv_error(error)}; the lines below it were not read")
-            return
-        if cells is None:
-            return
-        if any(cell.strip() for cell in cells):
-            if header is None:
-                header = _header([cell.strip() for cell in cells], line, where, columns)
-            else:
-                yield line, _csv_row(header, cells)
-
-
-def _csv_error(error: csv.Error) -> str:
-    if "field limit" in str(error):
-        return f"a cell of over {csv.field_size_limit():,} characters, as where a quote is never closed"
-    return "a quote is never closed" if "end of data" in str(error) else str(error)
-
-
-def _header(names: list[str], line: int, where: str, columns: Sequence[str]) -> list[str]:
-    known = f"known columns are {', '.join(columns)}"
-    problems = [
-        Problem(line, None, f"{name!r} is not a known column; {known}") for name in names if name not in columns
-    ]
-    problems += [Problem(line, name, "stands twice") for name in sorted({n for n in names if names.count(n) > 1})]
-    if "prompt" not in names:
-        problems.append(Problem(line, "prompt", f"is not among the columns of the first line; {known}"))
-    if problems:
-        raise InvalidItems(problems, where=where)
-    return names
-
-
-def _csv_row(header: list[str], cells: list[str]) -> object:
-    if len(cells) > len(header):
-        return Unreadable(
-            f"has {len(cells)} cells, the first line {len(header)}: put a text that holds commas into double quotes"
-        )
-    return {
-        name: _csv_value(name, cell)
-        for name, cell in zip(header, cells, strict=False)
-        if cell.strip() or name == "prompt"
-    }
-
-
-def _csv_value(name: str, cell: str) -> object:
-    """A number where the column wants one and the cell holds one; else the text, for the check to complain about."""
-    if name == "tags":
-        return [tag.strip() for tag in cell.split(TAG_SEPARATOR) if tag.strip()]
-    try:
-        if name in ("seed", "variants"):
-            return int(cell)
-        if name == "seconds":
-            return float(cell)
-    except ValueError:
-        pass
-    return cell if name == "prompt" else cell.strip()
+    names = next(csv.reader([first], delimiter=delimiter_of(first, COLUMNS)), [])
+    return ("csv" if "prompt" in [name.strip() for name in names] else "txt"), read
 
 
 def _jsonl(lines: Lines) -> Rows:
     for number, line in lines:
-        if line.strip():
+        if not is_blank(line):
             yield number, read_json(line)
 
 
 def _txt(lines: Lines) -> Rows:
     for number, line in lines:
-        if line.strip():
+        if not is_blank(line):
             yield number, {"prompt": line.rstrip("\r\n")}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import re
 import stat
 import sys
 import zlib
@@ -19,6 +20,8 @@ GZIP_MAGIC = b"\x1f\x8b"
 ZIP_MAGIC = b"PK\x03\x04"
 UTF8_BOM = b"\xef\xbb\xbf"
 UTF16_BOMS = (b"\xff\xfe", b"\xfe\xff")
+ESCAPED_BYTE = re.compile("[\udc80-\udcff]")
+"""A byte that is no UTF-8, as it is decoded: the lines before it can be read."""
 MAX_LINE = 2**20
 """Characters of a line, far more than all fields of an item take."""
 MAX_RATIO = 200
@@ -44,7 +47,7 @@ def open_text(path: str, *, limit: int) -> Generator[Iterator[str]]:
     where = where_of(path)
     with _opened(path, limit) as raw:
         content = _Bounded(_unpacked(raw, where), raw, limit, where)
-        text = io.TextIOWrapper(io.BufferedReader(content), encoding="utf-8", newline="")
+        text = io.TextIOWrapper(io.BufferedReader(content), encoding="utf-8", errors="surrogateescape", newline="")
         try:
             yield _lines(text, where)
         finally:
@@ -71,6 +74,14 @@ def _opened(path: str, limit: int) -> Generator[_Counted]:
         raise NotFound("there is no such file", where=path, hint="Check the path.") from None
     except OSError as error:
         raise InvalidFile(f"cannot be read: {error.strerror}", where=path) from error
+
+
+class UnreadableLine(InvalidFile):
+    """A line in the middle of a file that is no UTF-8."""
+
+    def __init__(self, message: str, *, where: str, line: int, hint: str) -> None:
+        super().__init__(message, where=f"{where}: line {line}", hint=hint)
+        self.line = line
 
 
 class _Counted(io.RawIOBase):
@@ -148,21 +159,21 @@ class _Bounded(io.RawIOBase):
 def _lines(text: io.TextIOWrapper, where: str) -> Iterator[str]:
     number = 0
     while True:
-        try:
-            line = text.readline(MAX_LINE + 1)
-        except UnicodeDecodeError as error:
-            number += error.object.count(b"\n", 0, error.start) + 1
-            raise InvalidFile(
-                f"is not UTF-8 (byte 0x{error.object[error.start]:02x})",
-                where=f"{where}: line {number}",
-                hint="Save it as UTF-8 (in Excel: CSV UTF-8).",
-            ) from error
+        line = text.readline(MAX_LINE + 1)
         if not line:
             return
         number += 1
         if len(line) > MAX_LINE:
             raise TooLarge(
                 f"is over {MAX_LINE:,} characters", where=f"{where}: line {number}", hint="Give one prompt a line."
+            )
+        wrong = None if line.isascii() else ESCAPED_BYTE.search(line)
+        if wrong is not None:
+            raise UnreadableLine(
+                f"is not UTF-8 (byte 0x{ord(wrong.group()) - 0xDC00:02x})",
+                where=where,
+                line=number,
+                hint="Save it as UTF-8 (in Excel: CSV UTF-8).",
             )
         yield line
 

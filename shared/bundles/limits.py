@@ -8,7 +8,7 @@ from typing import Any
 
 from shared.bundles.bundle import Bundle
 from shared.errors import InvalidBundle, InvalidInput
-from shared.items import OUTPUT_FPS, SETTINGS
+from shared.items import OUTPUT_FPS, SETTINGS, outside_range
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
@@ -40,8 +40,7 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
     """
     low, high = seconds_of(bundle)
     if seconds is not None and not low <= seconds <= high:
-        name = bundle.manifest.name
-        raise InvalidInput(f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {name}")
+        raise InvalidInput(outside_range(seconds, low, high, bundle.manifest.name))
 
 
 def check_settings(bundle: Bundle, names: Iterable[str]) -> None:

@@ -104,7 +104,7 @@ def test_a_name_with_path_tricks(marey: Marey, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "template", ["../{name}", "/tmp/{name}", "{job}/{name}", "{nonsense}", "{", "{name.__class__}"]
+    "template", ["../{name}", "/tmp/{name}", "{job}/../{name}", "{job}//{name}", "{nonsense}", "{", "{name.__class__}"]
 )
 def test_a_name_template_with_path_tricks(offline: Marey, tmp_path: Path, template: str) -> None:
     ran = offline("generate", "a person waves", "-o", tmp_path / "out", "--name-template", template)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any
+from typing import Annotated, Any
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,10 +12,14 @@ from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
 from services.api.problems import QuotaBody
 from services.api.schemas import Comment, Name, View
-from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from shared import items
+from shared.characters import LINE_PATTERN
+from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAG_LENGTH, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
 MAX_PRIORITY = 1000
+NAME_PATTERN = r"^[^/\\" + LINE_PATTERN.removeprefix("^[^")
+"""Of names of motions: one line without separators."""
 
 
 class NewItemBody(BaseModel):
@@ -24,12 +28,16 @@ class NewItemBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     prompt: str = Field(min_length=1, description="What the person does, in English, at most 200 words.")
-    name: str | None = Field(None, description="File name of the motion, without its ending.")
+    name: Annotated[str, Field(min_length=1, max_length=items.MAX_NAME, pattern=NAME_PATTERN)] | None = Field(
+        None, description="Of the motion, in any script; clients derive its file name from it."
+    )
     seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Of variant 0; variant k uses seed + k.")
     variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
     model: str | None = Field(None, description="Model, bundle or exact bundle.")
-    tags: list[str] | None = Field(None, max_length=MAX_TAGS)
+    tags: list[Annotated[str, Field(min_length=1, max_length=MAX_TAG_LENGTH, pattern=LINE_PATTERN)]] | None = Field(
+        None, max_length=MAX_TAGS
+    )
     settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
 
 

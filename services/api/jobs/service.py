@@ -14,7 +14,7 @@ from services.api.catalogue import Catalogue
 from services.api.documents import MAX_VALUE, Document
 from services.api.jobs.schemas import JobFields
 from shared.errors import InvalidInput, MareyError, TooLarge
-from shared.items import InvalidItems, Item, Problem, read_items, read_json
+from shared.items import InvalidItems, Problem, read_items, read_json
 from shared.jobs import NewItem
 from shared.offers import Offer, new_items
 
@@ -89,7 +89,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
     offers: dict[str | None, Offer] = {}
-    problems: dict[Problem, None] = {}
+    default_model: set[Problem] = set()
     line = 0
 
     def counted() -> Iterator[tuple[int, object]]:
@@ -99,33 +99,36 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
         if not line:
             raise InvalidInput("there is no prompt in it", where="body", hint='Write {"prompt": "…"}, one a line.')
 
-    for item in read_items(counted()):  # one by one: `line` is where this item stood
-        found = _offer(line, item, catalogue)
-        if isinstance(found, Problem):
-            problems[found] = None
-            continue
-        offers[item.model] = found
-        by_bundle[found.bundle.manifest.model, found.bundle.reference] += item.variants
-    if problems:
-        raise InvalidItems(problems)
+    def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+        """What the model of an item cannot do."""
+        model = values.get("model")
+        try:
+            offers[model] = offer = catalogue.offer(model)
+        except MareyError as error:
+            problem = _problem(error, None if model is None else line, "model")  # the default stands in no line
+            if problem not in default_model:
+                yield problem
+            if model is None:
+                default_model.add(problem)
+            return
+        for field, hold in (("seconds", offer.check_seconds), ("settings", offer.check_settings)):
+            try:
+                if field in values:
+                    hold(values[field])
+            except MareyError as error:
+                yield _problem(error, line, field)
+
+    for item in read_items(counted(), check=check):
+        bundle = offers[item.model].bundle
+        by_bundle[bundle.manifest.model, bundle.reference] += item.variants
     return Submission(fields, by_bundle.total(), by_bundle, raws, offers)
 
 
-def _offer(line: int, item: Item, catalogue: Catalogue) -> Offer | Problem:
-    """What the item is made with, or why it cannot be made."""
-    field = "model"
-    try:
-        offer = catalogue.offer(item.model)
-        field = "seconds"
-        offer.check_seconds(item.seconds)
-        field = "settings"
-        offer.check_settings(item.settings)
-    except MareyError as error:
-        if error.status >= 500:
-            raise
-        where = None if item.model is None and field == "model" else line  # the default model is nobody's line
-        return Problem(where, field, f"{error.message}. {error.hint}" if error.hint else error.message)
-    return offer
+def _problem(error: MareyError, line: int | None, field: str) -> Problem:
+    """What is wrong with a field of a line; what is wrong with this server is raised."""
+    if error.status >= 500:
+        raise error
+    return Problem(line, field, f"{error.message}. {error.hint}" if error.hint else error.message)
 
 
 def job_fields(values: Mapping[str, Any]) -> JobFields:

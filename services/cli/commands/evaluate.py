@@ -37,6 +37,7 @@ class State(StrEnum):
 def run(
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
+    extra_columns: evaluating.Extra = options.ExtraColumns.REFUSE,
     evaluator: evaluating.Evaluator = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
@@ -55,13 +56,14 @@ def run(
     A file of prompts has the columns prompt, seconds and expected, as in "walk straight then wave left".
     """
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
-    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
+    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
     from services.cli.client import Client
 
     waits = wait or fail_on_regression
     with Client.here() as client:
-        made = client.post_new("/v1/evaluations", body)
+        with asked.in_source():
+            made = client.post_new("/v1/evaluations", body)
         if not as_json:
             console.result(made["id"])
         elif not waits:

@@ -102,7 +102,7 @@ def fetch_job(
         only: items with a motion of which this was said.
         prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from services.cli.fetching import check_folder, plan
+    from services.cli.fetching import check_folder, make_folders, plan
     from services.cli.manifest import check_manifest, remove_left, write_manifest
 
     wanted = [f.value for f in formats] if formats else None
@@ -110,6 +110,7 @@ def fetch_job(
     planned = plan(client.pages(f"/v1/jobs/{job}/items", review=said, limit=1000), folder, wanted, template)
     check_folder(folder, hint="Choose another folder with -o.")
     check_manifest(folder, overwrite=overwrite)
+    make_folders(folder, (file.path for _, files in planned for file in files))
     done: set[Path] = set()
     try:
         _download(client, [file for _, files in planned for file in files], done, overwrite=overwrite)
@@ -118,7 +119,7 @@ def fetch_job(
     except BaseException:
         _write_part(folder, job, planned, done, overwrite=overwrite)
         raise
-    left = write_manifest(folder, job, _rows(planned), overwrite=overwrite)
+    left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
     if prune:
         remove_left(folder, left)
     if left:
@@ -146,7 +147,7 @@ def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, ov
 
     whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
     with suppress(MareyError):
-        write_manifest(folder, job, _rows(whole), overwrite=overwrite, whole=False)
+        write_manifest(folder, job, _rows(folder, whole), overwrite=overwrite, whole=False)
         wanted = sum(len(files) for _, files in planned)
         console.say(
             f"{console.home_relative(folder)}: {len(done)} of {wanted} files are there, and in manifest.csv; "
@@ -154,10 +155,13 @@ def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, ov
         )
 
 
-def _rows(planned: Planned) -> list[dict[str, str]]:
+def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
     from services.cli.manifest import row_of
 
-    return [row_of(item, {file.path.suffix[1:]: file.path.name for file in files}) for item, files in planned]
+    return [
+        row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})
+        for item, files in planned
+    ]
 
 
 def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:

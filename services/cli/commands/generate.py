@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from services.cli import console, options, rows
 from services.cli.commands.submit import read_prompts
 from services.cli.names import FileNames, Naming, check_template, slug
-from shared.errors import Conflict, InvalidBundle, InvalidInput
-from shared.items import MAX_SEED, InvalidItems, Item, Problem
+from shared.errors import Conflict, InvalidBundle, InvalidInput, MareyError
+from shared.items import MAX_SEED, Item, Problem
 
 if TYPE_CHECKING:
     from services.cli.roles.oneshot import Wanted
@@ -36,6 +36,7 @@ def generate(
     prompts: options.Prompts = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
+    extra_columns: options.Extra = options.ExtraColumns.REFUSE,
     model: options.Model = None,
     bundle: options.BundleOrFolder = None,
     seconds: options.Seconds = None,
@@ -51,23 +52,29 @@ def generate(
 ) -> None:
     """Make motions here and now, without a server or a queue."""
     from services.cli.extras import needs_extra
-    from services.cli.fetching import check_folder
+    from services.cli.fetching import check_folder, make_folders
     from services.cli.roles.oneshot import OneShot
 
     check_template(name_template)
     defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
-    items = list(read_prompts(prompts, file, input_format, defaults))
+    reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
+    items = list(reader)
     try:
         from shared.bundles import choose_bundle
         from shared.settings import settings
-    except ImportError as error:
-        raise needs_extra("worker", error) from error
-    config = settings()
-    chosen = choose_bundle(bundle or _one_model(items), config=config)
-    _check(items, chosen)
+
+        config = settings()
+        chosen = choose_bundle(bundle or _one_model(items), config=config)
+        reader.add(_problems(reader, items, chosen))
+    except (ImportError, MareyError) as error:
+        if not reader.total:
+            raise (needs_extra("worker", error) if isinstance(error, ImportError) else error) from error
+    if reader.total:
+        raise reader.error()
     kinds = [f.value for f in formats or options.FileFormat]
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
+    make_folders(output, (path for plan in planned for path in plan.paths.values()))
     studio = OneShot(chosen, config)
     if chosen.manifest.random:
         console.say(f"{chosen.manifest.name} has random weights: the motions show the machinery, not the prompts.")
@@ -93,12 +100,11 @@ def _tell_rewrite(clip: MotionClip) -> None:
         console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
 
 
-def _check(items: Iterable[Item], bundle: Bundle) -> None:
-    """What can be told before seconds of loading.
+def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) -> list[Problem]:
+    """Lengths that the bundle cannot make and settings that it has not, told before seconds of loading.
 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
-        InvalidItems: a length it cannot make, a setting it has not.
     """
     from services.cli.roles.serving import GENERATORS
     from shared.bundles.limits import check_seconds, check_settings
@@ -110,14 +116,13 @@ def _check(items: Iterable[Item], bundle: Bundle) -> None:
             hint=f"Models that do: {', '.join(sorted(GENERATORS))}.",
         )
     problems: list[Problem] = []
-    for line, item in enumerate(items, 1):
+    for number, item in enumerate(items, 1):
         for field, check in (("seconds", check_seconds), ("settings", check_settings)):
             try:
                 check(bundle, getattr(item, field))
             except InvalidInput as error:
-                problems.append(Problem(line, field, error.message))
-    if problems:
-        raise InvalidItems(problems)
+                problems.append(Problem(number, field, error.message))
+    return reader.located(problems)
 
 
 def _one_model(items: Iterable[Item]) -> str:
@@ -150,7 +155,17 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
         for variant in range(item.variants):
             wanted = Wanted(item.prompt, seed + variant, item.seconds, item.settings)
             name = item.name or slug(item.prompt)
-            naming = Naming(index, name, seed + variant, variant, bundle.manifest.model, "local", item.tags)
+            naming = Naming(
+                index,
+                name,
+                seed + variant,
+                variant,
+                bundle.manifest.model,
+                "local",
+                item.tags,
+                bundle.reference,
+                slug(item.prompt),
+            )
             paths = {kind: folder / names.of((index, variant), naming, kind) for kind in kinds}
             yield Planned(item, variant, wanted, paths)
 

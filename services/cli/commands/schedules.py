@@ -9,6 +9,7 @@ from typer.core import TyperGroup
 
 from services.cli import console, evaluating
 from services.cli.evaluating import Asked
+from services.cli.options import ExtraColumns
 
 COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
 
@@ -38,6 +39,7 @@ def add(
     ],
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
+    extra_columns: evaluating.Extra = ExtraColumns.REFUSE,
     evaluator: evaluating.Evaluator = None,
     settings: evaluating.Settings = None,
     repeats: evaluating.Repeats = None,
@@ -50,11 +52,11 @@ def add(
 ) -> None:
     """Measure a model again and again; prints the schedule's id. Each run looks up the bundles by the names given."""
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
-    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline)
+    asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
     from services.cli.client import Client
 
-    with Client.here() as client:
+    with Client.here() as client, asked.in_source():
         made = client.post_once("/v1/schedules", body)
     if as_json:
         console.result_json(made)

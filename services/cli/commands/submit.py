@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from services.cli import console, options, rows
-from shared.errors import InvalidInput
+from services.cli.names import check_template
+from shared.errors import InvalidInput, MareyError
+from shared.items import InvalidItems
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
-    from shared.items import Item
+    from services.cli.lines import Lines
 
 
 def submit(
     prompts: options.Prompts = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
+    extra_columns: options.Extra = options.ExtraColumns.REFUSE,
     name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
     priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
     fail_early: Annotated[
@@ -40,6 +43,7 @@ def submit(
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
     ] = None,
     formats: options.Formats = None,
+    name_template: options.Template = options.TEMPLATE,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Check everything, submit nothing.")] = False,
     timeout: Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")] = None,
     as_json: console.Json = False,
@@ -48,6 +52,7 @@ def submit(
     from services.cli.client import Client
     from services.cli.lines import Lines
 
+    check_template(name_template)
     if fetch is not None:
         from services.cli.fetching import check_folder
 
@@ -55,28 +60,47 @@ def submit(
     defaults = rows.defaults_of(
         model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags
     )
-    items = read_prompts(prompts, file, input_format, defaults)
-    with Lines(item.as_json() for item in items) as lines, Client.here() as client:
-        job = client.submit(
-            lines,
-            validate_only=dry_run,
-            name=name,
-            priority=priority or None,
-            fail_early=fail_early,
-            keep_days=keep_days,
-        )
-        if dry_run:
-            _tell_dry_run(job)
-            if as_json:
+    reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
+    with Lines(item.as_json() for item in reader) as lines:
+        if reader.total:
+            raise _all_problems(reader, lines)
+        with Client.here() as client:
+            with reader.in_source():
+                job = client.submit(
+                    lines,
+                    validate_only=dry_run,
+                    name=name,
+                    priority=priority or None,
+                    fail_early=fail_early,
+                    keep_days=keep_days,
+                )
+            if dry_run:
+                _tell_dry_run(job)
+                if as_json:
+                    console.result_json(job)
+                return
+            if as_json and fetch is None:
                 console.result_json(job)
-            return
-        if as_json and fetch is None:
-            console.result_json(job)
-        elif not as_json:
-            console.result(job["id"])
-        if not watch and fetch is None:
-            return
-        _follow(client, job["id"], fetch, formats, timeout, as_json)
+            elif not as_json:
+                console.result(job["id"])
+            if watch or fetch is not None:
+                _follow(client, job["id"], fetch, formats, name_template, timeout, as_json)
+
+
+def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
+    """What is wrong with the rows, and what their models cannot do, which the server knows; nothing is submitted."""
+    from services.cli.client import Client
+
+    try:
+        if len(lines):
+            with Client.here() as client:
+                client.submit(lines, validate_only=True)
+    except InvalidItems as error:
+        reader.add(reader.located(error.problems))
+        reader.total += error.total - len(error.problems)
+    except MareyError as error:
+        return reader.error(hint=f"Lengths and models were not checked: {error.message}.")
+    return reader.error()
 
 
 def _tell_dry_run(checked: dict[str, Any]) -> None:
@@ -102,11 +126,13 @@ def read_prompts(
     file: str | None,
     input_format: options.InputFormat | None,
     defaults: Mapping[str, object] = rows.NO_DEFAULTS,
-) -> Iterator[Item]:
-    """The items of PROMPT… or of -f, as they are read (`rows.items_from_file`).
+    extra_columns: options.ExtraColumns = options.ExtraColumns.REFUSE,
+) -> rows.PromptReader:
+    """The items of PROMPT… or of -f.
 
     Args:
         defaults: `rows.defaults_of` the options of the command.
+        extra_columns: of a CSV.
 
     Raises:
         InvalidInput: none or both are given, or what is there cannot be used.
@@ -114,20 +140,23 @@ def read_prompts(
     if prompts and file:
         raise InvalidInput("both PROMPT and -f are given", hint="Give the one or the other.")
     if file:
-        return rows.items_from_file(file, None if input_format is None else input_format.value, defaults)
+        file_format = None if input_format is None else input_format.value
+        return rows.read_file(file, file_format, defaults, extra_columns.value)
     for prompt in prompts or ():
         if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and Path(prompt).is_file():
             raise InvalidInput("is a file, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
     if not prompts:
         raise InvalidInput("there is no prompt", hint="Give one or more in quotes, or a file of them with -f.")
-    return rows.items_from_prompts(prompts, defaults)
+    return rows.read_arguments(prompts, defaults)
 
 
-def _follow(client, job: str, folder: Path | None, formats, timeout: float | None, as_json: bool) -> None:
+def _follow(
+    client, job: str, folder: Path | None, formats, template: str, timeout: float | None, as_json: bool
+) -> None:
     from services.cli.commands.fetch import write_job
     from services.cli.watching import check_ended, watch_job
 
     ended = watch_job(client, job, timeout=timeout)
     if folder is not None:
-        write_job(client, job, folder, formats, as_json=as_json)
+        write_job(client, job, folder, formats, template=template, as_json=as_json)
     check_ended(ended)

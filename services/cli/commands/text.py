@@ -10,6 +10,7 @@ import typer
 
 from services.cli import console, options
 from services.cli.commands.submit import read_prompts
+from services.cli.rows import right_items
 from shared.private_home import UMASK
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def parse(
     """Show the graph a prompt becomes. Needs no server."""
     from services.cli.extras import needs_extra
 
-    texts = [item.prompt for item in read_prompts(prompts, file, input_format)]
+    texts = [item.prompt for item in right_items(read_prompts(prompts, file, input_format))]
     try:
         for graph in _graphs(texts, model):
             if as_json:

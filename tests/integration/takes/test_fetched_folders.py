@@ -100,13 +100,15 @@ def test_names_of_a_manifest_do_not_lead_out_of_the_folder(marey: Command, job: 
     (folder / "sub").mkdir()
     (folder / "sub" / "deep.npz").write_text("mine")
     (folder / "notes.txt").write_text("mine")
+    (folder / "out").symlink_to(tmp_path)
     (folder / "link.npz").symlink_to(outside)
     (folder / "dir.npz").mkdir()
     rows = manifest(folder)
     tricks = (
         "../other.npz",
         str(outside),
-        "sub/deep.npz",
+        "sub/../../other.npz",
+        "out/other.npz",
         "notes.txt",
         "manifest.csv",
         "link.npz",

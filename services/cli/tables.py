@@ -1,0 +1,169 @@
+"""Tables of prompts: their delimiter, their columns, and what each row says, with the line where it begins."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import unicodedata
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from services.cli import manifest
+from services.cli.csv_cells import TAG_SEPARATOR, restore, split_tags
+from shared.characters import find_forbidden
+from shared.items import Unreadable
+
+Rows = Iterator[tuple[int | None, object]]
+Lines = Iterator[tuple[int, str]]
+"""With their numbers, from 1."""
+ExtraColumns = Literal["refuse", "tag", "ignore"]
+
+DELIMITERS = (",", ";", "\t")
+BLANK = " \t\r\n\ufeff\xa0"
+"""What is trimmed from cells; control characters are not, so that the check of the field refuses them."""
+EXTRA_HINT = "Rename or remove the columns, or choose --extra-columns tag or ignore."
+
+
+@dataclass(frozen=True)
+class Column:
+    """How one column is read.
+
+    Attributes:
+        field: of the row; None = the cell is not read.
+        tag: the cell becomes the tag `tag=cell`.
+    """
+
+    field: str | None
+    tag: str | None = None
+
+
+@dataclass(frozen=True)
+class Header:
+    """How the cells of a table are read."""
+
+    columns: Sequence[Column]
+    text: Callable[[str], str] = str
+    tags: Callable[[str], list[str]] = lambda cell: [tag.strip() for tag in cell.split(TAG_SEPARATOR)]
+
+
+def csv_rows(lines: Lines, columns: Sequence[str], extra: ExtraColumns = "refuse") -> Rows:
+    """The rows below the header, each with the line where it begins; a row or column that is wrong is `Unreadable`.
+
+    Args:
+        columns: known ones. A table that has all columns of our `manifest.csv` may have those too.
+        extra: what happens to other columns.
+    """
+    at = 0
+
+    def counted() -> Iterator[str]:
+        nonlocal at
+        for at, line in lines:  # noqa: B007 (the reader has no number for the line that a guess has skipped)
+            yield line
+
+    texts = counted()
+    first = next((line for line in texts if not is_blank(line)), "")
+    texts = itertools.chain([first], texts)
+    reader = csv.reader(texts, strict=True, delimiter=delimiter_of(first, columns))
+    header: Header | None = None
+    is_first = True
+    while True:
+        line = at if is_first else at + 1
+        is_first = False
+        try:
+            cells = next(reader, None)
+        except csv.Error as error:
+            yield line, Unreadable(f"is not CSV: {_csv_error(error)}; the lines below it were not read")
+            return
+        if cells is None:
+            return
+        if all(is_blank(cell) for cell in cells):
+            continue
+        if header is None:
+            header, problems = _read_header([cell.strip(BLANK) for cell in cells], columns, extra)
+            yield from ((line, problem) for problem in problems)
+            if all(column.field != "prompt" for column in header.columns):
+                return
+        else:
+            yield line, _row(header, cells)
+
+
+def delimiter_of(header: str, columns: Sequence[str]) -> str:
+    """The delimiter with which the header line names most of the known columns; the comma where none does."""
+
+    def known(delimiter: str) -> int:
+        try:
+            names = next(csv.reader([header], delimiter=delimiter), [])
+        except csv.Error:
+            return 0
+        return sum(name.strip(BLANK) in columns for name in names)
+
+    return max(DELIMITERS, key=known)
+
+
+def is_blank(text: str) -> bool:
+    """Return True if there is nothing in it; control characters that Python takes for spaces are something."""
+    return not text.strip() and find_forbidden(text, "\t\r\n") is None
+
+
+def _csv_error(error: csv.Error) -> str:
+    if "field limit" in str(error):
+        return f"a cell of over {csv.field_size_limit():,} characters, as where a quote is never closed"
+    return "a quote is never closed" if "end of data" in str(error) else str(error)
+
+
+def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) -> tuple[Header, list[Unreadable]]:
+    known = f"known columns are {', '.join(columns)}"
+    ours = set(names) >= set(manifest.RAW_COLUMNS)
+    found: list[Column] = []
+    problems: list[Unreadable] = []
+    for index, name in enumerate(names):
+        earlier = names[:index].count(name)
+        is_tag = extra == "tag" and name not in columns and not (ours and name in manifest.COLUMNS)
+        found.append(
+            Column(
+                field=name if name in columns and not earlier else None,
+                tag=unicodedata.normalize("NFC", name) if is_tag else None,
+            )
+        )
+        if is_tag and (not name or "=" in name):
+            problems.append(Unreadable(f"{name!r} cannot be the key of a tag: give the column a name without ="))
+        elif extra == "refuse" and name not in columns and not (ours and name in manifest.COLUMNS):
+            problems.append(Unreadable(f"{name!r} is not a known column; {known}"))
+        elif earlier == 1 and (is_tag or name in columns):
+            problems.append(Unreadable("stands twice", name))
+    if "prompt" not in names:
+        problems.append(Unreadable(f"is not among the columns of the first line; {known}", "prompt"))
+    if ours and "seconds" in names:
+        return Header(found, restore, split_tags), problems
+    return Header(found), problems
+
+
+def _row(header: Header, cells: list[str]) -> object:
+    if len(cells) > len(header.columns):
+        return Unreadable(
+            f"has {len(cells)} cells, the first line {len(header.columns)}: put a text that holds the delimiter into "
+            "double quotes"
+        )
+    row: dict[str, object] = {}
+    tags: list[str] = []
+    for column, cell in zip(header.columns, cells, strict=False):
+        if column.tag is not None and not is_blank(cell):
+            tags.append(f"{column.tag}={cell.strip(BLANK)}")
+        elif column.field == "tags":
+            tags = [*(tag for tag in header.tags(header.text(cell)) if tag), *tags]
+        elif column.field is not None and (column.field == "prompt" or not is_blank(cell)):
+            row[column.field] = _value(column.field, header.text(cell))
+    return {**row, "tags": tags} if tags else row
+
+
+def _value(name: str, cell: str) -> object:
+    """A number where the column wants one and the cell holds one; else the text, for the check to complain about."""
+    try:
+        if name in ("seed", "variants"):
+            return int(cell)
+        if name == "seconds":
+            return float(cell)
+    except ValueError:
+        pass
+    return cell if name == "prompt" else cell.strip(BLANK)
