@@ -156,6 +156,13 @@ def test_bad_input_is_2_with_every_line_and_nothing_is_begun(marey: Marey, tmp_p
         ("prompt,seconds\n", "no prompt"),
         ("prompt\nwalk\n", "a single prompt"),
         ("prompt,speed\nwalk,1\nrun,2\n", "'speed' is not a known column", "prompt, seconds, expected"),
+        (
+            "prompt;seconds;expected\nwalk;15;fly\n\nrun;40;\n",
+            f"{bad}: 3 problems",
+            "line 2: seconds: 15 is outside 0.8 to 9.8",
+            "line 2: expected",
+            "line 4: seconds: 40 is outside 0.8 to 9.8",
+        ),
         ("prompt,seconds,expected\nwalk,x,fly\nrun,-1,\n", "line 2: seconds", "line 2: expected", "line 3: seconds"),
     ):
         bad.write_text(content)
