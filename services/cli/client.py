@@ -217,7 +217,14 @@ class Client:
             headers = dict(request.get("headers") or {})
             if span.traceparent is not None:
                 headers[tracing.HEADER] = span.traceparent
-            response = self._http.request(method, path, **{**request, "headers": headers})
+            try:
+                response = self._http.request(method, path, **{**request, "headers": headers})
+            except UnicodeEncodeError as error:  # an argument whose bytes are no UTF-8
+                raise InvalidInput(
+                    f"{error.object[error.start : error.end]!r} is no UTF-8: the request cannot hold it",
+                    where=f"{method} {path}",
+                    hint="Write names, comments and reasons in UTF-8.",
+                ) from error
             span.set(**{"http.response.status_code": response.status_code})
             return response
 

@@ -155,9 +155,9 @@ def _range_check(bundle: str) -> PromptCheck:
         return found[0]
 
     def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
-        seconds = values.get("seconds")
+        seconds: float | None = values.get("seconds")
         known = None if seconds is None else model()
-        if known is not None and not known["min_seconds"] <= seconds <= known["max_seconds"]:
+        if seconds is not None and known is not None and not known["min_seconds"] <= seconds <= known["max_seconds"]:
             message = outside_range(seconds, known["min_seconds"], known["max_seconds"], known["name"])
             yield Problem(line, "seconds", message)
 

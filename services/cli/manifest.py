@@ -48,7 +48,7 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     review = motion.get("review") or {}
     values = {
         **{name: item[name] for name in ("index", "name", "prompt", "seed", "state", "variant", "model", "bundle")},
-        "seconds": item["seconds"],
+        "seconds": item.get("seconds"),
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
         **files,
         "tags": join_tags(item["tags"]),

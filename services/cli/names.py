@@ -144,7 +144,7 @@ def _parse(template: str) -> list[_Component]:
         for literal, name, spec, conversion in string.Formatter().parse(template):
             first, *others = literal.split("/")
             components[-1].append(first)
-            components += [[other] for other in others]
+            components.extend([other] for other in others)
             if name is not None:
                 components[-1].append(_field(name, spec or "", conversion))
     except ValueError as error:

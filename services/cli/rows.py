@@ -113,10 +113,12 @@ class PromptReader:
 
 def located(problems: Iterable[Problem], lines: Sequence[int | None]) -> list[Problem]:
     """Problems whose lines count what was read from a file, with the lines of the file."""
-    return [
-        replace(problem, line=lines[problem.line - 1]) if 0 < (problem.line or 0) <= len(lines) else problem
-        for problem in problems
-    ]
+
+    def place(problem: Problem) -> Problem:
+        number = problem.line
+        return problem if number is None or number > len(lines) else replace(problem, line=lines[number - 1])
+
+    return [place(problem) for problem in problems]
 
 
 def _stand_in(values: Mapping[str, Any]) -> Item:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from services.cli import console, options, rows
 from services.cli.commands.submit import read_prompts
+from services.cli.extras import needs_extra
 from services.cli.names import FileNames, Naming, check_template, slug
 from shared.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from shared.items import MAX_SEED, Item, Problem
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from services.cli.roles.oneshot import Wanted
     from shared.bundles import Bundle
     from shared.motion.clip import MotionClip
+    from shared.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,6 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Make motions here and now, without a server or a queue."""
-    from services.cli.extras import needs_extra
     from services.cli.fetching import check_folder, make_folders
     from services.cli.roles.oneshot import OneShot
 
@@ -59,18 +60,7 @@ def generate(
     defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
-    try:
-        from shared.bundles import choose_bundle
-        from shared.settings import settings
-
-        config = settings()
-        chosen = choose_bundle(bundle or _one_model(items), config=config)
-        reader.add(_problems(reader, items, chosen))
-    except (ImportError, MareyError) as error:
-        if not reader.total:
-            raise (needs_extra("worker", error) if isinstance(error, ImportError) else error) from error
-    if reader.total:
-        raise reader.error()
+    chosen, config = _bundle_for(reader, items, bundle)
     kinds = [f.value for f in formats or options.FileFormat]
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
@@ -100,6 +90,33 @@ def _tell_rewrite(clip: MotionClip) -> None:
         console.say(f"{about['prompt']!r} was read as it is: {about['not_rewritten']}.")
 
 
+def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None) -> tuple[Bundle, Settings]:
+    """The bundle that makes the items, and the settings of this process.
+
+    Raises:
+        InvalidItems: with all problems of the rows, lengths and settings of the bundle among them.
+        InvalidInput, NotFound, InvalidBundle: there is no such bundle, or the rows name several models.
+    """
+    try:
+        from shared.bundles import choose_bundle
+        from shared.settings import settings
+    except ImportError as error:
+        if reader.total:
+            raise reader.error() from None
+        raise needs_extra("worker", error) from error
+    config = settings()
+    try:
+        chosen = choose_bundle(bundle or _one_model(items), config=config)
+        reader.add(_problems(reader, items, chosen))
+    except MareyError:
+        if reader.total:
+            raise reader.error() from None
+        raise
+    if reader.total:
+        raise reader.error()
+    return chosen, config
+
+
 def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) -> list[Problem]:
     """Lengths that the bundle cannot make and settings that it has not, told before seconds of loading.
 
@@ -120,6 +137,8 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
         for field, check in (("seconds", check_seconds), ("settings", check_settings)):
             try:
                 check(bundle, getattr(item, field))
+            except InvalidBundle:
+                raise
             except InvalidInput as error:
                 problems.append(Problem(number, field, error.message))
     return reader.located(problems)

@@ -165,3 +165,14 @@ def test_a_server_that_stays_busy_is_given_up(scripted: Scripted, monkeypatch: p
         client.get("/v1/jobs")
     assert refused.value.exit_code == 4
     assert len(script.asked) == client_module.ATTEMPTS
+
+
+def test_text_that_no_request_can_hold_is_refused_with_what_to_do(scripted: Scripted) -> None:
+    client, script = scripted()
+    for send in (
+        lambda: client.submit([{"prompt": "a person walks"}], name="Zo\udceb"),
+        lambda: client.post("/v1/motions/review", {"comment": "\udcff"}),
+    ):
+        with pytest.raises(InvalidInput, match=r"udc.. is no UTF-8|'\\udc..' is no UTF-8"):
+            send()
+    assert script.asked == []
