@@ -8,9 +8,12 @@ import unicodedata
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 
 from services.cli.csv_cells import restore
 from services.cli.manifest import NAME, RAW_COLUMNS
+from shared.characters import find_forbidden
+from shared.jobs import schema, transaction
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 
@@ -176,3 +179,33 @@ def test_a_job_with_control_characters_is_refused(api: LiveApi, field: str) -> N
             line = http.post("/v1/jobs", params={field: text}, content=b'{"prompt": "a person walks"}',
                              headers={"Content-Type": "application/x-ndjson"})  # fmt: skip
             assert line.status_code == 422
+
+
+def test_rows_of_earlier_releases_are_shown_escaped_and_told_as_they_are(
+    api: LiveApi, marey: Command, tmp_path: Path
+) -> None:
+    text = "a\x1b[2Jb\x9b\u202ec\x7f\td\n"
+    job = marey("submit", "a person walks").ok().out.strip()
+    api.work()
+    with transaction(api.engine) as conn:  # the edge takes no such text any more
+        conn.execute(sa.update(schema.job).values(name=text, comment=text))
+        conn.execute(sa.update(schema.item).values(name=text, prompt=f"walk {text}", tags=[text]))
+        conn.execute(
+            sa.update(schema.motion).values(
+                review="kept", review_comment=text, reviewed_by=text, reviewed_at=sa.func.now()
+            )
+        )
+    for command in (["jobs", "list"], ["jobs", "show", job], ["motions", "list"], ["jobs", "watch", job]):
+        ran = marey(*command).ok()
+        assert find_forbidden(ran.out + ran.err, "\n\t") is None, command
+        if command[1] != "watch":
+            (line, *_) = marey(*command, "--json").ok().out.splitlines()
+            assert find_forbidden(line) is None
+            assert text in json.loads(line).values()
+    ran = marey("fetch", job, "-o", tmp_path).ok()
+    assert find_forbidden(ran.out + ran.err, "\n\t") is None
+    (row,) = rows(tmp_path)
+    assert row["npz"].startswith("00000_a_[2Jb__c__d_")
+    with api.client() as client:
+        (item,) = client.pages(f"/v1/jobs/{job}/items")
+        client.post("/v1/motions/reroll", {"motions": [item["motion"]["id"]]})
