@@ -47,6 +47,7 @@ from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
 from shared.errors import InvalidInput
 from shared.jobs import check_listening, create_engine
+from shared.runtime.systemd import notified
 from shared.settings import Settings, settings
 from shared.storage import open_store
 from shared.webhooks.addresses import Allowed
@@ -113,7 +114,8 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     tailer.start()
     shared.readiness.start()
     try:
-        yield
+        async with notified():
+            yield
     finally:
         shared.readiness.stop()
         tailer.stop()

@@ -26,6 +26,7 @@ from services.api.traces import Trace
 from services.text.routes import load_pipeline, text_router
 from shared.bundles import list_bundles
 from shared.errors import InvalidInput, MareyError
+from shared.runtime.systemd import notified
 from shared.settings import Settings, settings
 
 log = structlog.get_logger(__name__)
@@ -48,7 +49,8 @@ def create_text_app(config: Settings, *, preload: bool = True) -> FastAPI:
             threading.Thread(target=_preload, args=(config, loaded), name="preload", daemon=True).start()
         else:
             loaded.set()
-        yield
+        async with notified():
+            yield
 
     app = FastAPI(title="Marey text service", lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
     problems.install(app)
