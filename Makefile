@@ -36,7 +36,7 @@ test: $(STAMP) lint ## Everything but slow and gpu tests: under ten minutes on t
 test-all: $(STAMP) lint ## Every test
 	$(BIN)/pytest -q $(PARALLEL) -m ''
 
-chaos: $(STAMP) ## 10,000 items twice, whatever is killed; prints how long recovery took
+chaos: $(STAMP) ## 10,000 items three times, whatever is killed or falls silent; prints how long recovery took
 	rm -rf out/chaos
 	MAREY_CHAOS_REPORTS=out/chaos $(BIN)/pytest -q -m '' tests/chaos
 	$(BIN)/python -m tests.chaos.figures out/chaos

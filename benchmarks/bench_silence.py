@@ -1,8 +1,9 @@
-"""How soon the platform works again after its connections to Postgres have fallen silent.
+"""How soon the platform works again after its connections to a server have fallen silent.
 
-The real processes reach Postgres through a proxy that can stop forwarding while every connection stays open. There are
-two faults: (a) all open connections fall silent for ever, and new ones work: seconds from the start of the fault; (b)
-everything is silent for a minute, new connections too: seconds from its end. Measured at the same time, in each fault:
+The real processes reach Postgres, Valkey (queue) and an S3 server (store) through proxies that can stop forwarding
+while every connection stays open. There are two faults of each: (a) all open connections fall silent for ever, and new
+ones work: seconds from the start of the fault; (b) everything is silent for a minute, new connections too: seconds
+from its end. Measured at the same time, in each fault:
 
 - API: until `GET /v1/jobs` answers and keeps answering;
 - scheduler: until a new job, for a queue whose worker is idle, has been claimed (a hint must reach the worker);
@@ -10,7 +11,8 @@ everything is silent for a minute, new connections too: seconds from its end. Me
 - event stream: until an open stream delivers the next event of that job;
 - watcher: until `watch_job` returns for a job whose one item is finished during the fault.
 
-`MAREY_SILENCE_REPEATS` (3) and `MAREY_SILENCE_SECONDS` (60) change the length of a run.
+`MAREY_SILENCE_REPEATS` (3) and `MAREY_SILENCE_SECONDS` (60) change the length of a run, `MAREY_SILENCE_OF`
+(`Postgres,queue,store`) which servers it has. Seven minutes a server.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from uuid import UUID
 
@@ -35,11 +37,14 @@ from services.cli.watching import watch_job
 from shared.errors import Unreachable
 from shared.jobs import transaction
 from shared.runtime.embedded import postgres_url, socket_folder
+from tests.chaos.places import S3
 from tests.servers.stalling_proxy import StallingProxy
+from tests.servers.swift import Swift
 from tests.support.toy import REFERENCE
 from tests.support.toy_jobs import job_row, submit_toys
 
 REPEATS = int(os.environ.get("MAREY_SILENCE_REPEATS", "3"))
+SERVERS = os.environ.get("MAREY_SILENCE_OF", "Postgres,queue,store").split(",")
 SECONDS = float(os.environ.get("MAREY_SILENCE_SECONDS", "60"))
 BARS = {"API": 15, "scheduler": 15, "worker": 15, "event stream": 20, "watcher": 20}
 BATCH_SECONDS = 1.0
@@ -50,17 +55,40 @@ SETTLED = 5.0
 
 
 def main() -> None:
-    """Print, for both faults and each part, the median and the worst of the repeats, and the bar."""
+    """Print, for both faults of each server and each part, the median and the worst of the repeats, and the bar."""
     home = Path(tempfile.mkdtemp(prefix="marey-"))
-    try:
-        with StallingProxy(str(socket_folder(home) / ".s.PGSQL.5432")) as proxy:
-            url = sa.make_url(postgres_url(home)).set(host="127.0.0.1", port=proxy.port, query={})
-            environment = {"MAREY_DATABASE_URL": url.render_as_string(hide_password=False)}
-            with Platform(home, environment) as platform:
-                _start(platform)
-                _run(platform, proxy)
-    finally:
-        shutil.rmtree(home, ignore_errors=True)
+    with ExitStack() as stack:
+        stack.callback(shutil.rmtree, home, ignore_errors=True)
+        (home / "swift").mkdir()
+        swift = Swift(home / "swift")
+        swift.start()
+        stack.callback(swift.stop)
+        host, port = swift.endpoint.split(":")
+        proxies = {
+            "Postgres": StallingProxy(str(socket_folder(home) / ".s.PGSQL.5432")),
+            "queue": StallingProxy(str(socket_folder(home) / "valkey.sock")),
+            "store": StallingProxy((host, int(port))),
+        }
+        for proxy in proxies.values():
+            stack.enter_context(proxy)
+        url = sa.make_url(postgres_url(home)).set(host="127.0.0.1", port=proxies["Postgres"].port, query={})
+        environment = {
+            "MAREY_DATABASE_URL": url.render_as_string(hide_password=False),
+            "MAREY_QUEUE_URL": f"redis://127.0.0.1:{proxies['queue'].port}/0",
+            **S3(swift, proxies["store"]).environment,
+        }
+        with Platform(home, environment) as platform:
+            _start(platform)
+            long = submit_toys(
+                platform.engine, ["walk"] * 32 * 3000, queue="long", steps=10, step_seconds=BATCH_SECONDS / 10
+            )
+            platform.wait(lambda: job_row(platform.engine, long).succeeded > 0, "the first commit")
+            print(
+                f"load {os.getloadavg()[0]:.1f}; {REPEATS} repeats of each fault; seconds, median (worst)", flush=True
+            )
+            for name in SERVERS:
+                print(f"\n### {name}\n", flush=True)
+                _run(platform, proxies[name], long)
 
 
 def _start(platform: Platform) -> None:
@@ -71,17 +99,15 @@ def _start(platform: Platform) -> None:
         platform.wait_ready(queue)
 
 
-def _run(platform: Platform, proxy: StallingProxy) -> None:
-    print(f"load {os.getloadavg()[0]:.1f}; {REPEATS} repeats of each fault; seconds, median (worst)\n", flush=True)
+def _run(platform: Platform, proxy: StallingProxy, long: UUID) -> None:
     results: dict[str, dict[str, list[float]]] = {"a": {}, "b": {}}
-    long = submit_toys(platform.engine, ["walk"] * 32 * 3000, queue="long", steps=10, step_seconds=BATCH_SECONDS / 10)
-    platform.wait(lambda: job_row(platform.engine, long).succeeded > 0, "the first commit")
     for repeat in range(REPEATS):
         for fault, found in results.items():
             for name, seconds in _Fault(platform, proxy, long, everything=fault == "b").measure().items():
                 found.setdefault(name, []).append(seconds)
             last = ", ".join(f"{name} {times[-1]:.1f}" for name, times in found.items())
             print(f"({fault}) {repeat + 1}: {last}", flush=True)
+            proxy.cut(silent=True)  # as a firewall forgets them in time
             time.sleep(15)  # leases and the pauses of retries are as before
     print(f"\n| what | bar | (a) from its start | (b) {SECONDS:g} s, from its end |\n|---|---|---|---|")
     for name, bar in BARS.items():

@@ -18,27 +18,38 @@ import sqlalchemy as sa
 from shared.errors import Unreachable
 from shared.jobs import create_engine, transaction, upgrade
 from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
-from shared.runtime.queue import redis_client
+from shared.runtime.queue import SOCKET_SCHEME, redis_client
 from shared.runtime.status import read_status
+from tests.servers.stalling_proxy import StallingProxy
 from tests.support.toy import QUEUE, REFERENCE
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 class Cluster:
-    """Postgres, Valkey, one scheduler and some toy workers on `home`; `environment` adds settings (store, times)."""
+    """Postgres, Valkey, one scheduler and some toy workers on `home`.
 
-    def __init__(self, home: Path, environment: Mapping[str, str]) -> None:
+    Args:
+        environment: adds settings (store, times).
+        proxied: let the processes reach both servers through proxies that can fall silent; the tests do not.
+    """
+
+    def __init__(self, home: Path, environment: Mapping[str, str], *, proxied: bool = False) -> None:
         self.home = home
         self.postgres: EmbeddedServer = start_postgres(home)
         self.valkey: EmbeddedServer = start_valkey(home)
         self.engine: sa.Engine = create_engine(self.postgres.url)
         upgrade(self.engine)
+        self._stack = contextlib.ExitStack()
+        self.proxies: dict[str, StallingProxy] = {}
+        database_url, queue_url = self.postgres.url, self.valkey.url
+        if proxied:
+            database_url, queue_url = self._through_proxies()
         self._environment = {
             **os.environ,
             "MAREY_HOME": str(home),
-            "MAREY_DATABASE_URL": self.postgres.url,
-            "MAREY_QUEUE_URL": self.valkey.url,
+            "MAREY_DATABASE_URL": database_url,
+            "MAREY_QUEUE_URL": queue_url,
             "MAREY_LOG_JSON": "true",
             "OMP_NUM_THREADS": "1",
             **environment,
@@ -56,8 +67,24 @@ class Cluster:
             with contextlib.suppress(psutil.NoSuchProcess):
                 orphan.kill()
         self.engine.dispose()
+        self._stack.close()
         self.valkey.stop()
         self.postgres.stop()
+
+    def _through_proxies(self) -> tuple[str, str]:
+        """URLs of database and queue by way of proxies in front of their sockets, which outlive a restart."""
+        database = sa.make_url(self.postgres.url)
+        folder, port = str(database.query["host"]), database.port or 5432
+        for name, path in {
+            "Postgres": f"{folder}/.s.PGSQL.{port}",
+            "queue": self.valkey.url.removeprefix(SOCKET_SCHEME),
+        }.items():
+            self.proxies[name] = self._stack.enter_context(StallingProxy(path))
+        reached = database.set(host="127.0.0.1", port=self.proxies["Postgres"].port, query={})
+        return (
+            reached.render_as_string(hide_password=False),
+            f"redis://127.0.0.1:{self.proxies['queue'].port}/0",
+        )
 
     # --- starting ---
 

@@ -9,9 +9,11 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from uuid import UUID
 
 import httpx2
@@ -23,7 +25,9 @@ from shared.runtime.faults import patiently
 from shared.runtime.status import read_status
 from tests.chaos.driver import Cluster
 from tests.chaos.places import Place
+from tests.chaos.silence import ALL_SILENT, OPEN_SILENT, UNDER_WAY, EventProbe, stall
 from tests.chaos.studios import ask, client_of
+from tests.servers.stalling_proxy import StallingProxy
 
 LIMIT = 600.0  # seconds; what takes longer to answer again fails the run
 LOOK = 0.05
@@ -61,6 +65,7 @@ class Breaker:
         start: starts the process of a name.
         longest: seconds by which outages are measured.
         start_again: starts what has ended by itself.
+        probe: follows the events of a job.
     """
 
     def __init__(
@@ -68,6 +73,7 @@ class Breaker:
         cluster: Cluster,
         place: Place,
         *,
+        probe: EventProbe,
         draw: random.Random,
         url: str,
         key: str,
@@ -85,6 +91,7 @@ class Breaker:
         self._start = start
         self._longest = longest
         self._start_again = start_again
+        self._probe = probe
         self.faults: list[Fault] = []
         self.kinds: dict[str, Callable[[Fault], None]] = {
             "worker's child killed": self._child,
@@ -103,6 +110,9 @@ class Breaker:
             "store full": lambda fault: self._without_store(fault, place.full()),
             "garbage collected": self._collect,
         }
+        for name, proxy in (cluster.proxies | ({} if place.proxy is None else {"store": place.proxy})).items():
+            self.kinds[f"{name} {OPEN_SILENT}"] = partial(self._open_silent, proxy=proxy)
+            self.kinds[f"{name} {ALL_SILENT}"] = partial(self._all_silent, proxy=proxy)
 
     def break_one(self, kind: str) -> Fault:
         """Break something of this kind and bring it back."""
@@ -198,6 +208,21 @@ class Breaker:
             self._away(1.5 * self._longest, least=1.0)
         fault.back = now()
 
+    def _open_silent(self, fault: Fault, *, proxy: StallingProxy) -> None:
+        stall(proxy, new=False)
+        fault.at = fault.back = now()
+        self._wait_for_all(fault)
+
+    def _all_silent(self, fault: Fault, *, proxy: StallingProxy) -> None:
+        """A third of them for up to a minute, where outages are measured by ten seconds."""
+        stall(proxy, new=True)
+        fault.at = now()
+        most = self._longest * self._draw.choice((1, 1, 6))
+        self._away(most, least=most / 2)
+        proxy.resume()
+        fault.back = now()
+        self._wait_for_all(fault)
+
     def _collect(self, _fault: Fault) -> None:
         """No fault: it must do no harm at any moment."""
         patiently(lambda: collect_garbage(self._cluster.engine, self._place.store), seconds=LIMIT)
@@ -217,6 +242,27 @@ class Breaker:
             time.sleep(LOOK)
         fault.waits[what] = (now() - fault.back).total_seconds()
 
+    def _wait_for_all(self, fault: Fault) -> None:
+        """Wait for everything at the same time, each on a thread: what hangs must not hide when the others came."""
+        conditions: dict[str, Callable[[], bool]] = {
+            "API answers": self._answers,
+            "event delivered": self._probe.delivers,
+        }
+        for part in ("relay", "sweeper"):
+            before = self._rounds(part)
+            conditions[f"{part} at work"] = lambda part=part, before=before: self._rounds(part) not in (0.0, before)
+        assert fault.back is not None
+        with ThreadPoolExecutor(len(conditions)) as threads:
+            waiting = {what: threads.submit(_until, condition) for what, condition in conditions.items()}
+            while not all(future.done() for future in waiting.values()):
+                self._start_again()
+                time.sleep(LOOK)
+        for what, future in waiting.items():
+            when = future.result()
+            if when is None:
+                raise AssertionError(f"{fault.kind}, and then not in {LIMIT:.0f} s: {what}\n{self._cluster.logs()}")
+            fault.waits[what] = (when - fault.back).total_seconds()
+
     def _answers(self) -> bool:
         with client_of(self._url, self._key) as http:
             answer = ask(http, "GET", "/v1/jobs", params={"limit": 1})
@@ -231,6 +277,16 @@ class Breaker:
             return 0.0
         wanted = f'marey_scheduler_rounds_total{{outcome="done",part="{part}"}}'
         return next((float(line.rpartition(" ")[2]) for line in lines if line.startswith(wanted)), 0.0)
+
+
+def _until(condition: Callable[[], bool]) -> datetime | None:
+    """When a condition held first; None = not within the limit of a run."""
+    deadline = time.monotonic() + LIMIT
+    while not condition():
+        if time.monotonic() > deadline:
+            return None
+        time.sleep(4 * LOOK)
+    return now()
 
 
 # --- what the ledger says of it afterwards ---
@@ -253,6 +309,8 @@ STEERED = """
 """
 JOBS = "SELECT array_agg(DISTINCT job_id) FROM item WHERE id = ANY(:items)"
 PATIENCE = 15.0
+WANTED = {"Postgres": ("succeeded", "leased"), "store": ("succeeded",), "queue": ("leased",)}
+NEXT_NAMES = {"succeeded": "next motion stored", "leased": "next claim"}
 NEXT = "SELECT min(at) FROM ledger_item WHERE after = :after AND at > :at"
 
 
@@ -268,12 +326,13 @@ def recoveries(engine: sa.Engine, fault: Fault) -> dict[str, float]:
                 again = conn.execute(sa.text(STARTED_AGAIN), asked).scalar_one()
                 if again is not None:
                     found["first item again"] = (again - fault.at).total_seconds()
-        wanted = {"Postgres": "succeeded", "store": "succeeded", "queue": "leased"}.get(fault.kind.split()[0])
-        if wanted is not None and fault.back is not None:
-            first = conn.execute(sa.text(NEXT), {"at": fault.back, "after": wanted}).scalar_one()
+        wanted = WANTED.get(fault.kind.split()[0], ()) if fault.back is not None else ()
+        silent = fault.kind.endswith(OPEN_SILENT)
+        for after in wanted:
+            since = fault.back + timedelta(seconds=UNDER_WAY if silent else 0.0)
+            first = conn.execute(sa.text(NEXT), {"at": since, "after": after}).scalar_one()
             if first is not None:
-                name = "next motion stored" if wanted == "succeeded" else "next claim"
-                found[name] = (first - fault.back).total_seconds()
+                found[NEXT_NAMES[after]] = (first - fault.back).total_seconds()
     return found
 
 

@@ -23,6 +23,28 @@ def recovery_table(reports: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def bar_table(reports: list[dict[str, Any]]) -> list[str]:
+    """Faults of silence against their bars: samples that no other fault fell into, and all."""
+    found: dict[tuple[str, str, float], list[dict[str, Any]]] = defaultdict(list)
+    for report in reports:
+        for sample in report["samples"]:
+            if sample.get("bar") is not None:
+                found[sample["fault"], sample["until"], sample["bar"]].append(sample)
+    lines = ["| fault | until | bar | alone: worst | above | N | all: worst | above | N |", "|---" * 9 + "|"]
+    for (fault, until, bar), samples in sorted(found.items()):
+        columns = [
+            _against(bar, [sample["seconds"] for sample in some])
+            for some in ([sample for sample in samples if sample["alone"]], samples)
+        ]
+        lines.append(f"| {fault} | {until} | {bar:g} s | {' | '.join(columns)} |")
+    return lines
+
+
+def _against(bar: float, seconds: list[float]) -> str:
+    worst = f"{max(seconds):.1f} s" if seconds else ""
+    return f"{worst} | {sum(each > bar for each in seconds)} | {len(seconds)}"
+
+
 def run_table(reports: list[dict[str, Any]]) -> list[str]:
     """What happened, a column a run."""
     rows = {
@@ -40,6 +62,7 @@ def run_table(reports: list[dict[str, Any]]) -> list[str]:
         "webhook events, messages": lambda r: f"{r['webhook_events']}, {r['webhook_messages']}",
         "looks at the quotas": lambda r: f"{r['quota_looks']:,}",
         "processes that ended by themselves": lambda r: sum(r["ended_by_themselves"].values()),
+        "bars missed, alone": lambda r: sum("another fault" not in line for line in r.get("bars_missed", [])),
         "minutes": lambda r: f"{r['seconds'] / 60:.0f}",
         "audit": lambda r: "nothing wrong" if not r["wrong"] else f"{len(r['wrong'])} wrong",
     }
@@ -55,9 +78,12 @@ def _figures(seconds: list[float]) -> str:
 
 
 def main(folder: Path) -> None:
-    """Print both tables."""
+    """Print the tables, and which bars were missed."""
     reports = [json.loads(path.read_text()) for path in sorted(folder.glob("seed-*.json"))]
-    print("\n".join([*run_table(reports), "", *recovery_table(reports)]))
+    print("\n".join([*run_table(reports), "", *recovery_table(reports), "", *bar_table(reports)]))
+    for report in reports:
+        for line in report.get("bars_missed", []):
+            print(f"seed {report['seed']}: bar missed: {line}")
 
 
 if __name__ == "__main__":

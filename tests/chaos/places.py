@@ -11,6 +11,7 @@ from typing import Protocol
 
 from shared.storage import FolderStore
 from shared.storage.port import AssetStore
+from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 
 ROOM = 40 * 4096
@@ -24,6 +25,11 @@ class Place(Protocol):
     def environment(self) -> dict[str, str]: ...
     @property
     def store(self) -> AssetStore: ...
+    @property
+    def proxy(self) -> StallingProxy | None:
+        """The way of the processes to it, if that is a network that can fall silent."""
+        ...
+
     def away(self) -> AbstractContextManager[None]:
         """It does not answer inside the block."""
         ...
@@ -49,6 +55,10 @@ class Folder:
     @property
     def store(self) -> AssetStore:
         return FolderStore(self.root)
+
+    @property
+    def proxy(self) -> StallingProxy | None:
+        return None
 
     @contextmanager
     def away(self) -> Iterator[None]:
@@ -110,9 +120,22 @@ class Disk(Folder):
 
 @dataclass
 class S3:
-    """A bucket of a server that can be taken away and has a byte limit of its own."""
+    """A bucket of a server that can be taken away and has a byte limit of its own.
+
+    Attributes:
+        proxy: by which the processes reach it; the tests do not. None = they reach it directly.
+    """
 
     server: Swift
+    proxy: StallingProxy | None = None
+
+    @classmethod
+    @contextmanager
+    def proxied(cls, server: Swift) -> Iterator[S3]:
+        """A bucket that the processes reach through a proxy that can fall silent."""
+        host, port = server.endpoint.split(":")
+        with StallingProxy((host, int(port))) as proxy:
+            yield cls(server, proxy)
 
     def __post_init__(self) -> None:
         self._store = self.server.new_store()
@@ -125,7 +148,7 @@ class S3:
     def environment(self) -> dict[str, str]:
         return {
             "MAREY_STORE": f"s3://{self._store.options.bucket}",
-            "MAREY_S3_ENDPOINT": self.server.endpoint,
+            "MAREY_S3_ENDPOINT": self.server.endpoint if self.proxy is None else f"127.0.0.1:{self.proxy.port}",
             "MAREY_S3_ACCESS_KEY": ACCESS_KEY,
             "MAREY_S3_SECRET_KEY": SECRET_KEY,
         }

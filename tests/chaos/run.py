@@ -20,21 +20,24 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from shared.errors import Unreachable
-from shared.jobs import Quotas, collect_garbage, create_key, create_tenant, transaction
+from shared.jobs import Quotas, cancel, collect_garbage, create_key, create_tenant, transaction
 from shared.jobs.schema import item, job, lease
 from shared.jobs.states import OPEN
+from shared.jobs.types import DEFAULT_TENANT
 from shared.runtime.faults import patiently
 from tests.chaos import ledger
 from tests.chaos.driver import Cluster
 from tests.chaos.faults import LIMIT, PATIENCE, SINCE_FAULT, Breaker, meanwhile, recoveries
 from tests.chaos.model import ITEM_SECONDS, QUEUE, REFERENCE
 from tests.chaos.places import Place
+from tests.chaos.silence import EventProbe, bar_of, missed
 from tests.chaos.studios import Operator, Quota, Studio
 from tests.chaos.webhooks import Flaky, webhooks_wrong
 from tests.servers.audit import audit as tables_audit
 from tests.servers.receiver import LOOPBACK
 from tests.support.live_api import write_bundle
 from tests.support.toy_jobs import audit as store_audit
+from tests.support.toy_jobs import submit_toys
 from tests.support.webhooks import KEY, new_webhook
 
 LOOK = 0.25
@@ -138,6 +141,11 @@ class Run:
             },
         }
         self.watch = Watch(cluster, self._start, self._hands)
+        # No worker serves its queue: it stays open, for events that a fault must not hold up.
+        self._probed = submit_toys(cluster.engine, ["probe"])
+        with transaction(cluster.engine) as conn:
+            key = create_key(conn, "probe", ["read", "operate"]).secret
+        self.probe = EventProbe(self.url, key, self._probed)
         self.breaker = Breaker(
             cluster,
             place,
@@ -149,6 +157,7 @@ class Run:
             start=self._start,
             longest=plan.longest,
             start_again=self.watch.start_again,
+            probe=self.probe,
         )
         self.seconds = 0.0
 
@@ -179,10 +188,11 @@ class Run:
         for name in self._start:
             if name.startswith("worker"):
                 self.cluster.wait_ready(name)
-        for thread in (*self.studios, self.watch, self.operator):
+        for thread in (*self.studios, self.watch, self.operator, self.probe):
             thread.start()
         try:
             self._break(deadline)
+            self._end_probe()
             self._wait(deadline, "every job is accepted", lambda: not any(s.is_alive() for s in self.studios))
             self._done.set()
             self.operator.join(60)
@@ -192,6 +202,7 @@ class Run:
             self._wait(deadline, "webhooks are told", self._told)
         finally:
             self._done.set()
+            self.probe.close()
             self.watch.close()
         self.seconds = time.monotonic() - began
 
@@ -208,6 +219,15 @@ class Run:
             with self._hands:
                 self.breaker.break_one(waiting.pop())
             time.sleep(self.plan.calm * self._draw.choice((0.1, 1.0)) * self._draw.uniform(0.5, 1.5))
+
+    def _end_probe(self) -> None:
+        self.probe.close()
+
+        def end() -> None:
+            with transaction(self.cluster.engine) as conn:
+                cancel(conn, DEFAULT_TENANT, self._probed)
+
+        patiently(end, seconds=LIMIT)
 
     def _nearly_done(self) -> bool:
         if any(studio.is_alive() for studio in self.studios):
@@ -280,6 +300,7 @@ class Run:
     def _accepted_wrong(self) -> list[str]:
         """What was answered with 202 is there once, whole; and nothing else is."""
         accepted = {UUID(job): count for studio in self.studios for job, count in studio.accepted.items()}
+        accepted[self._probed] = 1
         with transaction(self.cluster.engine) as conn:
             rows = conn.execute(sa.select(item.c.job_id, sa.func.count()).group_by(item.c.job_id)).all()
         found = {row[0]: row[1] for row in rows}
@@ -309,6 +330,7 @@ class Run:
                     "until": what,
                     "seconds": round(seconds, 2),
                     "alone": alone,
+                    "bar": bar_of(fault.kind, what),
                 }
                 if what in SINCE_FAULT and seconds > PATIENCE:
                     sample["meanwhile"] = meanwhile(self.cluster.engine, fault, seconds)
@@ -331,6 +353,7 @@ class Run:
             "webhook_messages": len(self.receiver.received),
             "webhook_events": len({request.id for request in self.receiver.received}),
             "samples": samples,
+            "bars_missed": missed(samples),
         }
 
 

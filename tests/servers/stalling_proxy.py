@@ -22,8 +22,9 @@ CHUNK = 64 * 1024
 class _Link:
     """One client connection and its connection to the server."""
 
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, task: asyncio.Task[None]) -> None:
         self.reader = reader
+        self.task = task
         self.writer = writer
         self.flowing = asyncio.Event()
         self.flowing.set()
@@ -86,9 +87,13 @@ class StallingProxy:
         """
         self._call(self._resume(old))
 
-    def cut(self) -> None:
-        """Close every open connection."""
-        self._call(self._cut())
+    def cut(self, *, silent: bool = False) -> None:
+        """Close every open connection, also towards the server.
+
+        Args:
+            silent: close only those that are silent.
+        """
+        self._call(self._cut(silent))
 
     def _call(self, work: Coroutine[object, object, T]) -> T:
         future: Future[T] = asyncio.run_coroutine_threadsafe(work, self._loop)
@@ -120,15 +125,17 @@ class StallingProxy:
             for link in self._links:
                 link.flowing.set()
 
-    async def _cut(self) -> None:
-        for link in list(self._links):
-            link.writer.close()
+    async def _cut(self, silent: bool = False) -> None:
+        tasks = [link.task for link in self._links if not (silent and link.flowing.is_set())]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)
-        link = _Link(reader, writer)
+        link = _Link(reader, writer, task)
         if self._stall_new:
             link.flowing.clear()
         self._links.add(link)

@@ -1,0 +1,75 @@
+"""Live streams whose Redis falls silent: frames go on from the next one, on new connections."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from uuid import UUID
+
+import pytest
+import redis
+import sqlalchemy as sa
+
+from shared.jobs import StreamState
+from shared.runtime.live.main import REDIS_SECONDS
+from shared.runtime.queue import SOCKET_SCHEME, redis_client
+from shared.streams.frames import Frame
+from tests.servers.stalling_proxy import StallingProxy
+from tests.support.live_loop import LiveWorker, Studio
+from workers.mogo.bundle import random_bundle
+from workers.mogo.generate import Generator
+from workers.mogo.live import LiveRoom
+
+STREAMS = 3
+FRAMES = 20
+"""A second of them."""
+
+
+@pytest.fixture(scope="module")
+def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
+    return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu", threads=1)
+
+
+@pytest.fixture
+def client(queue_url: str) -> Iterator[redis.Redis]:
+    """The test's own way to Redis."""
+    with redis_client(queue_url) as client:
+        yield client
+
+
+def goes_on(studio: Studio, streams: list[UUID]) -> float:
+    """Wait until every stream has shown another second; gives how long the slowest took."""
+    began, before = time.monotonic(), [studio.shown(stream) for stream in streams]
+    wanted = [shown + FRAMES for shown in before]
+    studio.until(
+        lambda: all(studio.shown(stream) >= count for stream, count in zip(streams, wanted, strict=True)), "frames"
+    )
+    return time.monotonic() - began
+
+
+def test_frames_go_on_after_redis_fell_silent(
+    engine: sa.Engine, client: redis.Redis, queue_url: str, generator: Generator
+) -> None:
+    studio = Studio(engine, client, generator.bundle.reference)
+    with (
+        StallingProxy(queue_url.removeprefix(SOCKET_SCHEME)) as proxy,
+        redis_client(
+            f"redis://127.0.0.1:{proxy.port}/0", timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS
+        ) as worker_client,
+    ):
+        worker = LiveWorker(engine, worker_client, lambda: LiveRoom(generator, STREAMS))
+        try:
+            streams = [studio.begin("a person walks", seed=seed) for seed in range(STREAMS)]
+            studio.until(lambda: all(studio.row(one).state is StreamState.LIVE for one in streams), "the streams")
+            goes_on(studio, streams)
+            assert proxy.stall() > 0
+            print(f"open connections silent: frames of a second after {goes_on(studio, streams):.1f} s")
+            proxy.stall(new=True)
+            time.sleep(4 * REDIS_SECONDS)  # leases are lost, and taken again
+            proxy.resume()
+            print(f"everything silent: frames of a second after {goes_on(studio, streams):.1f} s")
+            for stream in streams:
+                numbers = [frame.number for frame in studio.frames(stream) if isinstance(frame, Frame)]
+                assert numbers == list(range(len(numbers)))
+        finally:
+            worker.stop()
