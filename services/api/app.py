@@ -20,6 +20,7 @@ from services.api.bodies import BodyGuard, Patience
 from services.api.catalogue import Catalogue
 from services.api.connections import connection_options
 from services.api.context import CONNECTIONS, Context
+from services.api.docs.routes import router as docs_router
 from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from services.api.evaluations.routes import router as evaluations_router
 from services.api.guards import HostGuard, UpgradeGuard
@@ -54,7 +55,7 @@ from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
 ROUTERS = (
-    *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, models_router),
+    *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, docs_router, models_router),
     texts_router,
     *(evaluations_router, schedules_router, webhooks_router),
 )

@@ -17,6 +17,7 @@ BODY = """<body>
 <p>Text in, 3D human motion out.</p>
 <ul>
 <li><a href="live">/live</a>: type a prompt, watch the motion while it is made.</li>
+<li><a href="docs">/docs</a>: the API, to read and to try.</li>
 <li><a href="openapi.json">/openapi.json</a>: every route of the API, as OpenAPI 3.1.</li>
 <li><a href="readyz">/readyz</a>: whether all that the server needs is there.</li>
 </ul>

@@ -1,0 +1,72 @@
+"""`GET /docs`: every route of the API, to read and to try, by Swagger UI."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+from fastapi import APIRouter, Request, Response
+
+router = APIRouter()
+
+POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' data:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+"""Nothing from elsewhere, and no code or style within the page."""
+TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
+FILES = ("swagger-ui.css", "swagger-ui-bundle.js", "docs.css", "docs.js")
+
+
+@dataclass(frozen=True)
+class _File:
+    content: bytes
+    etag: str
+    media_type: str
+
+
+@cache
+def _file(name: str) -> _File:
+    content = (resources.files(__package__) / "assets" / name).read_bytes()
+    return _File(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', TYPES[name.rpartition(".")[2]])
+
+
+def _answer(request: Request, name: str) -> Response:
+    file = _file(name)
+    headers = {
+        "Cache-Control": "no-cache",
+        "Content-Security-Policy": POLICY,
+        "ETag": file.etag,
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+        "X-Frame-Options": "DENY",
+    }
+    if request.headers.get("if-none-match") == file.etag:
+        return Response(status_code=304, headers=headers)
+    return Response(file.content, headers=headers, media_type=file.media_type)
+
+
+@router.get("/docs", include_in_schema=False)
+def docs(request: Request) -> Response:
+    """The page. It wants no key; what is tried on it does."""
+    return _answer(request, "docs.html")
+
+
+def _serve(name: str) -> None:
+    @router.get(f"/docs/{name}", include_in_schema=False, name=f"docs_{name}")
+    def asset(request: Request) -> Response:
+        return _answer(request, name)
+
+
+for _name in FILES:
+    _serve(_name)
