@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import AsyncIterator, Sequence
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.concurrency import run_in_threadpool
-from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
 from services.api import problems
@@ -37,6 +36,7 @@ from services.api.origins import OriginGuard
 from services.api.process import prepare_process
 from services.api.queries import known_query
 from services.api.rates import Rates
+from services.api.reference import build_reference
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
@@ -72,6 +72,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         lifespan=lambda app: _lifespan(app, config),
         generate_unique_id_function=_operation_id,
         dependencies=[Depends(known_query)],
+        openapi_url=None,  # a route of `docs`, which refuses unknown queries as all do
         docs_url=None,
         redoc_url=None,
     )
@@ -85,7 +86,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         app.add_middleware(OriginGuard, origins=config.cors_origins)
     app.add_middleware(Trace)
     app.add_middleware(Measure)
-    app.openapi = lambda: openapi(app)
+    app.openapi = cache(lambda: build_reference(app, SCHEMAS, config.public_url))
     return app
 
 
@@ -127,37 +128,13 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
         engine.dispose()
 
 
-def openapi(app: FastAPI) -> dict[str, Any]:
-    """The OpenAPI 3.1 document, with the bodies that are read by hand; `docs/openapi.json` is a copy of it."""
-    if app.openapi_schema:
-        return app.openapi_schema
-    document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    schemas = document["components"]["schemas"]
-    for model in (*SCHEMAS, problems.ProblemBody):
-        schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
-        schemas.update(schema.pop("$defs", {}))
-        schemas[model.__name__] = schema
-    _answer_problems(document)
-    app.openapi_schema = document
-    return document
-
-
-def _answer_problems(document: dict[str, Any]) -> None:
-    """FastAPI documents its own 422; ours is a problem like the others."""
-    for path in document["paths"].values():
-        for operation in path.values():
-            operation["responses"].pop("422", None)
-    for name in ("HTTPValidationError", "ValidationError"):
-        document["components"]["schemas"].pop(name, None)
-
-
 def _operation_id(route: APIRoute) -> str:
     return route.name
 
 
 def write_openapi(path: Path) -> None:
     """Write the document that is checked in."""
-    document = openapi(create_app(Settings()))
+    document = create_app(Settings(public_url=None)).openapi()
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hmac
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import anyio
 from anyio import CapacityLimiter, to_thread
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from services.api.fields import PROMPT
 from services.api.problems import RESPONSES
 from services.text.limits import Ticket, WordLimit
 from shared.bundles import TextSpec, choose_bundle, named_by
@@ -38,7 +39,7 @@ class ParseBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    prompts: list[str] = Field(min_length=1, max_length=MAX_PROMPTS)
+    prompts: list[Annotated[str, Field(json_schema_extra=PROMPT)]] = Field(min_length=1, max_length=MAX_PROMPTS)
     model: str = Field("hgm3", pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use.")
 
 

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, Phase, settings
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import response_schema_conformance
 
-from services.api.app import create_app, openapi
+from services.api.app import create_app
 from shared.jobs import create_key, create_tenant, transaction
 from shared.runtime.embedded import EmbeddedServer
 from shared.settings import Settings
@@ -110,7 +110,7 @@ def ndjson(_context: object, value: object) -> bytes:
     return b"".join(json.dumps(line).encode() + b"\n" for line in (value if isinstance(value, list) else [value]))
 
 
-document = schemathesis.openapi.from_dict(openapi(create_app(Settings())))
+document = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 operations = document.exclude(path="/readyz")  # which answers 503 on purpose: no worker runs here
 QUICK = settings(
     max_examples=EXAMPLES,

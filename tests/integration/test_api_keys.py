@@ -10,7 +10,7 @@ import httpx2
 import pytest
 from fastapi.routing import APIRoute
 
-from services.api.app import ROUTERS, create_app, openapi
+from services.api.app import ROUTERS, create_app
 from shared.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi
@@ -36,7 +36,7 @@ OTHERS = {
 
 def documented() -> dict[str, str | None]:
     """By operation, the scope that the OpenAPI document says it wants."""
-    paths = openapi(create_app(Settings()))["paths"]
+    paths = create_app(Settings()).openapi()["paths"]
     return {
         f"{method.upper()} {path}": security[0]["HTTPBearer"][0] if (security := operation.get("security")) else None
         for path, operations in paths.items()

@@ -1,4 +1,4 @@
-"""`GET /docs`: every route of the API, to read and to try, by Swagger UI."""
+"""`GET /docs` and `/openapi.json`: every route of the API, to read and to try, by Swagger UI."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cache
 from importlib import resources
 
 from fastapi import APIRouter, Request, Response
+from fastapi.responses import JSONResponse
 
 router = APIRouter()
 
@@ -60,6 +61,12 @@ def _answer(request: Request, name: str) -> Response:
 def docs(request: Request) -> Response:
     """The page. It wants no key; what is tried on it does."""
     return _answer(request, "docs.html")
+
+
+@router.get("/openapi.json", include_in_schema=False)
+def openapi(request: Request) -> JSONResponse:
+    """The same as JSON."""
+    return JSONResponse(request.app.openapi())
 
 
 def _serve(name: str) -> None:

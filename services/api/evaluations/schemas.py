@@ -9,6 +9,7 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from services.api.fields import EXPECTED, PROMPT, SAMPLING
 from services.api.files import FileView
 from services.api.schemas import MAX_NAME, Comment, FreeText, Name, View
 from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
@@ -24,9 +25,13 @@ class EvaluationPromptBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    prompt: str = Field(min_length=1, description="What the person does, in English, at most 200 words.")
+    prompt: str = Field(description="What the person does, in English, at most 200 words.", json_schema_extra=PROMPT)
     seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
-    expected: str | None = Field(None, description='What the motion must show: "walk", "walk straight then wave left".')
+    expected: str | None = Field(
+        None,
+        description='What the motion must show: "walk", "walk straight then wave left".',
+        json_schema_extra=EXPECTED,
+    )
 
 
 class EvaluationFields(BaseModel):
@@ -44,7 +49,9 @@ class EvaluationFields(BaseModel):
     source: Annotated[str, Field(min_length=1, max_length=MAX_NAME), FreeText()] | None = Field(
         None, description="What the prompts are called in reports."
     )
-    settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
+    settings: dict[str, Any] | None = Field(
+        None, description="Sampling settings, such as `guidance`.", json_schema_extra=SAMPLING
+    )
     repeats: int = Field(1, ge=1, le=MAX_VARIANTS, description="Motions of each prompt.")
     seed: int = Field(
         0, ge=0, le=MAX_SEED, description="Of the first motion; motion k uses seed + k: equal runs are comparable."

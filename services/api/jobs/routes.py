@@ -17,6 +17,7 @@ from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
 from services.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
 from services.api.jobs.schemas import (
+    MAX_PRIORITY,
     CheckedView,
     ErasureView,
     EventsView,
@@ -69,7 +70,7 @@ async def submit_job(
     key: Submitter,
     name: Annotated[schemas.Name | None, Query()] = None,
     comment: Annotated[schemas.Comment | None, Query()] = None,
-    priority: Annotated[int, Query(ge=-1000, le=1000)] = 0,
+    priority: Annotated[int, Query(ge=-MAX_PRIORITY, le=MAX_PRIORITY)] = 0,
     fail_early: Annotated[float | None, Query(ge=0, le=1)] = None,
     keep_days: Annotated[int | None, Query(ge=1, le=jobs.MAX_KEEP_DAYS)] = None,
     validate_only: Annotated[bool, Query(description="Check everything, write nothing.")] = False,

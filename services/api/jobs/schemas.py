@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Any
 from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from services.api.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
 from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
 from services.api.problems import QuotaBody
 from services.api.schemas import Comment, Name, View
-from shared import items
-from shared.characters import LINE_PATTERN
-from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAG_LENGTH, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
 MAX_PRIORITY = 1000
-NAME_PATTERN = r"^[^/\\" + LINE_PATTERN.removeprefix("^[^")
-"""Of names of motions: one line without separators."""
 
 
 class NewItemBody(BaseModel):
@@ -27,18 +24,20 @@ class NewItemBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    prompt: str = Field(min_length=1, description="What the person does, in English, at most 200 words.")
-    name: Annotated[str, Field(min_length=1, max_length=items.MAX_NAME, pattern=NAME_PATTERN)] | None = Field(
-        None, description="Of the motion, in any script; clients derive its file name from it."
+    prompt: str = Field(description="What the person does, in English, at most 200 words.", json_schema_extra=PROMPT)
+    name: str | None = Field(
+        None,
+        description="Of the motion, in any script; clients derive its file name from it.",
+        json_schema_extra=ITEM_NAME,
     )
     seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Of variant 0; variant k uses seed + k.")
     variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
-    model: str | None = Field(None, description="Model, bundle or exact bundle.")
-    tags: list[Annotated[str, Field(min_length=1, max_length=MAX_TAG_LENGTH, pattern=LINE_PATTERN)]] | None = Field(
-        None, max_length=MAX_TAGS
+    model: str | None = Field(None, description="Model, bundle or exact bundle.", json_schema_extra=ITEM_MODEL)
+    tags: list[str] | None = Field(None, max_length=MAX_TAGS, json_schema_extra=TAGS)
+    settings: dict[str, Any] | None = Field(
+        None, description="Sampling settings, such as `guidance`.", json_schema_extra=SAMPLING
     )
-    settings: dict[str, Any] | None = Field(None, description="Sampling settings, such as `guidance`.")
 
 
 class JobFields(BaseModel):

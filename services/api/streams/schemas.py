@@ -11,6 +11,7 @@ from uuid import UUID
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from services.api.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from services.api.jobs.schemas import ErrorView
 from services.api.problems import ProblemBody
 from services.api.schemas import View
@@ -33,9 +34,19 @@ class NewStreamBody(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    prompt: str = Field(min_length=1, description="What the person does first, in English, at most 200 words.")
-    name: str | None = Field(None, description="File name of the clip, without its ending.")
-    model: str = Field(MODEL, description="Model, bundle or exact bundle that can make motion frame by frame.")
+    prompt: str = Field(
+        min_length=1,
+        description="What the person does first, in English, at most 200 words.",
+        json_schema_extra=PROMPT,
+    )
+    name: str | None = Field(
+        None, description="File name of the clip, without its ending.", json_schema_extra=ITEM_NAME
+    )
+    model: str = Field(
+        MODEL,
+        description="Model, bundle or exact bundle that can make motion frame by frame.",
+        json_schema_extra=ITEM_MODEL,
+    )
     seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Drawn when not given.")
     seconds: float = Field(MAX_SECONDS, ge=MIN_SECONDS, le=MAX_SECONDS, description="After which it ends by itself.")
 

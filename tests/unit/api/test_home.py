@@ -29,6 +29,6 @@ def test_the_page_wants_no_key_and_loads_nothing(client: TestClient) -> None:
 def test_what_it_leads_to_is_there(client: TestClient) -> None:
     links = re.findall(r'<a href="([^"]+)"', client.get("/").text)
     assert {"live", "openapi.json"} <= set(links)
-    known = {"/live", "/openapi.json", *client.get("/openapi.json").json()["paths"]}
+    known = {"/live", "/docs", "/openapi.json", *client.get("/openapi.json").json()["paths"]}
     assert {f"/{link}" for link in links} <= known
-    assert client.get("/live").status_code == 200
+    assert client.get("/live").status_code == client.get("/docs").status_code == 200
