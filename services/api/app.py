@@ -76,6 +76,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         docs_url=None,
         redoc_url=None,
     )
+    app.state.catalogue = Catalogue(config)
     problems.install(app)
     for router in routers:
         app.include_router(router)
@@ -111,7 +112,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     if redis_url is not None:
         hub = Hub(redis_url.get_secret_value(), tenant=config.sockets_per_tenant, key=config.sockets_per_key)
     texts = TextService(config)
-    shared = Context(config, engine, open_store(config), Catalogue(config), tailer, Rates(config), texts, hub)
+    shared = Context(config, engine, open_store(config), app.state.catalogue, tailer, Rates(config), texts, hub)
     app.state.context = shared
     tailer.start()
     shared.readiness.start()

@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from typing import Annotated, Any
 
-from fastapi import Depends, Header, Request, Response
+from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
 from services.api.context import Context
@@ -46,6 +46,9 @@ class Part:
     byte_range: Annotated[str | None, Header(alias="Range")] = None
     if_range: Annotated[str | None, Header(alias="If-Range")] = None
     if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None
+    redirect: Annotated[
+        bool, Query(description="False = this server sends the content, also where it could redirect to a bucket.")
+    ] = True
 
 
 AskedPart = Annotated[Part, Depends()]
@@ -70,8 +73,7 @@ def file_response(shared: Context, tenant: str, stem: str, file: FileView, part:
     if part.request.method == "HEAD":  # also of a bucket, whose URLs are signed for GET alone
         return Response(headers={**headers, "Content-Length": str(file.size)}, media_type=file.media_type)
     object_key = asset_key(tenant, file.sha256)
-    url = shared.store.presign(object_key, filename=name, media_type=file.media_type)
-    if url is not None:
+    if part.redirect and (url := shared.store.presign(object_key, filename=name, media_type=file.media_type)):
         return RedirectResponse(url, status_code=307, headers=_valid_for(PRESIGN_SECONDS))
     wanted = None if part.if_range not in (None, etag) else parse_range(part.byte_range, file.size)
     return _content(shared.store, object_key, file, wanted, headers)

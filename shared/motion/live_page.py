@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 from shared.motion.body import dress
 from shared.motion.pages import asset, body_document, code_hashes, fill, script_json, whole_page
@@ -54,10 +54,15 @@ class LivePage:
         )
 
 
-@cache
-def live_page() -> LivePage:
-    """The page, put together once a process."""
+@lru_cache(maxsize=4)
+def live_page(examples: tuple[str, ...] = ()) -> LivePage:
+    """The page, put together once a process.
+
+    Args:
+        examples: prompts that it offers.
+    """
     parts = {
+        "%EXAMPLES%": script_json(examples),
         "%BODIES%": script_json([{"names": s.joint_names, **body_document(s, dress(s))} for s in SKELETONS]),
         "%LICENCE%": asset("three.LICENSE.txt"),
         "%THREE%": asset("three.min.js"),

@@ -326,3 +326,43 @@ def test_who_is_far_behind_leaps_to_the_newest(tab):
     seen, end = played(tab, "(p) => (p === 300 ? 400 : p % 3 === 0)")
     assert np.diff(seen).max() > 300
     assert end["buffered"] == pytest.approx(0.25, abs=0.06)
+
+
+# ---------------------------------------------------------------- examples, and the finished clip
+def test_an_example_starts_a_stream_and_another_steers_it(tab, server):
+    examples = tab.ask("[...document.querySelectorAll('#examples button')].map((each) => each.textContent)")
+    assert len(examples) >= 3
+    assert tab.ask("document.getElementById('prompt').placeholder") == "describe a motion"
+    tab.type(KEY, "key")
+    tab.ask("document.querySelectorAll('#examples button')[0].click()")
+    tab.wait("Number(document.body.dataset.frames) >= 5")
+    tab.ask("document.querySelectorAll('#examples button')[1].click()")
+    tab.wait("document.body.dataset.prompt === '1'")
+    assert server.bodies == [{"prompt": examples[0]}]
+    assert server.heard == [{"kind": "steer", "prompt": examples[1]}]
+
+
+def test_the_finished_clip_is_downloaded_with_the_key_in_a_header(tab, server):
+    begin(tab)
+    assert tab.ask("document.getElementById('clip').hidden")
+    tab.click("stop")
+    tab.wait("document.querySelectorAll('#clip button').length === 2")
+    assert server.asked == 2  # it was not made yet when it was asked for first
+    tab.ask("""(() => {
+      const create = document.createElement.bind(document);
+      document.createElement = (tag) => {
+        const made = create(tag);
+        if (tag === 'a') made.click = async () => {
+          window.saved = [made.download, await (await fetch(made.href)).text()];
+        };
+        return made;
+      };
+      URL.createObjectURL = (blob) => { window.blob = blob; return 'blob:x'; };
+      const fetched = fetch;
+      window.fetch = async (url, options) => (url === 'blob:x' ? new Response(window.blob) : fetched(url, options));
+    })()""")
+    tab.ask("document.querySelector('#clip [data-format=bvh]').click()")
+    tab.wait("window.saved")
+    assert tab.ask("window.saved") == ["歩く.bvh", "content of bvh"]
+    begin(tab, "another one")
+    assert tab.ask("document.getElementById('clip').hidden")

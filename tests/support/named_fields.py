@@ -27,8 +27,8 @@ def names_the_field(_context: CheckContext, response: Response, case: Case) -> N
     for each in told:
         field, line = each.get("field"), each.get("line")
         named = line is not None if field is None else _leads(field.lower(), known)
-        if response.status_code == 409:  # about what stands there: its kind and id
-            named = named or bool(field)
+        if response.status_code == 409 or problem["type"].endswith(":idempotency-mismatch"):
+            named = named or bool(field)  # about what stands there: its kind and id
         assert named, f"{field!r} (line {line}) is no field of the request: {problem}"
 
 

@@ -17,12 +17,15 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI, Request, WebSocket
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from starlette.websockets import WebSocketDisconnect
 
+from services.api.catalogue import Catalogue
 from services.api.live.routes import router
+from shared.disposition import attachment
 from shared.motion.clip import MotionClip
 from shared.motion.skeleton import HUMANML3D, Skeleton
+from shared.settings import Settings
 from shared.streams.frames import Frame, encode_frame
 from tests.support.walker import walker
 
@@ -89,6 +92,7 @@ class WalkingServer:
         hold: streams keep waiting.
         skip: frames that are left out, with a gap, before the next one.
         skeleton: that streams to come tell of; they walk as HumanML3D's.
+        asked: how often the motions of the clip's job were listed.
     """
 
     def __init__(self) -> None:
@@ -98,6 +102,7 @@ class WalkingServer:
         self.full, self.hold, self.burst, self.skip = False, False, 1, 0
         self.skeleton = HUMANML3D
         self.url = ""
+        self.asked = 0
         self._walks: dict[str, Walk] = {}
         self._sockets: set[WebSocket] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -120,7 +125,10 @@ class WalkingServer:
     def app(self) -> FastAPI:
         """The page, the routes and the socket."""
         app = FastAPI(openapi_url=None)
+        app.state.catalogue = Catalogue(Settings())
         app.include_router(router)
+        app.add_api_route("/v1/jobs/job-of-the-clip/motions", self._motions, methods=["GET"])
+        app.add_api_route("/v1/motions/motion-of-the-clip/files/{format}", self._file, methods=["GET"])
         app.add_api_route("/v1/streams", self._begin, methods=["POST"])
         app.add_api_route("/v1/streams/{stream}", self._show, methods=["GET"])
         app.add_api_websocket_route("/v1/streams/{stream}", self._watch)
@@ -141,6 +149,21 @@ class WalkingServer:
         walk.prompts.append({"number": 0, "frame": 0, "prompt": walk.prompt})
         self._walks[walk.id] = walk
         return JSONResponse(walk.view(), 201)
+
+    async def _motions(self, request: Request) -> JSONResponse:
+        """The clip's motion; it is not there when it is asked for first."""
+        self.asked += 1
+        if request.headers.get("authorization") != f"Bearer {KEY}":
+            return _problem(401, "this API key is unknown or revoked", "")
+        files = [{"format": "npz"}, {"format": "bvh"}]
+        motion = [{"id": "motion-of-the-clip", "files": files}] if self.asked > 1 else []
+        return JSONResponse({"items": motion, "next": None})
+
+    async def _file(self, request: Request, format: str) -> Response:
+        if request.headers.get("authorization") != f"Bearer {KEY}":
+            return _problem(401, "this API key is unknown or revoked", "")
+        header = {"Content-Disposition": attachment(f"歩く.{format}")}
+        return Response(f"content of {format}".encode(), headers=header)
 
     async def _show(self, stream: str) -> JSONResponse:
         walk = self._walks.get(stream)

@@ -83,10 +83,10 @@ def steers(
         some = pairs[start : start + SESSIONS]
         room = LiveRoom(generator, len(some))
         names = [room.start(texts[first.text], start + k) for k, (first, _) in enumerate(some)]
-        _played(room, names, round(BEFORE * fps))
+        played(room, names, round(BEFORE * fps))
         for name, (_, second) in zip(names, some, strict=True):
             room.steer(name, texts[second.text])
-        joints = _played(room, names, round(AFTER * fps))
+        joints = played(room, names, round(AFTER * fps))
         for k, (first, second) in enumerate(some):
             verdict = steered(joints[k], fps, second)
             found.append(Streamed((first.text, second.text), start + k, verdict.passed, verdict.reason))
@@ -101,12 +101,12 @@ def walks(
     chosen = [walking[k % len(walking)] for k in range(count)]
     room = LiveRoom(generator, count)
     names = [room.start(texts[p.text], seed) for seed, p in enumerate(chosen)]
-    joints = _played(room, names, LONG)[:, -SEEN:]
+    joints = played(room, names, LONG)[:, -SEEN:]
     verdicts = [judge(joints[k], generator.limits.fps, p.expected) for k, p in enumerate(chosen)]
     return [Streamed((p.text,), k, v.passed, v.reason) for k, (p, v) in enumerate(zip(chosen, verdicts, strict=True))]
 
 
-def _played(room: LiveRoom, names: Sequence[int], frames: int) -> Array:
+def played(room: LiveRoom, names: Sequence[int], frames: int) -> Array:
     """Joints (sessions, frames, J, 3) of the next frames of all sessions."""
     steps = [room.step() for _ in range(frames)]
     return np.stack([_joints(room, [step[name].frame for step in steps]) for name in names])

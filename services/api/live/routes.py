@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
 from fastapi import APIRouter, Request, Response
 
+from services.api.catalogue import Catalogue
+from services.api.streams.schemas import MODEL
+from shared.errors import MareyError
 from shared.motion.live_page import live_page
 
 router = APIRouter()
+
+MOST_EXAMPLES = 8
+
+
+@cache
+def _measured() -> dict[str, list[dict[str, Any]]]:
+    return json.loads((resources.files(__package__) / "examples.json").read_text(encoding="utf-8"))
+
+
+def examples(catalogue: Catalogue) -> tuple[str, ...]:
+    """Prompts that this server's model was measured to obey while it streams; none for a bundle without measurements.
+
+    `python -m workers.mogo.examples` measures them.
+    """
+    try:
+        reference = catalogue.offer(MODEL).bundle.reference
+    except MareyError:
+        return ()  # no such model here: the page says so when a stream is begun
+    return tuple(row["prompt"] for row in _measured().get(reference, [])[:MOST_EXAMPLES])
 
 
 @router.get("/live", include_in_schema=False)
 def live(request: Request) -> Response:
     """The page itself holds nothing that is anybody's: it asks for a key, and the API asks for that."""
-    page = live_page()
+    page = live_page(examples(request.app.state.catalogue))
     headers = {
         "Cache-Control": "no-cache",
         "Content-Security-Policy": page.policy(request.headers.get("host", "")),

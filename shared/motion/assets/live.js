@@ -7,12 +7,14 @@
   const clock = () => performance.now() / 1000;
   const shown = document.body.dataset; // what is going on, for whoever looks from outside
   const OPEN = ["starting", "connecting", "reconnecting", "waiting", "live", "paused"];
+  const CLIP_SECONDS = 120; // for which the page waits for the clip of a stream that has ended
   const REFUSED = {
     4401: "The API key was not accepted.",
     4403: "The API key may not do this.",
     4404: "There is no such stream.",
   };
 
+  const SUGGESTED = JSON.parse($("suggested").textContent); // prompts that the model was measured to obey
   let view;
   try {
     view = new MareyView.View(JSON.parse($("bodies").textContent));
@@ -44,7 +46,8 @@
     $("pause").disabled = state !== "live" && state !== "paused";
     $("stop").disabled = !open || state === "starting";
     $("options").hidden = open;
-    $("prompt").placeholder = open ? "and now: a person jumps" : "a person walks in a circle";
+    $("examples").hidden = !SUGGESTED.length || state === "starting";
+    $("clip").hidden = open || !$("clip").childElementCount;
     resize();
     tell();
   }
@@ -139,6 +142,7 @@
     for (const field of ["seconds", "seed"]) if ($(field).value !== "") body[field] = Number($(field).value);
     const asked = clock();
     say("");
+    $("clip").replaceChildren();
     enter("starting");
     const stream = await ask("POST", "v1/streams", key, body);
     if (stream === null) return enter("idle");
@@ -224,6 +228,60 @@
     const cause = sentence(stream.error?.message ?? stream.reason) + sentence(stream.error?.hint);
     if (stream.state === "failed") say(`Failed after ${length}${cause}`, "problem");
     else say(`Ended after ${length}${cause}${stream.job ? `Its clip is made by job ${stream.job}.` : ""}`);
+    if (stream.job) offer(stream.job, session.link.key);
+  }
+
+  // ---------------------------------------------------------------- the finished clip
+  // Its files are made within seconds of the end, and need the key in a header: a plain link would be refused.
+  async function offer(job, key) {
+    const current = session;
+    const deadline = clock() + CLIP_SECONDS;
+    for (let wait = 0.5; clock() < deadline && session === current; wait = Math.min(2 * wait, 5)) {
+      const motions = await load(`v1/jobs/${encodeURIComponent(job)}/motions?limit=1`, key, (answer) => answer.json()).catch(() => null);
+      const motion = motions?.items[0];
+      if (motion && session === current) {
+        const buttons = motion.files.map((file) => {
+          const button = document.createElement("button");
+          Object.assign(button, { type: "button", textContent: `Download ${file.format}` });
+          button.dataset.format = file.format;
+          button.onclick = () => download(motion.id, file.format, key, button);
+          return button;
+        });
+        $("clip").replaceChildren(...buttons);
+        return enter(shown.state);
+      }
+      await new Promise((resolve) => setTimeout(resolve, 1000 * wait));
+    }
+  }
+
+  async function load(path, key, read) {
+    const response = await fetch(address(path), { headers: { Authorization: `Bearer ${key}` } });
+    if (!response.ok) throw Object.assign(new Error("refused"), { response });
+    return read(response);
+  }
+
+  async function download(motion, format, key, button) {
+    button.disabled = true;
+    try {
+      const { blob, name } = await load(`v1/motions/${encodeURIComponent(motion)}/files/${format}?redirect=false`, key, async (response) => ({
+        blob: await response.blob(),
+        name: filename(response.headers.get("Content-Disposition")) ?? `${motion}.${format}`,
+      }));
+      const link = document.createElement("a");
+      Object.assign(link, { href: URL.createObjectURL(blob), download: name });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+    } catch (error) {
+      if (error.response) await explain(error.response);
+      else say("The file cannot be loaded: the server does not answer.", "problem");
+    }
+    button.disabled = false;
+  }
+
+  // The name in `attachment; filename="…"; filename*=UTF-8''…`.
+  function filename(header) {
+    const encoded = header?.match(/filename\*=UTF-8''([^;]+)/i)?.[1];
+    return encoded ? decodeURIComponent(encoded) : header?.match(/filename="([^"]+)"/i)?.[1];
   }
 
   function lost(reason, seconds) {
@@ -301,6 +359,17 @@
     $("keys").hidden = !$("keys").hidden;
     $("help").setAttribute("aria-expanded", String(!$("keys").hidden));
   };
+  $("examples").replaceChildren(
+    ...SUGGESTED.map((prompt) => {
+      const button = document.createElement("button");
+      Object.assign(button, { type: "button", textContent: prompt });
+      button.onclick = () => {
+        $("prompt").value = prompt;
+        $("form").requestSubmit();
+      };
+      return button;
+    }),
+  );
   $("pause").onclick = pause;
   $("stop").onclick = stop;
   $("form").onsubmit = (event) => {

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import json
+import re
+from pathlib import Path
+
 import pytest
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-from services.api.live.routes import router
+import services.api.live
+from services.api.catalogue import Catalogue
+from services.api.live.routes import MOST_EXAMPLES, router
+from shared.bundles import find_bundle
 from shared.motion.live_page import live_page
+from shared.settings import Settings
+from workers.mogo.examples import LEAST, SETS, act_of
+from workers.training.checks.prompts import evaluation_prompts
 
 
 @pytest.fixture(scope="module")
-def client() -> TestClient:
+def client(tmp_path_factory: pytest.TempPathFactory) -> TestClient:
+    models = tmp_path_factory.mktemp("models")
     app = FastAPI()
     app.include_router(router)
+    app.state.catalogue = Catalogue(Settings(models=models))
     return TestClient(app, base_url="http://studio.example:8000")
 
 
@@ -38,3 +50,28 @@ def test_a_browser_that_has_the_page_does_not_get_it_again(client: TestClient):
 
 def test_the_page_is_no_part_of_the_api_document(client: TestClient):
     assert client.get("/openapi.json").json()["paths"] == {}
+
+
+def test_examples_are_prompts_that_the_bundle_was_measured_to_obey() -> None:
+    app = FastAPI()
+    app.include_router(router)
+    app.state.catalogue = Catalogue(Settings())
+    page = TestClient(app).get("/live").text
+    found = re.search(r'<script type="application/json" id="suggested">(.*?)</script>', page)
+    assert found is not None
+    offered = json.loads(found[1])
+    measured = json.loads((Path(services.api.live.__file__).parent / "examples.json").read_text())
+    rows = {row["prompt"]: row for row in measured[find_bundle("mogo-starter").reference]}
+    assert 3 <= len(offered) <= MOST_EXAMPLES
+    for prompt in offered:
+        row = rows[prompt]
+        assert row["obeyed"] >= LEAST * row["sessions"]
+        assert row["sessions"] >= 6
+    prompts = {each.text: each for which in SETS for each in evaluation_prompts(which)}
+    acts = [act_of(prompts[prompt]) for prompt in offered]
+    assert len(set(acts)) == len(acts)
+    assert not any(prompts[prompt].separate for prompt in offered)
+
+
+def test_a_bundle_that_was_not_measured_has_no_examples(client: TestClient) -> None:
+    assert '<script type="application/json" id="suggested">[]</script>' in client.get("/live").text
