@@ -51,8 +51,13 @@ def test_a_file_is_fetched_from_a_signed_url_without_the_key(api: LiveApi, tmp_p
             answer = http.get(path)
             assert answer.status_code == 307
             assert http.head(path).headers["content-length"] == str(len(content))
+            sent = http.get(path, params={"redirect": "false"}, headers={"Range": "bytes=0-9"})
+            assert (sent.status_code, sent.content) == (206, content[:10])
         signed = answer.headers["location"]
-        assert httpx2.get(signed).content == content
+        fetched = httpx2.get(signed)
+        assert fetched.content == content
+        assert fetched.headers["content-disposition"] == sent.headers["content-disposition"]
+        assert f"00000_a-person-walks_{motion['seed']}.npz" in sent.headers["content-disposition"]
         assert httpx2.get(signed[:-4] + "0000").status_code == 403
         digest = next(file for file in motion["files"] if file["format"] == "npz")
         target = Download(path, digest["sha256"], digest["size"], tmp_path / "x.npz")
