@@ -105,7 +105,7 @@ def test_ranges_are_those_of_the_checks(document: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("field", "schema", "values"),
     [
-        ("name", ITEM_NAME, ["greeting", "a (2)", ".hidden", "a/b", "-x"]),
+        ("name", ITEM_NAME, ["greeting", "a (2)", "歩く", "a/b", "a\\b", "a\nb", "a\u202eb"]),
         ("model", ITEM_MODEL, ["hgm3", "hgm3-starter@0123456789ab", "../hgm3", "hgm3@x"]),
     ],
 )
