@@ -77,7 +77,7 @@ def html_gallery(
                 "id": card.id,
                 "prompt": one_line(card.prompt),
                 "facts": one_line(card.facts),
-                "tags": list(card.tags),
+                "tags": [one_line(tag) for tag in card.tags],
                 "said": one_line(card.said),
             }
             for card in cards
