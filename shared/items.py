@@ -274,7 +274,9 @@ def checked(
 
 def _name(value: object) -> str:
     text = check_text(_text(value))
-    text = re.sub(r"[^\S ]", " ", unicodedata.normalize("NFC", text)).strip()
+    if not text.isascii():
+        text = re.sub(r"[^\S ]", " ", unicodedata.normalize("NFC", text))
+    text = text.strip()
     if len(text) > MAX_NAME:
         raise InvalidInput(f"has {len(text)} characters; file names take up to {MAX_NAME} of it")
     if RESERVED.fullmatch(text):
@@ -324,7 +326,8 @@ def _tags(value: object) -> tuple[str, ...]:
 
 def _tag(value: object) -> str:
     tag = _text(value)
-    check_text(tag, subject=f"{tag[:80]!r} is not a tag: it")
+    if not tag.isprintable():
+        check_text(tag, subject=f"{tag[:80]!r} is not a tag: it")
     if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not is_printable(tag):
         raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
     return tag
