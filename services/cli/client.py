@@ -39,7 +39,7 @@ from shared.tls import trusting_context
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0
 """Seconds between attempts, doubling with jitter: five attempts give a restarting server about five seconds."""
-BUSY_SECONDS = 60.0
+BUSY_SECONDS = 180.0
 """Waited in all, for a server that answers but has no room for the request now; at least `ATTEMPTS` are made."""
 SUBMIT_BUSY_SECONDS = 900.0
 """The same for a submit: large ones are read one after the other."""
