@@ -11,7 +11,6 @@ from pathlib import Path
 
 import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
-from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 
 from services.api import problems
@@ -103,10 +102,8 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     if config.webhook_key is not None:
         Vault.of(config)
     url = config.database_url.get_secret_value()
-    listen_url = config.notifications_url or url
-    await run_in_threadpool(check_listening, listen_url)
     engine = create_engine(url, pool_size=CONNECTIONS // 2, max_overflow=CONNECTIONS // 2)
-    tailer = Tailer(engine, listen_url, message)
+    tailer = Tailer(engine, config.notifications_url or url, message)
     redis_url = config.streams_url or config.queue_url
     hub = None
     if redis_url is not None:
@@ -140,7 +137,13 @@ def write_openapi(path: Path) -> None:
 
 
 def serve() -> None:
-    """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where."""
+    """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where.
+
+    Raises:
+        InvalidInput: the database passes no notifications on.
+    """
     config = settings()
     options = prepare_process("api", config)
+    if config.notifications_url is not None:
+        check_listening(config.notifications_url)
     uvicorn.run(create_app(config), host=config.host, port=config.port, **options, **connection_options(config))

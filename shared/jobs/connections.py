@@ -2,7 +2,7 @@
 
 A firewall that drops a flow, a hung load balancer or a stopped server leave a connection open: the client's kernel may
 even see every byte acknowledged, so neither keepalives nor `tcp_user_timeout` find the fault. Only a deadline on the
-answer does. docs/decisions/0013-deadlines.md has the reasons.
+answer does. docs/decisions/0014-deadlines.md has the reasons.
 """
 
 from __future__ import annotations

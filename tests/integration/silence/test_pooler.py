@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -65,6 +68,23 @@ def test_listening_through_a_transaction_pooler_is_refused(pooled: str) -> None:
     assert refused.value.where == "MAREY_LISTEN_URL"
     with pytest.raises(InvalidInput, match="transaction pooler"):
         check_listening(pooled)
+
+
+def test_api_and_scheduler_refuse_to_start_behind_a_transaction_pooler(
+    pooled: str, queue_url: str, short_home: Path
+) -> None:
+    environment = {**os.environ, "MAREY_DATABASE_URL": pooled, "MAREY_QUEUE_URL": queue_url}
+    for command in ("api", "scheduler"):
+        ended = subprocess.run(
+            [sys.executable, "-m", "services.cli", command],
+            env={**environment, "MAREY_HOME": str(short_home / "home")},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+        )
+        assert ended.returncode == InvalidInput.exit_code
+        assert "MAREY_LISTEN_URL" in ended.stderr
 
 
 def test_listening_through_a_session_pooler_works(short_home: Path, database_url: str, engine: sa.Engine) -> None:
