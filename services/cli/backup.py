@@ -73,8 +73,7 @@ def export_tenant(
     items = 0
     files: dict[str, int] = {}
     for job in jobs:
-        with transaction(engine, BACKUP) as conn:
-            conn.execute(sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
+        with transaction(engine, BACKUP, snapshot=True) as conn:
             backup = back_up(conn, tenant, job)
         data = b"".join(_lines(backup))
         for sha256, asset in backup.assets().items():

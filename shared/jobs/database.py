@@ -23,6 +23,7 @@ POOL_SECONDS = 10
 """A thread waits so long for another to give a connection back."""
 GROUP, DEADLINE = "marey_group", "marey_deadline"
 """Execution options of an engine: its connection group, and the limits its sessions are set up with."""
+SNAPSHOT = sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
 SET_LOCAL = sa.text("""
     SELECT set_config('statement_timeout', :statement, true),
         set_config('idle_in_transaction_session_timeout', :idle, true)
@@ -66,11 +67,14 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
 
 
 @contextmanager
-def transaction(engine: sa.Engine, deadline: Deadline | None = None) -> Generator[sa.Connection]:
+def transaction(
+    engine: sa.Engine, deadline: Deadline | None = None, *, snapshot: bool = False
+) -> Generator[sa.Connection]:
     """One transaction: commits at the end, rolls back on an exception.
 
     Args:
         deadline: the kind of its calls (`shared.jobs.deadlines`); None = the engine's.
+        snapshot: every statement sees the database as it was at the first one, and none may write.
 
     Raises:
         Unreachable: the database does not answer, or went away in the middle (nothing is written then, unless it went
@@ -83,6 +87,8 @@ def transaction(engine: sa.Engine, deadline: Deadline | None = None) -> Generato
         with group.turn():
             connection = engine.connect()
         with connection, connection.begin():
+            if snapshot:
+                connection.execute(SNAPSHOT)  # Postgres takes it before any other statement alone
             _limit(connection, chosen)
             yield connection
     except (exc.OperationalError, exc.TimeoutError, psycopg.OperationalError) as error:
