@@ -11,7 +11,7 @@ import sqlalchemy as sa
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.tenant_types import Actor, AuditRow
 from shared.jobs.types import Page
 
@@ -54,9 +54,8 @@ def list_audit(
         verb: "job.cancel", or a noun: "job".
     """
     table = schema.audit_event.c
-    query = _rows()
-    if tenant is not None:
-        query = query.where(table.tenant_id == tenant)
+    ours = sa.true() if tenant is None else table.tenant_id == tenant
+    query, order = _rows().where(ours), Order(table.at, table.id)
     if key is not None:
         query = query.where(table.key_id == key)
     if verb is not None:
@@ -64,9 +63,9 @@ def list_audit(
     if since is not None:
         query = query.where(table.at >= since)
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([AuditRow(**row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([AuditRow(**row) for row in rows], limit, lambda row: mark_of(row.at, row.id))
 
 
 def _rows() -> sa.Select[*tuple[Any, ...]]:

@@ -144,7 +144,9 @@ class JobBackup(_Record):
 def ended_jobs(conn: sa.Connection, tenant: str) -> tuple[list[UUID], int]:
     """Jobs of a tenant that can be backed up, the oldest first, and how many have not ended yet."""
     table = schema.job.c
-    rows = conn.execute(sa.select(table.id, table.state).where(table.tenant_id == tenant).order_by(table.id)).all()
+    rows = conn.execute(
+        sa.select(table.id, table.state).where(table.tenant_id == tenant).order_by(table.created_at, table.id)
+    ).all()
     ended = [row.id for row in rows if row.state in ENDED]
     return ended, len(rows) - len(ended)
 

@@ -17,7 +17,7 @@ from shared.errors import Conflict, NotFound
 from shared.jobs.audit import audit
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.schema import webhook, webhook_attempt, webhook_delivery, webhook_event
 from shared.jobs.tenant_types import Actor
 from shared.jobs.types import Page
@@ -78,7 +78,7 @@ CLAIM = sa.text("""
                 ELSE ARRAY[webhook.secret] END, claimed.tries
     FROM claimed JOIN webhook ON webhook.id = claimed.webhook_id JOIN webhook_event AS event
          ON event.id = claimed.event_id
-    ORDER BY claimed.event_id
+    ORDER BY event.at, event.id
 """)
 
 
@@ -159,8 +159,9 @@ def send_test(conn: sa.Connection, tenant: str, webhook: UUID) -> DeliveryRow:
     _refuse_paused(get_webhook(conn, tenant, webhook))
     event = new_id()
     data = {"webhook": str(webhook)}
-    conn.execute(sa.insert(webhook_event).values(id=event, tenant_id=tenant, kind=TEST_KIND, data=data, at=CLOCK))
-    conn.execute(sa.insert(webhook_delivery).values(webhook_id=webhook, event_id=event, next_at=CLOCK))
+    written = sa.insert(webhook_event).values(id=event, tenant_id=tenant, kind=TEST_KIND, data=data, at=CLOCK)
+    at = conn.execute(written.returning(webhook_event.c.at)).scalar_one()
+    conn.execute(sa.insert(webhook_delivery).values(webhook_id=webhook, event_id=event, next_at=CLOCK, created_at=at))
     return get_delivery(conn, tenant, webhook, event)
 
 
@@ -210,13 +211,14 @@ def list_deliveries(
     """
     get_webhook(conn, tenant, webhook)
     table = webhook_delivery.c
-    query = _deliveries().where(table.webhook_id == webhook)
+    ours = table.webhook_id == webhook
+    query, order = _deliveries().where(ours), Order(table.created_at, table.event_id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
     if cursor is not None:
-        query = query.where(table.event_id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.event_id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([_row(row) for row in rows], limit, lambda row: str(row.event))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.event))
 
 
 def delivery_attempts(conn: sa.Connection, webhook: UUID, event: UUID) -> list[AttemptRow]:
@@ -268,7 +270,7 @@ def _deliveries() -> sa.Select[*tuple[Any, ...]]:
     return (
         sa.select(
             *(c.webhook_id.label("webhook"), c.event_id.label("event"), event.kind, event.data, c.state, c.attempts),
-            *(c.next_at.label("next"), event.at.label("created"), c.ended_at.label("ended")),
+            *(c.next_at.label("next"), c.created_at.label("created"), c.ended_at.label("ended")),
             *(last.c.status, last.c.error),
         )
         .join(webhook_event, event.id == c.event_id)

@@ -29,7 +29,7 @@ from shared.jobs.idempotency import take_key
 from shared.jobs.journal import CLOCK
 from shared.jobs.operate import cancel
 from shared.jobs.outbox import tell_of_evaluation
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
 from shared.jobs.submit import check_text
 from shared.jobs.types import Page
@@ -134,15 +134,16 @@ def list_evaluations(
 ) -> Page[EvaluationRow]:
     """Evaluations, newest first; of a schedule, of these states, if any are given."""
     table = schema.evaluation.c
-    query = _evaluations().where(table.tenant_id == tenant)
+    ours = table.tenant_id == tenant
+    query, order = _evaluations().where(ours), Order(table.created_at, table.id)
     if schedule is not None:
         query = query.where(table.schedule_id == schedule)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = _read(conn, query.order_by(table.id.desc()).limit(page_limit(limit) + 1))
-    return cut_page(rows, limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = _read(conn, query.order_by(*order.by()).limit(page_limit(limit) + 1))
+    return cut_page(rows, limit, lambda row: mark_of(row.created, row.id))
 
 
 def evaluation_events(conn: sa.Connection, evaluation: UUID) -> list[EvaluationEvent]:

@@ -137,7 +137,7 @@ def keys_still_valid(conn: sa.Connection, keys: Collection[UUID]) -> set[UUID]:
 def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
     """Keys of a tenant, newest first, revoked ones too."""
     table = schema.api_key.c
-    rows = conn.execute(_keys().where(table.tenant_id == tenant).order_by(table.id.desc()))
+    rows = conn.execute(_keys().where(table.tenant_id == tenant).order_by(table.created_at.desc(), table.id.desc()))
     return [_key(row) for row in rows.mappings()]
 
 

@@ -12,9 +12,9 @@ from shared.errors import NotFound
 from shared.jobs import schema
 from shared.jobs.files import files_of
 from shared.jobs.journal import among, no_such_job
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit, read_cursor
+from shared.jobs.searching import fetching_by_id, find_motions
 from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
-from shared.jobs.submit import check_text
 from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionFilter, MotionRow, Page, Problem
 
 EVERYTHING = MotionFilter()
@@ -38,13 +38,14 @@ def list_jobs(
 ) -> Page[JobRow]:
     """Jobs, newest first; of these states, if any are given."""
     table = schema.job.c
-    query = _jobs().where(table.tenant_id == tenant)
+    ours = table.tenant_id == tenant
+    query, order = _jobs().where(ours), Order(table.created_at, table.id)
     if states:
         query = query.where(table.state.in_([str(state) for state in states]))
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([_job(row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_job(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 
 def list_items(
@@ -103,17 +104,13 @@ def list_motions(
         NotFound: the tenant has no such job.
         InvalidInput: a filter that holds what no text can.
     """
-    table = schema.motion.c
-    wanted = (table.tenant_id == tenant) & _found(found)
     if job is not None:
         get_job(conn, tenant, job)
-        wanted &= table.job_id == job
-    if cursor is not None:
-        after = read_cursor(cursor, UUID)
-        wanted &= table.id > after if job is not None else table.id < after
-    order = table.id if job is not None else table.id.desc()
-    motions = _motions(conn, wanted, order=order, limit=page_limit(limit) + 1)
-    return cut_page(motions, limit, lambda row: str(row.id))
+    ids = find_motions(conn, tenant, found, job=job, cursor=cursor, limit=page_limit(limit) + 1)
+    with fetching_by_id(conn):
+        rows = {row.id: row for row in _motions(conn, among(schema.motion.c.id, ids))}
+    # Between the two statements another transaction may have deleted some.
+    return cut_page([rows[each] for each in ids if each in rows], limit, lambda row: mark_of(row.created, row.id))
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
@@ -216,35 +213,11 @@ def _item(row: sa.RowMapping, motion: MotionRow | None) -> ItemRow:
     return ItemRow(**values)
 
 
-def _found(found: MotionFilter) -> sa.ColumnElement[bool]:
-    """The condition of a filter, in the words of the indexes."""
-    item, motion = schema.item.c, schema.motion.c
-    made = item.state == ItemState.SUCCEEDED
-    wanted: list[sa.ColumnElement[bool]] = []
-    for where, text in (("name", found.name), ("text", found.text), *(("tag", tag) for tag in found.tags)):
-        check_text(text, where)
-    if found.tags:
-        wanted.append(made & item.tags.contains(list(found.tags)) & sa.literal_column("item.tags <> '{}'"))
-    if found.name is not None:
-        wanted.append(made & sa.func.lower(item.name).startswith(found.name.lower(), autoescape=True))
-    if found.text is not None:
-        words = sa.func.to_tsvector(sa.literal_column("'english'::regconfig"), item.prompt)
-        asked = sa.func.websearch_to_tsquery(sa.literal_column("'english'::regconfig"), found.text)
-        wanted.append(made & words.bool_op("@@")(asked))
-    if found.reviews or found.unreviewed:
-        said = motion.review.in_([str(review) for review in found.reviews])
-        wanted.append(sa.or_(said, motion.review.is_(None)) if found.unreviewed else said)
-    return sa.and_(sa.true(), *wanted)
-
-
 def _motions(
     conn: sa.Connection,
     wanted: sa.ColumnElement[bool],
-    *,
-    order: sa.ColumnElement[object] | None = None,
-    limit: int | None = None,
 ) -> list[MotionRow]:
-    """Motions with their files: two queries, however many."""
+    """Motions with their files, in no order: two queries, however many."""
     motion, item = schema.motion.c, schema.item.c
     later = schema.item.alias("later")
     query = (
@@ -260,7 +233,7 @@ def _motions(
         .outerjoin(later, later.c.replaces == motion.id)
         .where(wanted)
     )
-    rows = conn.execute(query.order_by(motion.id if order is None else order).limit(limit)).mappings().all()
+    rows = conn.execute(query).mappings().all()
     file = schema.motion_file.c
     files = files_of(conn, file.motion_id, [row["id"] for row in rows], MotionFile, ~file.erasing)
     return [_motion(row, files[row["id"]]) for row in rows]

@@ -22,8 +22,10 @@ WRITE = sa.text("""
     ), event AS (
         INSERT INTO webhook_event (id, tenant_id, kind, data, at)
         SELECT :event, :tenant, :kind, CAST(:data AS jsonb), clock_timestamp() WHERE EXISTS (SELECT FROM wanted)
+        RETURNING at
     )
-    INSERT INTO webhook_delivery (webhook_id, event_id, next_at) SELECT id, :event, clock_timestamp() FROM wanted
+    INSERT INTO webhook_delivery (webhook_id, event_id, next_at, created_at)
+    SELECT wanted.id, :event, clock_timestamp(), event.at FROM wanted, event
 """)
 
 

@@ -1,18 +1,92 @@
-"""Pages of listings. Cursors are opaque."""
+"""Pages of listings, in the order of the database's clock. Cursors are opaque.
+
+A cursor holds the creation time and the id of the last row. Those of earlier releases hold its id alone, and are read
+too: the time is that of the row, or, when that is gone, the time in its UUIDv7.
+"""
 
 from __future__ import annotations
 
 import base64
 import binascii
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, TypeVar
+from uuid import UUID
+
+import sqlalchemy as sa
 
 from shared.errors import InvalidInput
+from shared.jobs.schema.base import Id, Time
 from shared.jobs.types import Page
 
 LARGEST_PAGE = 1000
+SEPARATOR = "|"
 Row = TypeVar("Row")
 Mark = TypeVar("Mark")
+Place = sa.ColumnElement[Any]
+"""The creation time and the id of a row, as SQL."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a listing is ordered by: a creation time, then an id."""
+
+    created: sa.ColumnElement[Any]
+    id: sa.ColumnElement[Any]
+    descending: bool = True
+
+    def by(self) -> tuple[sa.ColumnElement[Any], sa.ColumnElement[Any]]:
+        """The terms of ORDER BY."""
+        return (self.created.desc(), self.id.desc()) if self.descending else (self.created, self.id)
+
+    def place(self, cursor: str, scope: sa.ColumnElement[bool]) -> Place:
+        """Where a cursor stands.
+
+        Args:
+            scope: the rows of the listing; the row of an earlier release's cursor is looked up among them.
+
+        Raises:
+            InvalidInput: it is none of ours.
+        """
+        mark = read_cursor(cursor, _Mark.read)
+        at: sa.ColumnElement[Any] = sa.literal(mark.at, Time)
+        if mark.by_id:
+            own = sa.select(self.created).where(scope, self.id == mark.id).correlate(None)
+            at = sa.func.coalesce(own.scalar_subquery(), at)
+        return sa.tuple_(at, sa.literal(mark.id, Id))
+
+    def beyond(self, place: Place) -> sa.ColumnElement[bool]:
+        """The condition of rows that come after a place."""
+        here = sa.tuple_(self.created, self.id)
+        return here < place if self.descending else here > place
+
+    def after(self, cursor: str, scope: sa.ColumnElement[bool]) -> sa.ColumnElement[bool]:
+        """The condition of rows that come after a cursor; raises as `place`."""
+        return self.beyond(self.place(cursor, scope))
+
+
+@dataclass(frozen=True)
+class _Mark:
+    at: datetime
+    id: UUID
+    by_id: bool
+
+    @classmethod
+    def read(cls, text: str) -> _Mark:
+        time, separator, identifier = text.rpartition(SEPARATOR)
+        if not separator:
+            own = UUID(text)
+            return cls(datetime.fromtimestamp((own.int >> 80) / 1000).astimezone(), own, by_id=True)
+        at = datetime.fromisoformat(time)
+        if at.tzinfo is None:
+            raise ValueError("a time without its zone")
+        return cls(at, UUID(identifier), by_id=False)
+
+
+def mark_of(created: datetime, identifier: UUID) -> str:
+    """The mark of a row for `cut_page`."""
+    return f"{created.isoformat()}{SEPARATOR}{identifier}"
 
 
 def page_limit(limit: int) -> int:
@@ -42,7 +116,7 @@ def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
     """
     try:
         return kind(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
-    except (binascii.Error, ValueError) as error:
+    except (binascii.Error, ValueError, OverflowError, OSError) as error:
         raise InvalidInput(
             "this is no cursor of this listing", where="cursor", hint="Use the one the last page gave."
         ) from error

@@ -16,7 +16,7 @@ from shared.jobs.evaluation_types import EvaluationRequest, NewEvaluation, NewSc
 from shared.jobs.evaluations import create_evaluation, lock_evaluation, move_evaluation
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.states import EvaluationState
 from shared.jobs.submit import check_text
 from shared.jobs.types import Page
@@ -66,11 +66,12 @@ def list_schedules(
 ) -> Page[ScheduleRow]:
     """Schedules, newest first."""
     table = schema.schedule.c
-    query = _schedules().where(table.tenant_id == tenant)
+    ours = table.tenant_id == tenant
+    query, order = _schedules().where(ours), Order(table.created_at, table.id)
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([_row(row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 
 def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: ScheduleChange) -> ScheduleRow:
@@ -216,7 +217,7 @@ def _schedules() -> sa.Select[*tuple[Any, ...]]:
     last = (
         sa.select(evaluation.id, evaluation.state, evaluation.regressed)
         .where(evaluation.schedule_id == c.id)
-        .order_by(evaluation.id.desc())
+        .order_by(evaluation.created_at.desc(), evaluation.id.desc())
         .limit(1)
         .lateral("last")
     )

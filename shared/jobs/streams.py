@@ -18,8 +18,8 @@ from shared.errors import Busy, NotFound
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
-from shared.jobs.listings import cut_page, page_limit, read_cursor
 from shared.jobs.outbox import tell_of_stream
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.states import OPEN_STREAMS, StreamState
 from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
 from shared.jobs.submit import check_text, submit
@@ -92,13 +92,14 @@ def list_streams(
 ) -> Page[StreamRow]:
     """Streams, newest first; with `is_open` those that are not over."""
     table = schema.stream.c
-    query = _streams().where(table.tenant_id == tenant)
+    ours = table.tenant_id == tenant
+    query, order = _streams().where(ours), Order(table.created_at, table.id)
     if is_open:
         query = query.where(table.ended_at.is_(None))
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([_row(row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 
 def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
@@ -135,7 +136,7 @@ def open_streams(conn: sa.Connection, bundle: str, limit: int = 200) -> list[Str
     table, tenant = schema.stream.c, schema.tenant.c
     idle = sa.exists().where(tenant.id == table.tenant_id, tenant.suspended_at.is_not(None))
     wanted = (table.bundle == bundle) & table.ended_at.is_(None) & ((table.state != StreamState.WAITING) | ~idle)
-    query = _streams().where(wanted).order_by(table.id).limit(limit)
+    query = _streams().where(wanted).order_by(table.created_at, table.id).limit(limit)
     return [_row(row) for row in conn.execute(query).mappings()]
 
 

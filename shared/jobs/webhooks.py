@@ -12,7 +12,7 @@ from shared.errors import Conflict, InvalidInput, NotFound
 from shared.jobs import schema
 from shared.jobs.ids import new_id
 from shared.jobs.journal import CLOCK, interval
-from shared.jobs.pages import cut_page, page_limit, read_cursor
+from shared.jobs.pages import Order, cut_page, mark_of, page_limit
 from shared.jobs.schema import webhook, webhook_delivery
 from shared.jobs.submit import check_text
 from shared.jobs.types import Page
@@ -69,11 +69,12 @@ def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRo
 def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[WebhookRow]:
     """Webhooks, newest first."""
     table = webhook.c
-    query = _webhooks().where(table.tenant_id == tenant)
+    ours = table.tenant_id == tenant
+    query, order = _webhooks().where(ours), Order(table.created_at, table.id)
     if cursor is not None:
-        query = query.where(table.id < read_cursor(cursor, UUID))
-    rows = conn.execute(query.order_by(table.id.desc()).limit(page_limit(limit) + 1)).mappings().all()
-    return cut_page([_row(row) for row in rows], limit, lambda row: str(row.id))
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([_row(row) for row in rows], limit, lambda row: mark_of(row.created, row.id))
 
 
 def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: WebhookChange) -> WebhookRow:

@@ -12,7 +12,7 @@ Under the tenant's lock claims and submits count what there is of a quota, one a
 from shared.jobs.schema.base import metadata
 from shared.jobs.schema.evaluations import evaluation, evaluation_event, evaluation_report, prompt_set, schedule
 from shared.jobs.schema.jobs import JOB_STATE, idempotency, item, job, job_event, lane, lease, text_features, worker
-from shared.jobs.schema.motions import asset, asset_writer, motion, motion_file
+from shared.jobs.schema.motions import asset, asset_writer, motion, motion_file, motion_search
 from shared.jobs.schema.streams import stream, stream_chunk
 from shared.jobs.schema.tenants import api_key, audit_event, tenant
 from shared.jobs.schema.webhooks import webhook, webhook_attempt, webhook_delivery, webhook_event
@@ -35,6 +35,7 @@ __all__ = [
     "metadata",
     "motion",
     "motion_file",
+    "motion_search",
     "prompt_set",
     "schedule",
     "stream",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of
+from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
 from shared.jobs.states import EvaluationState
 
 # Prompts of evaluations, by the digest of their content: a schedule and all its runs share one row.
@@ -38,6 +38,8 @@ schedule = sa.Table(
         name="fk_schedule_prompts",
     ),
     sa.Index("ix_schedule_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_schedule_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_schedule_short_id", "tenant_id", short_id()),
     sa.Index("ix_schedule_next_at", "next_at", postgresql_where=sa.text("NOT paused")),
 )
 
@@ -73,7 +75,11 @@ evaluation = sa.Table(
     sa.CheckConstraint("state NOT IN ('generating', 'scoring', 'done') OR prompts_sha256 IS NOT NULL", name="prompts"),
     sa.UniqueConstraint("schedule_id", "due_at"),
     sa.Index("ix_evaluation_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_evaluation_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_evaluation_short_id", "tenant_id", short_id()),
+    sa.Index("ix_evaluation_name", "tenant_id", "name", postgresql_where=sa.text("name IS NOT NULL")),
     sa.Index("ix_evaluation_schedule_id_id", "schedule_id", "id"),
+    sa.Index("ix_evaluation_schedule_created", "schedule_id", "created_at", "id"),
     sa.Index("ix_evaluation_open", "id", postgresql_where=sa.text("finished_at IS NULL")),
     # What the next run is compared with: the last one of the same prompts.
     sa.Index("ix_evaluation_done", "tenant_id", "prompts_sha256", "id", postgresql_where=sa.text("state = 'done'")),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of
+from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
 from shared.jobs.states import ItemState, JobControl, Stage
 
 # The rule of `states.job_state`.
@@ -54,7 +54,10 @@ job = sa.Table(
     ),
     sa.CheckConstraint("keep_days BETWEEN 1 AND 36500", name="keep_days"),
     sa.CheckConstraint("traceparent ~ '^00-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}$'", name="traceparent"),
-    sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_job_tenant_id_id", "tenant_id", "id"),  # the order of earlier releases
+    sa.Index("ix_job_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_job_short_id", "tenant_id", short_id()),
+    sa.Index("ix_job_name", "tenant_id", "name", postgresql_where=sa.text("name IS NOT NULL")),
     sa.Index("ix_job_keep_days", "id", postgresql_where=sa.text("keep_days IS NOT NULL")),
     # For counting what a tenant has in the queue. Its predicate changes once in a job's life.
     sa.Index("ix_job_open", "tenant_id", postgresql_where=sa.text("finished_at IS NULL")),

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import JSONB
+from sqlalchemy.dialects.postgresql import JSONB, TSVECTOR
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of
+from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
 from shared.jobs.states import Review
 
 asset = sa.Table(
@@ -58,6 +58,27 @@ motion = sa.Table(
     sa.Index("ix_motion_tenant_id_id", "tenant_id", "id"),
     sa.Index("ix_motion_job_id_id", "job_id", "id"),
     sa.Index("ix_motion_review", "tenant_id", "review", "id", postgresql_where=sa.text("review IS NOT NULL")),
+)
+
+# What motions are listed and searched by, narrow and with indexes of its own. Triggers keep it (migration 0014), so
+# that the writes of every release reach it. No foreign key: a trigger removes rows, many at a time.
+# `terms` are the words of the prompt and, behind chr(1), everything else that a filter names: `t` tenant, `j` job, `x`
+# index of the prompt, `n` name in lower case, `g` tag, `r` review. One index intersects them all.
+motion_search = sa.Table(
+    "motion_search",
+    metadata,
+    sa.Column("motion_id", Id, primary_key=True),
+    sa.Column("job_id", Id, nullable=False),
+    sa.Column("created_at", Time, nullable=False),
+    sa.Column("tenant_id", sa.Text, nullable=False),
+    sa.Column("terms", TSVECTOR, nullable=False),
+    sa.Index("ix_motion_search_created", "tenant_id", "created_at", "motion_id"),
+    sa.Index("ix_motion_search_job", "job_id", "created_at", "motion_id"),
+    # A search reads what is pending through to its end.
+    sa.Index(
+        "ix_motion_search_terms", "terms", postgresql_using="gin", postgresql_with={"gin_pending_list_limit": 512}
+    ),
+    sa.Index("ix_motion_search_short_id", "tenant_id", short_id("motion_id")),
 )
 
 motion_file = sa.Table(

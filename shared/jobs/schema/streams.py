@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of
+from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
 from shared.jobs.states import StreamState
 
 stream = sa.Table(
@@ -37,6 +37,9 @@ stream = sa.Table(
     sa.CheckConstraint("seed >= 0", name="seed"),
     sa.CheckConstraint("frames >= 0 AND max_frames > 0", name="frames"),
     sa.Index("ix_stream_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_stream_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_stream_short_id", "tenant_id", short_id()),
+    sa.Index("ix_stream_name", "tenant_id", "name", postgresql_where=sa.text("name IS NOT NULL")),
     sa.Index("ix_stream_open", "bundle", "id", postgresql_where=sa.text("ended_at IS NULL")),
     sa.Index("ix_stream_key_id", "key_id", postgresql_where=sa.text("ended_at IS NULL")),
     sa.Index("ix_stream_job_id", "job_id"),

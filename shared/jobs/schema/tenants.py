@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata
+from shared.jobs.schema.base import NOW, Id, Time, metadata, short_id
 
 tenant = sa.Table(
     "tenant",
@@ -38,6 +38,7 @@ api_key = sa.Table(
     sa.Column("replaced_by", Id, sa.ForeignKey("api_key.id")),  # it was rotated
     sa.Column("rates", JSONB, nullable=False, server_default=sa.text("'{}'")),  # {"submit": "60/minute"}: its own
     sa.Index("ix_api_key_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_api_key_short_id", "tenant_id", short_id()),
 )
 
 # Who did what, when. Refers to nothing: it outlives what it is about.
@@ -53,5 +54,7 @@ audit_event = sa.Table(
     sa.Column("target", sa.Text, nullable=False),
     sa.Column("data", JSONB, nullable=False),  # no prompts, no secrets
     sa.Index("ix_audit_event_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_audit_event_created", "tenant_id", "at", "id"),
     sa.Index("ix_audit_event_at", "at"),
+    sa.Index("ix_audit_event_at_id", "at", "id"),
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata
+from shared.jobs.schema.base import NOW, Id, Time, metadata, short_id
 
 webhook = sa.Table(
     "webhook",
@@ -27,6 +27,8 @@ webhook = sa.Table(
     sa.CheckConstraint("cardinality(events) > 0", name="events"),
     sa.CheckConstraint("(previous_secret IS NULL) = (previous_until IS NULL)", name="previous"),
     sa.Index("ix_webhook_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_webhook_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_webhook_short_id", "tenant_id", short_id()),
 )
 
 # One row an event, however many webhooks want it; none where nobody does.
@@ -52,6 +54,7 @@ webhook_delivery = sa.Table(
     sa.Column("next_at", Time),  # when it is tried; while it is claimed, when it counts as abandoned
     sa.Column("claim", Id),  # fences the record of a try
     sa.Column("ended_at", Time),
+    sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.CheckConstraint("state IN ('pending', 'delivered', 'failed')", name="state"),
     sa.CheckConstraint("(state = 'pending') = (next_at IS NOT NULL)", name="next"),
     sa.CheckConstraint("(state = 'pending') = (ended_at IS NULL)", name="ended"),
@@ -59,6 +62,8 @@ webhook_delivery = sa.Table(
     sa.CheckConstraint("0 <= tries AND tries <= attempts", name="tries"),
     sa.Index("ix_webhook_delivery_due", "webhook_id", "next_at", postgresql_where=sa.text("state = 'pending'")),
     sa.Index("ix_webhook_delivery_event_id", "event_id"),
+    sa.Index("ix_webhook_delivery_created", "webhook_id", "created_at", "event_id"),
+    sa.Index("ix_webhook_delivery_short_id", "webhook_id", short_id("event_id")),
 )
 
 webhook_attempt = sa.Table(
