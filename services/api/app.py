@@ -36,6 +36,7 @@ from services.api.process import prepare_process
 from services.api.queries import known_query
 from services.api.rates import Rates
 from services.api.reference import build_reference
+from services.api.references.routes import router as references_router
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
@@ -56,7 +57,7 @@ from shared.webhooks.vault import Vault
 ROUTERS = (
     *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, docs_router, models_router),
     texts_router,
-    *(evaluations_router, schedules_router, webhooks_router),
+    *(evaluations_router, schedules_router, webhooks_router, references_router),
 )
 SCHEMAS = (*JOB_SCHEMAS, *EVALUATION_SCHEMAS, *SCHEDULE_SCHEMAS)
 DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 with a stable `type`."

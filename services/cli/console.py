@@ -26,6 +26,13 @@ Limit = Annotated[
     int | None, typer.Option("--limit", min=1, help="Show at most this many; none given = all.", show_default=False)
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
+FullIds = Annotated[
+    bool, typer.Option("--full-ids", "-l", help="Whole ids in the table; else their last 8 digits, which will do.")
+]
+ID_COLUMNS = frozenset({"id", "job", "stream", "event", "item", "motion", "replaced by"})
+"""Columns of drawn tables that hold ids: they are short there, and never wrap."""
+TIME_COLUMNS = frozenset({"created", "next", "due", "at", "last used", "expires", "revoked", "started", "finished"})
+SHORT = 8
 PAGE = 1000
 """Elements of one request of a listing, and rows of one drawn table: a long one is not held in memory."""
 
@@ -81,8 +88,22 @@ def result_json(value: Any) -> None:
     result(escape_json(json.dumps(value, ensure_ascii=not utf8, separators=(", ", ": "))))
 
 
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe, each line as it comes."""
+def short_id(identifier: str) -> str:
+    """The last digits of an id: they are random, where the first are those of the whole batch."""
+    return identifier.replace("-", "")[-SHORT:]
+
+
+def moment(time: str) -> str:
+    """`2026-11-24 08:05`: a time of the API for people, in UTC as it came."""
+    return time[:16].replace("T", " ")
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, full_ids: bool = False) -> None:
+    """Results as a table on stdout: drawn for a terminal, tab-separated for a pipe, each line as it comes.
+
+    Args:
+        full_ids: also where the table is drawn; a pipe always gets whole ids and times.
+    """
     if not sys.stdout.isatty():
         for row in rows:
             result("\t".join(_cell(value) for value in row))
@@ -90,21 +111,22 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     left = iter(rows)
     piece = list(islice(left, PAGE))
     while True:
-        _draw(columns, piece)
+        _draw(columns, piece, full_ids=full_ids)
         piece = list(islice(left, PAGE))
         if not piece:
             return
 
 
-def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]], *, full_ids: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
     drawn = Table(box=None, header_style="bold", pad_edge=False)
     for column in columns:
-        drawn.add_column(column, overflow="fold")
+        drawn.add_column(column, overflow="fold", no_wrap=column in ID_COLUMNS)
     for row in rows:
-        drawn.add_row(*(Text(_cell(value)) for value in row))
+        cells = (_shown(column, _cell(value), full_ids=full_ids) for column, value in zip(columns, row, strict=True))
+        drawn.add_row(*map(Text, cells))
     drawing(sys.stdout).print(drawn)
 
 
@@ -115,6 +137,7 @@ def listing(
     *,
     as_json: bool,
     limit: int | None = None,
+    full_ids: bool = False,
 ) -> None:
     """Elements of a listing as they come: a line of JSON each, or a table with what `cell` makes of each column.
 
@@ -127,7 +150,7 @@ def listing(
         for each in shown:
             result_json(each)
     else:
-        table(columns, ([cell(each, column) for column in columns] for each in shown))
+        table(columns, ([cell(each, column) for column in columns] for each in shown), full_ids=full_ids)
     if limit is not None and next(left, None) is not None:
         say(f"There are more than these {limit}: --limit shows more, without it all.")
 
@@ -204,6 +227,13 @@ def size(count: int) -> str:
         if count >= of_it:
             return f"{count / of_it:.3g} {unit}iB"
     return f"{count} B"
+
+
+def _shown(column: str, cell: str, *, full_ids: bool) -> str:
+    """A cell of a drawn table."""
+    if column in TIME_COLUMNS:
+        return moment(cell) if cell[:1].isdigit() else cell
+    return short_id(cell) if column in ID_COLUMNS and not full_ids else cell
 
 
 def _cell(value: object) -> str:

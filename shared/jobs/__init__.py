@@ -100,6 +100,7 @@ from shared.jobs.migrate import check_revision, downgrade, upgrade
 from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
 from shared.jobs.policy import Policy, policy
 from shared.jobs.quotas import check_room, usage
+from shared.jobs.references import ReferenceKind, ReferenceMatch, resolve_reference
 from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
 from shared.jobs.retention import KEPT, delete_expired, erase, rewrite_files
 from shared.jobs.reviews import MAX_REVIEWED, reroll, review
@@ -271,6 +272,8 @@ __all__ = [
     "QueueDepth",
     "QueuePlace",
     "Quotas",
+    "ReferenceKind",
+    "ReferenceMatch",
     "ReportFile",
     "Reroll",
     "Review",
@@ -393,6 +396,7 @@ __all__ = [
     "remove_unused_prompts",
     "replay_delivery",
     "reroll",
+    "resolve_reference",
     "resume",
     "retire",
     "retry",

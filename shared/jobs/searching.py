@@ -29,6 +29,8 @@ from shared.jobs.types import MotionFilter
 WALKED = 20_000
 """Motions that are looked at in order before the index is asked: some 10 ms."""
 UNREVIEWED = "new"
+VARIANTS = 1000
+"""Motions of one prompt that are looked at, by its index."""
 
 _PLAIN = {"jit": "off", "max_parallel_workers_per_gather": "0", "work_mem": "32MB"}
 _SWITCHES = ("seqscan", "indexscan", "indexonlyscan", "bitmapscan", "sort", "hashjoin", "mergejoin")
@@ -74,6 +76,15 @@ def find_motions(
         query = query.where(order.beyond(place))
     with _plan(conn, _LOOK_UP):
         return list(conn.execute(query).scalars())
+
+
+def motions_at(conn: sa.Connection, job: UUID, index: int) -> list[UUID]:
+    """Ids of the motions of one prompt of a job, by the prompt's index; more than one where it has variants."""
+    table = schema.motion_search.c
+    terms = (_lexeme("j", str(job)), _lexeme("x", str(index)))
+    with _plan(conn, _LOOK_UP):
+        query = sa.select(table.motion_id).where(*(_has(table.terms, term) for term in terms))
+        return list(conn.execute(query.limit(VARIANTS)).scalars())
 
 
 @contextmanager

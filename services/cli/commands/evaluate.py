@@ -11,13 +11,14 @@ import typer
 from services.cli import console, evaluating, options
 from services.cli.commands import schedules
 from services.cli.evaluating import Asked
+from services.cli.references import FORMS, find, find_all, of_view
 from shared.errors import InvalidInput, NotFound
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
 app.add_typer(schedules.app, name="schedule")
 
-Run = Annotated[str, typer.Argument(metavar="RUN", help="The evaluation's id.")]
-Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help="Ids of evaluations.")]
+Run = Annotated[str, typer.Argument(metavar="RUN", help=f"The evaluation: {FORMS}.")]
+Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help=f"Evaluations: of each {FORMS}.")]
 FORMATS = ("html", "json", "md")
 COLUMNS = ("id", "name", "state", "regressed", "bundle", "source", "created")
 
@@ -83,17 +84,20 @@ def wait_for(
     from services.cli.client import Client
 
     with Client.here() as client:
-        _follow(client, run, timeout, fail_on_regression=fail_on_regression, as_json=as_json)
+        _follow(
+            client, find(client, "evaluation", run).id, timeout, fail_on_regression=fail_on_regression, as_json=as_json
+        )
 
 
 @app.command("list")
 def list_runs(
     state: Annotated[State | None, typer.Option("--state", help="Only runs in this state.")] = None,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List runs, newest first: their states, and which regressed."""
-    show_runs("/v1/evaluations", limit, as_json, state=state.value if state else None)
+    show_runs("/v1/evaluations", limit, as_json, full_ids=full_ids, state=state.value if state else None)
 
 
 @app.command()
@@ -102,6 +106,7 @@ def show(run: Run, as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
+        run = find(client, "evaluation", run).id
         found = client.get(f"/v1/evaluations/{run}")
     if as_json:
         console.result_json(found)
@@ -138,6 +143,7 @@ def report(
     if kind not in FORMATS:
         raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
     with Client.here() as client:
+        run = find(client, "evaluation", run).id
         found = client.get(f"/v1/evaluations/{run}")
         file = next((file for file in found["reports"] if file["format"] == kind), None)
         if file is None:
@@ -161,8 +167,8 @@ def report(
 
 @app.command()
 def compare(
-    before: Annotated[str, typer.Argument(metavar="A", help="The earlier run's id.")],
-    after: Annotated[str, typer.Argument(metavar="B", help="The later run's id.")],
+    before: Annotated[str, typer.Argument(metavar="A", help=f"The earlier run: {FORMS}.")],
+    after: Annotated[str, typer.Argument(metavar="B", help=f"The later run: {FORMS}.")],
     fail_on_regression: Annotated[
         bool, typer.Option("--fail-on-regression", help="Exit 8 when B is worse than A.")
     ] = False,
@@ -172,7 +178,8 @@ def compare(
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = client.get(f"/v1/evaluations/{after}/comparison", before=before)
+        earlier, later = (find(client, "evaluation", each).id for each in (before, after))
+        found = client.get(f"/v1/evaluations/{later}/comparison", before=earlier)
     if as_json:
         console.result_json(found)
     else:
@@ -186,22 +193,22 @@ def cancel(runs: Runs, as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        for each in runs:
-            client.delete(f"/v1/evaluations/{each}")
-            found = client.get(f"/v1/evaluations/{each}")
+        for each in find_all(client, "evaluation", runs):
+            client.delete(f"/v1/evaluations/{each.id}")
+            found = client.get(f"/v1/evaluations/{each.id}")
             if as_json:
                 console.result_json(found)
             else:
-                console.say(f"{each} {found['state']}")
+                console.say(f"cancelled {of_view('evaluation', found)}: {found['state']}")
 
 
-def show_runs(path: str, limit: int | None, as_json: bool, **params: Any) -> None:
+def show_runs(path: str, limit: int | None, as_json: bool, *, full_ids: bool = False, **params: Any) -> None:
     """The runs of a listing, newest first."""
     from services.cli.client import Client
 
     with Client.here() as client:
         found = client.pages(path, limit=console.page_size(limit), **params)
-        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 def _cell(run: dict[str, Any], column: str) -> object:

@@ -11,6 +11,7 @@ import typer
 
 from services.cli import console, options
 from services.cli.names import check_template
+from services.cli.references import FORMS, find_all
 from shared.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ class Review(StrEnum):
 
 
 def fetch(
-    jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help="Jobs whose motions to fetch.")],
+    jobs: Annotated[list[str], typer.Argument(metavar="JOB…", help=f"Jobs whose motions to fetch: {FORMS}.")],
     output: options.Folder = Path(),
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
@@ -50,10 +51,11 @@ def fetch(
 
     check_template(name_template)
     with Client.here() as client:
-        for job in jobs:
-            folder = output if len(jobs) == 1 else output / job
+        found = find_all(client, "job", jobs)
+        for job in found:
+            folder = output if len(found) == 1 else output / job.id
             write_job(
-                client, job, folder, formats,
+                client, job.id, folder, formats,
                 template=name_template, only=only, prune=prune, overwrite=overwrite, as_json=as_json,
             )  # fmt: skip
 

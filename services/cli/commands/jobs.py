@@ -8,12 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from services.cli import console
+from services.cli.references import FORMS, find, find_all, listed, named, of_view
 from shared.errors import InvalidInput
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
-Job = Annotated[str, typer.Argument(metavar="JOB", help="The job's id.")]
-Jobs = Annotated[list[str], typer.Argument(metavar="JOB…", help="Ids of jobs.")]
+Job = Annotated[str, typer.Argument(metavar="JOB", help=f"The job: {FORMS}.")]
+Jobs = Annotated[list[str], typer.Argument(metavar="JOB…", help=f"Jobs: of each {FORMS}.")]
 Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
 
 Reason = Annotated[str | None, typer.Option("--reason", help="Why; it stands in the job's events.")]
@@ -23,6 +24,7 @@ FIELDS = (
     *("created", "started", "finished", "expires", "erased"),
 )
 COLUMNS = ("id", "name", "state", "priority", "done", "total", "created")
+DONE = {"pause": "paused", "resume": "resumed", "cancel": "cancelled", "retry": "retried"}
 COUNTERS = ("succeeded", "failed", "dead", "cancelled", "leased", "ready")
 
 
@@ -42,6 +44,7 @@ class State(StrEnum):
 def list_jobs(
     state: Annotated[State | None, typer.Option("--state", help="Only jobs in this state.")] = None,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List jobs, newest first."""
@@ -49,7 +52,7 @@ def list_jobs(
 
     with Client.here() as client:
         found = client.pages("/v1/jobs", state=state.value if state else None, limit=console.page_size(limit))
-        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 @app.command()
@@ -58,6 +61,7 @@ def show(job: Job, as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
+        job = find(client, "job", job).id
         found = client.get(f"/v1/jobs/{job}")
         place = client.get(f"/v1/jobs/{job}/queue")
         if as_json:
@@ -153,11 +157,12 @@ def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
     from services.cli.client import Client
 
-    console.confirm(f"Delete {len(jobs)} jobs with their motions?", yes=yes)
     with Client.here() as client:
-        for job in jobs:
-            client.delete(f"/v1/jobs/{job}")
-            console.say(f"{job} deleted")
+        found = named(client, "job", "/v1/jobs", jobs)
+        console.confirm(f"Delete {listed(found)} with all motions?", yes=yes)
+        for job in found:
+            client.delete(f"/v1/jobs/{job.id}")
+            console.say(f"deleted {job}")
 
 
 @app.command()
@@ -169,16 +174,17 @@ def erase(
     """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
     from services.cli.client import Client
 
-    console.confirm(f"Forget the prompts of {len(jobs)} jobs for good?", yes=yes)
     with Client.here() as client:
-        for job in jobs:
-            found = client.post(f"/v1/jobs/{job}/erase")
+        wanted = named(client, "job", "/v1/jobs", jobs)
+        console.confirm(f"Forget the prompts of {listed(wanted)} for good?", yes=yes)
+        for job in wanted:
+            found = client.post(f"/v1/jobs/{job.id}/erase")
             if as_json:
                 console.result_json(found)
                 continue
             left = found["files_left"]
             more = f"; {left} npz files are written anew and cannot be fetched before" if left else ""
-            console.say(f"{job} prompts erased{more}")
+            console.say(f"erased the prompts of {job}{more}")
 
 
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
@@ -186,7 +192,7 @@ def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> Non
     from services.cli.watching import check_ended, watch_job
 
     with Client.here() as client:
-        ended = watch_job(client, job, timeout=timeout, quiet=quiet)
+        ended = watch_job(client, find(client, "job", job).id, timeout=timeout, quiet=quiet)
     if as_json:
         console.result_json(ended)
     check_ended(ended)
@@ -196,26 +202,26 @@ def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        for job in jobs:
-            found = client.post(f"/v1/jobs/{job}/{verb}", **params)
+        for job in find_all(client, "job", jobs):
+            found = client.post(f"/v1/jobs/{job.id}/{verb}", **params)
             if as_json:
                 console.result_json(found)
             else:
-                console.say(f"{job} {found['state']}")
+                console.say(f"{DONE[verb]} {of_view('job', found)}: {found['state']}")
 
 
 def _change(job: str, patch: dict[str, Any], as_json: bool, reason: str | None = None) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = client.patch(f"/v1/jobs/{job}", patch, reason=reason)
+        found = client.patch(f"/v1/jobs/{find(client, 'job', job).id}", patch, reason=reason)
     if as_json:
         console.result_json(found)
         return
     told = [f"{found['state']}, priority {found['priority']}"]
     if found["fail_early"] is not None:
         told.append(f"fails early above {found['fail_early']:g}")
-    console.say(f"{job}: {', '.join([*told, *filter(None, [found['comment']])])}")
+    console.say(f"{of_view('job', found)}: {', '.join([*told, *filter(None, [found['comment']])])}")
 
 
 def _share(text: str) -> float | None:

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
+from uuid import UUID
 
 import typer
 
 from services.cli import console
-from services.cli.database import connection, identifier, operator
+from services.cli.database import connection, operator
+from services.cli.references import FORMS, choose, whole_id
 from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
+    import sqlalchemy as sa
+
     from shared.jobs import ApiKey, NewApiKey
 
 app = typer.Typer(help="API keys.", no_args_is_help=True)
 
 DAY = 86_400.0
-HINT = "`marey admin keys list` shows them."
 COLUMNS = ("id", "name", "tenant", "scopes", "created", "last_used", "expires", "revoked", "replaced_by", "rates")
 
 Scopes = Annotated[
     list[str] | None, typer.Option("--scope", help="read, submit, operate, admin or metrics; may be repeated.")
 ]
 Tenant = Annotated[str, typer.Option("--tenant", help="Whose key it is.")]
-Key = Annotated[str, typer.Argument(metavar="ID", help="Id of the key.")]
+Key = Annotated[str, typer.Argument(metavar="ID", help=f"The key: {FORMS}.")]
 Rates = Annotated[
     list[str] | None,
     typer.Option("--rate", help="A rate limit of its own, as submit=60/minute (read, submit, operate, parse)."),
@@ -59,6 +62,7 @@ def create(
 @app.command("list")
 def list_them(
     tenant: Annotated[str | None, typer.Option("--tenant", help="Those of this tenant alone.")] = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List keys, without their secrets."""
@@ -71,7 +75,8 @@ def list_them(
         for row in rows:
             console.result_json(row)
     else:
-        console.table([column.replace("_", " ") for column in COLUMNS], (list(row.values()) for row in rows))
+        columns = [column.replace("_", " ") for column in COLUMNS]
+        console.table(columns, (list(row.values()) for row in rows), full_ids=full_ids)
 
 
 @app.command("rotate")
@@ -84,10 +89,10 @@ def rotate(
     as_json: console.Json = False,
 ) -> None:
     """Make a new key in the place of another, and print it, this once."""
-    wanted = identifier(key, "a key", HINT)
     with connection() as conn:
         from shared.jobs import audit, rotate_key
 
+        wanted = _find(conn, tenant, key)
         made = rotate_key(conn, tenant, wanted, overlap=hours * 3600)
         audit(conn, tenant, operator(), "key.rotate", wanted, new=str(made.key.id), overlap_hours=hours)
     _show_secret(made, as_json)
@@ -98,13 +103,24 @@ def rotate(
 @app.command("revoke")
 def revoke(key: Key, tenant: Tenant = "default") -> None:
     """Make a key invalid from now on."""
-    wanted = identifier(key, "a key", HINT)
     with connection() as conn:
         from shared.jobs import audit, revoke_key
 
+        wanted = _find(conn, tenant, key)
         revoked = revoke_key(conn, tenant, wanted)
         audit(conn, tenant, operator(), "key.revoke", wanted, name=revoked.name)
-    console.say(f"{revoked.name} is revoked")
+    console.say(f"revoked key {console.short_id(str(wanted))} {revoked.name!r}")
+
+
+def _find(conn: sa.Connection, tenant: str, key: str) -> UUID:
+    """The key that is meant; raises as `services.cli.references.find`."""
+    from shared.jobs import ReferenceKind, resolve_reference
+
+    if (identifier := whole_id(key)) is not None:
+        return UUID(identifier)
+    found = resolve_reference(conn, tenant, ReferenceKind.KEY, key)
+    matches = [{**vars(each), "created": each.created.isoformat()} for each in found]
+    return UUID(choose("key", key, matches).id)
 
 
 def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from services.cli import console
+from services.cli.references import FORMS, MOTION_FORMS, find, find_all
 from shared.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from services.cli.client import Client
 
 app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
 
@@ -18,7 +22,7 @@ MOST = 1000
 """Motions of one request."""
 COLUMNS = ("id", "index", "name", "tags", "seed", "review", "seconds", "prompt")
 
-Motions = Annotated[list[str], typer.Argument(metavar="ID…", help="Ids of motions; - reads them from stdin.")]
+Motions = Annotated[list[str], typer.Argument(metavar="ID…", help=f"Motions: of each {MOTION_FORMS}; - reads stdin.")]
 Comment = Annotated[str | None, typer.Option("--comment", help="Why; stands beside the verdict.")]
 
 
@@ -43,8 +47,9 @@ def list_motions(
     reviews: Annotated[
         list[Review] | None, typer.Option("--review", help="What was said of it; several: any of them.")
     ] = None,
-    job: Annotated[str | None, typer.Option("--job", help="Of this job, in the order they were made.")] = None,
+    job: Annotated[str | None, typer.Option("--job", help=f"Of a job ({FORMS}), in the order they were made.")] = None,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List motions that fit everything given, newest first."""
@@ -55,11 +60,13 @@ def list_motions(
         "name": name,
         "text": text,
         "review": [review.value for review in reviews] if reviews else None,
-        "job": job,
         "limit": console.page_size(limit),
     }
     with Client.here() as client:
-        console.listing(client.pages("/v1/motions", **params), COLUMNS, _cell, as_json=as_json, limit=limit)
+        if job is not None:
+            params["job"] = find(client, "job", job).id
+        found = client.pages("/v1/motions", **params)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 @app.command()
@@ -89,7 +96,7 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
     from services.cli.client import Client
 
     with Client.here() as client:
-        for some in _ids(motions):
+        for some in _ids(client, motions):
             for take in client.post("/v1/motions/reroll", {"motions": some, "comment": comment})["items"]:
                 if as_json:
                     console.result_json(take)
@@ -102,7 +109,7 @@ def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: 
     from services.cli.client import Client
 
     with Client.here() as client:
-        for some in _ids(motions):
+        for some in _ids(client, motions):
             body = {"motions": some, "verdict": verdict, "comment": comment}
             for motion in client.post("/v1/motions/review", body):
                 if as_json:
@@ -111,28 +118,24 @@ def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: 
                     console.say(f"{motion['id']} {review_of(motion) or Review.NEW.value}")
 
 
-def _ids(motions: list[str]) -> Iterator[list[str]]:
+def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:
     """The ids, each once, so many as one request takes at a time.
 
     Raises:
-        InvalidInput: there is none, or one is no id.
+        InvalidInput: there is none, or one is ambiguous.
+        NotFound: there is no such motion.
     """
-    from uuid import UUID
-
-    given = sys.stdin.read().split() if motions == ["-"] else motions
-    ids = list(dict.fromkeys(given))
-    for number, each in enumerate(ids, 1):
-        try:
-            UUID(each)
-        except ValueError:
-            where = f"line {number}" if motions == ["-"] else "ID"
-            raise InvalidInput(
-                f"{each[:60]!r} is not the id of a motion", where=where, hint="`marey motions list` shows them."
-            ) from None
+    given = _lines(sys.stdin.read()) if motions == ["-"] else motions
+    ids = [each.id for each in find_all(client, "motion", dict.fromkeys(given))]
     if not ids:
         raise InvalidInput("there is no id of a motion", hint="`marey motions list` shows them.")
     for first in range(0, len(ids), MOST):
         yield ids[first : first + MOST]
+
+
+def _lines(text: str) -> list[str]:
+    """References of a text: a line each where names hold blanks, else the words."""
+    return [word for line in text.splitlines() for word in ([line.strip()] if ":" in line else line.split()) if word]
 
 
 def _cell(motion: dict[str, Any], column: str) -> object:

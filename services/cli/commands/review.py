@@ -14,6 +14,7 @@ import typer
 
 from services.cli import console
 from services.cli.commands.motions import Review, review_of
+from services.cli.references import FORMS, find
 from shared.errors import Conflict, InvalidInput, NotFound
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ CONTINUED = re.compile(r"-from-\d+$")
 
 
 def review(
-    job: Annotated[str, typer.Argument(metavar="JOB", help="The job's id.")],
+    job: Annotated[str, typer.Argument(metavar="JOB", help=f"The job: {FORMS}.")],
     output: Annotated[
         Path,
         typer.Option("-o", "--output", help="A .html (3D players) or .png (contact sheet); several get -1, -2, …"),
@@ -65,6 +66,7 @@ def review(
     if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="The ending says what to draw.")
     with Client.here() as client:
+        job = find(client, "job", job).id
         found, more = _motions(client, job, reviews, tags, skip, limit)
         name = client.get(f"/v1/jobs/{job}")["name"] or f"Job {job}"
         pages = [found[first : first + per_page] for first in range(0, len(found), per_page)]

@@ -10,6 +10,7 @@ from typer.core import TyperGroup
 from services.cli import console, evaluating
 from services.cli.evaluating import Asked
 from services.cli.options import ExtraColumns
+from services.cli.references import FORMS, find, find_all, listed, named, of_view
 
 COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
 
@@ -28,8 +29,8 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-Id = Annotated[str, typer.Argument(metavar="SCHEDULE", help="The schedule's id.")]
-Ids = Annotated[list[str], typer.Argument(metavar="SCHEDULE…", help="Ids of schedules.")]
+Id = Annotated[str, typer.Argument(metavar="SCHEDULE", help=f"The schedule: {FORMS}.")]
+Ids = Annotated[list[str], typer.Argument(metavar="SCHEDULE…", help=f"Schedules: of each {FORMS}.")]
 
 
 @app.command()
@@ -66,12 +67,13 @@ def add(
 
 
 @app.command("list")
-def list_schedules(as_json: console.Json = False) -> None:
+def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List schedules, newest first: when they are due, and how their last runs ended."""
     from services.cli.client import Client
 
     with Client.here() as client:
-        console.listing(client.pages("/v1/schedules", limit=console.PAGE), COLUMNS, _cell, as_json=as_json)
+        found = client.pages("/v1/schedules", limit=console.PAGE)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
 
 
 @app.command()
@@ -92,7 +94,7 @@ def run(schedule: Id, as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        made = client.post_once(f"/v1/schedules/{schedule}/run", None)
+        made = client.post_once(f"/v1/schedules/{find(client, 'schedule', schedule).id}/run", None)
     if as_json:
         console.result_json(made)
     else:
@@ -103,12 +105,16 @@ def run(schedule: Id, as_json: console.Json = False) -> None:
 def history(
     schedule: Id,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List the runs of a schedule, newest first."""
+    from services.cli.client import Client
     from services.cli.commands.evaluate import show_runs
 
-    show_runs(f"/v1/schedules/{schedule}/evaluations", limit, as_json)
+    with Client.here() as client:
+        wanted = find(client, "schedule", schedule).id
+    show_runs(f"/v1/schedules/{wanted}/evaluations", limit, as_json, full_ids=full_ids)
 
 
 @app.command()
@@ -116,23 +122,25 @@ def delete(schedules: Ids, yes: console.Yes = False) -> None:
     """Delete schedules; their runs stay."""
     from services.cli.client import Client
 
-    console.confirm(f"Delete {len(schedules)} schedules?", yes=yes)
     with Client.here() as client:
-        for each in schedules:
-            client.delete(f"/v1/schedules/{each}")
-            console.say(f"{each} deleted")
+        found = named(client, "schedule", "/v1/schedules", schedules)
+        console.confirm(f"Delete {listed(found)}?", yes=yes)
+        for each in found:
+            client.delete(f"/v1/schedules/{each.id}")
+            console.say(f"deleted {each}")
 
 
 def _change(schedules: list[str], as_json: bool, **changes: object) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        for each in schedules:
-            found = client.patch(f"/v1/schedules/{each}", changes)
+        for each in find_all(client, "schedule", schedules):
+            found = client.patch(f"/v1/schedules/{each.id}", changes)
             if as_json:
                 console.result_json(found)
             else:
-                console.say(f"{each} is paused" if found["paused"] else f"{each} is next due at {found['next']}")
+                what = of_view("schedule", found)
+                console.say(f"{what} is paused" if found["paused"] else f"{what} is next due at {found['next']}")
 
 
 def _cell(schedule: dict[str, Any], column: str) -> object:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from services.cli import console
+from services.cli.references import FORMS, find, find_all, listed, named, of_view
 from shared.errors import ItemsFailed, TimedOut
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ COLUMNS = ("id", "name", "url", "events", "paused", "pending", "failed")
 DELIVERY_COLUMNS = ("event", "kind", "state", "attempts", "status", "created", "next", "error")
 LOOK_SECONDS = 0.25
 
-Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help="The webhook's id.")]
-Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help="Ids of webhooks.")]
+Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help=f"The webhook: {FORMS}.")]
+Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help=f"Webhooks: of each {FORMS}.")]
 
 
 class State(StrEnum):
@@ -57,12 +58,13 @@ def add(
 
 
 @app.command("list")
-def list_webhooks(as_json: console.Json = False) -> None:
+def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List webhooks, newest first."""
     from services.cli.client import Client
 
     with Client.here() as client:
-        console.listing(client.pages("/v1/webhooks", limit=console.PAGE), COLUMNS, _cell, as_json=as_json)
+        found = client.pages("/v1/webhooks", limit=console.PAGE)
+        console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
 
 
 @app.command()
@@ -71,7 +73,7 @@ def show(webhook: Id, as_json: console.Json = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = client.get(f"/v1/webhooks/{webhook}")
+        found = client.get(f"/v1/webhooks/{find(client, 'webhook', webhook).id}")
     if as_json:
         console.result_json(found)
         return
@@ -103,6 +105,7 @@ def rotate(
     from services.cli.client import Client
 
     with Client.here() as client:
+        webhook = find(client, "webhook", webhook).id
         made = client.post_once(f"/v1/webhooks/{webhook}/rotate?overlap_hours={overlap_hours:g}", None)
     if as_json:
         console.result_json(made)
@@ -116,11 +119,12 @@ def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     """Remove webhooks, with their deliveries and log."""
     from services.cli.client import Client
 
-    console.confirm(f"Remove {len(webhooks)} webhooks?", yes=yes)
     with Client.here() as client:
-        for each in webhooks:
-            client.delete(f"/v1/webhooks/{each}")
-            console.say(f"{each} removed")
+        found = named(client, "webhook", "/v1/webhooks", webhooks)
+        console.confirm(f"Remove {listed(found)}?", yes=yes)
+        for each in found:
+            client.delete(f"/v1/webhooks/{each.id}")
+            console.say(f"removed {each}")
 
 
 @app.command()
@@ -131,25 +135,31 @@ def deliveries(
     ] = None,
     state: Annotated[State | None, typer.Option("--state", help="Only those.")] = None,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
     from services.cli.client import Client
 
     with Client.here() as client:
+        webhook = find(client, "webhook", webhook).id
         if event is not None:
+            event = find(client, "delivery", event, webhook=webhook).id
             _show_tries(client.get(f"/v1/webhooks/{webhook}/deliveries/{event}"), as_json)
             return
         wanted = {"state": state.value} if state else {}
         pages = client.pages(f"/v1/webhooks/{webhook}/deliveries", limit=console.page_size(limit), **wanted)
-        console.listing(pages, DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json, limit=limit)
+        console.listing(pages, DELIVERY_COLUMNS, dict.__getitem__, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 @app.command()
 def replay(
     webhook: Id,
     events: Annotated[
-        list[str] | None, typer.Argument(metavar="EVENT…", help="Ids of events.", show_default=False)
+        list[str] | None,
+        typer.Argument(
+            metavar="EVENT…", help="Deliveries: the id of the event, its last 8 digits, or last.", show_default=False
+        ),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="All whose tries are used up.")] = False,
     as_json: console.Json = False,
@@ -160,8 +170,10 @@ def replay(
     from services.cli.client import Client
 
     with Client.here() as client:
+        webhook = find(client, "webhook", webhook).id
         path = f"/v1/webhooks/{webhook}/deliveries"
-        wanted = events or [each["event"] for each in client.pages(path, limit=1000, state="failed")]
+        given = [each.id for each in find_all(client, "delivery", events or (), webhook=webhook)]
+        wanted = given or [each["event"] for each in client.pages(path, limit=1000, state="failed")]
         for event in wanted:
             found = client.post(f"{path}/{event}/replay")
             if as_json:
@@ -181,6 +193,7 @@ def send_test(
     from services.cli.client import Client
 
     with Client.here() as client:
+        webhook = find(client, "webhook", webhook).id
         found = client.post_once(f"/v1/webhooks/{webhook}/test", None)
         if wait:
             found = _tried(client, found, timeout)
@@ -227,12 +240,13 @@ def _change(webhooks: list[str], as_json: bool, *, paused: bool) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        for each in webhooks:
-            found = client.patch(f"/v1/webhooks/{each}", {"paused": paused})
+        for each in find_all(client, "webhook", webhooks):
+            found = client.patch(f"/v1/webhooks/{each.id}", {"paused": paused})
             if as_json:
                 console.result_json(found)
             else:
-                console.say(f"{each} is paused" if found["paused"] else f"{each} goes on")
+                what = of_view("webhook", found)
+                console.say(f"{what} is paused" if found["paused"] else f"{what} goes on")
 
 
 def _cell(webhook: dict[str, Any], column: str) -> object:

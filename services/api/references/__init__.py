@@ -1,0 +1,1 @@
+"""What the short references of a person stand for."""

@@ -1,0 +1,69 @@
+"""`/v1/resolve`."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+from uuid import UUID
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+
+from services.api.auth import Reader
+from services.api.context import Connection
+from services.api.problems import RESPONSES
+from services.api.schemas import View
+from shared import jobs
+from shared.jobs.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
+
+router = APIRouter(prefix="/v1/resolve", tags=["references"], responses=RESPONSES)
+
+
+AskedKind = Literal["job", "motion", "stream", "evaluation", "schedule", "webhook", "delivery"]
+
+
+class MatchView(View):
+    """Something that a reference may stand for."""
+
+    kind: ReferenceKind
+    id: UUID
+    name: str | None = Field(description="Of a delivery, its kind.")
+    state: str | None = Field(description="Of a motion, its review.")
+    created: datetime
+    items: int | None = Field(description="Of a job, how many.")
+    job: UUID | None = Field(description="Of a motion.")
+    index: int | None = Field(description="Of a motion, its prompt's in the job.")
+    variant: int | None = Field(description="Of a motion, among those of its prompt.")
+
+    @classmethod
+    def of(cls, match: ReferenceMatch) -> MatchView:
+        """The view of a match."""
+        return cls(**vars(match))
+
+
+class ResolutionView(View):
+    """What a reference stands for."""
+
+    matches: list[MatchView] = Field(description="Newest first. None: nothing; several: it is ambiguous. At most 10.")
+
+
+@router.get("")
+def resolve(
+    conn: Connection,
+    key: Reader,
+    kind: Annotated[AskedKind, Query(description="What it refers to. A delivery needs `webhook`.")],
+    reference: Annotated[
+        str,
+        Query(
+            min_length=1,
+            max_length=MAX_REFERENCE,
+            description="An id; its last 8 or more digits; a name; `last`, the newest; of a motion also `JOB:INDEX` or "
+            "`JOB:INDEX.VARIANT`, where JOB is any of these.",
+            examples=["1a2b3c4d", "day 1", "last", "last:0.1"],
+        ),
+    ],
+    webhook: Annotated[UUID | None, Query(description="Whose delivery.")] = None,
+) -> ResolutionView:
+    """What a reference that a person typed stands for, among what the key's tenant has."""
+    found = jobs.resolve_reference(conn, key.tenant, ReferenceKind(kind), reference, webhook=webhook)
+    return ResolutionView(matches=[MatchView.of(match) for match in found])

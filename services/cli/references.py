@@ -1,0 +1,121 @@
+"""Ids as a person types them: whole, by their last digits, by name, `last`, or a motion by its place in a job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+from uuid import UUID
+
+from services.cli import console
+from shared.errors import InvalidInput, NotFound
+
+if TYPE_CHECKING:
+    from services.cli.client import Client
+
+FORMS = "its id, the last 8 digits of it, a name, or last"
+MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX, JOB:INDEX.VARIANT, or last"
+LISTED = 5
+LISTS = {
+    "job": "marey jobs list",
+    "motion": "marey motions list",
+    "evaluation": "marey eval list",
+    "schedule": "marey eval schedule list",
+    "webhook": "marey webhooks list",
+    "delivery": "marey webhooks deliveries WEBHOOK",
+    "key": "marey admin keys list",
+}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a command was pointed at."""
+
+    kind: str
+    id: str
+    match: Mapping[str, Any] | None = None
+    """As the server answered; None where the whole id was given, which the server was not asked about."""
+
+    def __str__(self) -> str:
+        """`job 1a2b3c4d 'day 1' (120 items)`."""
+        return describe(self.match or {"kind": self.kind, "id": self.id})
+
+
+def whole_id(text: str) -> str | None:
+    """The text as an id, if it is a whole one."""
+    try:
+        return str(UUID(text)) if len(text) in (32, 36) else None
+    except ValueError:
+        return None
+
+
+def find(client: Client, kind: str, text: str, *, webhook: str | None = None) -> Reference:
+    """What a person means; the server is asked where it is not a whole id.
+
+    Raises:
+        NotFound: nothing.
+        InvalidInput: it is ambiguous; the error lists the candidates.
+    """
+    if (identifier := whole_id(text)) is not None:
+        return Reference(kind, identifier)
+    matches = client.get("/v1/resolve", kind=kind, reference=text, webhook=webhook)["matches"]
+    return choose(kind, text, matches)
+
+
+def find_all(client: Client, kind: str, texts: Iterable[str], *, webhook: str | None = None) -> list[Reference]:
+    """`find` for several, before anything is done to one of them."""
+    found = [find(client, kind, text, webhook=webhook) for text in texts]
+    return list({each.id: each for each in found}.values())
+
+
+def named(client: Client, kind: str, path: str, texts: Iterable[str]) -> list[Reference]:
+    """`find_all` for a verb that cannot be taken back: each with its name, so that the command can say what it met.
+
+    Args:
+        path: of the noun, such as `/v1/jobs`.
+    """
+    return [
+        each if each.match is not None else of_view(kind, client.get(f"{path}/{each.id}"))
+        for each in find_all(client, kind, texts)
+    ]
+
+
+def listed(found: Sequence[Reference]) -> str:
+    """What a question is about: each by name, or how many there are."""
+    return ", ".join(map(str, found)) if len(found) <= LISTED else f"{len(found)} {found[0].kind}s"
+
+
+def choose(kind: str, text: str, matches: list[Mapping[str, Any]]) -> Reference:
+    """The one match.
+
+    Raises:
+        NotFound, InvalidInput: as `find`.
+    """
+    if not matches:
+        raise NotFound(f"there is no such {kind}", where=f"{kind} {text[:80]!r}", hint=f"`{LISTS[kind]}` shows yours.")
+    if len(matches) > 1:
+        lines = "\n".join(f"  {each['id']}  {describe(each)}, {console.moment(each['created'])}" for each in matches)
+        raise InvalidInput(
+            f"{text[:80]!r} may be any of these:\n{lines}",
+            where=f"{kind.upper()}",
+            hint="Give the whole id, or more of its last digits.",
+        )
+    return Reference(kind, str(matches[0]["id"]), matches[0])
+
+
+def describe(match: Mapping[str, Any]) -> str:
+    """A match in a few words."""
+    words = [str(match["kind"]), console.short_id(str(match["id"]))]
+    if match.get("name"):
+        words.append(repr(match["name"]))
+    if match.get("items") is not None:
+        words.append(f"({match['items']} items)" if match["items"] != 1 else "(1 item)")
+    if match.get("job"):
+        words.append(f"({console.short_id(str(match['job']))}:{match['index']}.{match['variant']})")
+    return " ".join(words)
+
+
+def of_view(kind: str, view: Mapping[str, Any]) -> Reference:
+    """What a view of the API shows."""
+    match = {"kind": kind, "id": view["id"], "name": view.get("name"), "items": view.get("total")}
+    return Reference(kind, str(view["id"]), match)
