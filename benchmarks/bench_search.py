@@ -39,11 +39,13 @@ REVIEWS = {"new": "new", "kept (1 in 1,000)": "kept", "rejected (none)": "reject
 ITEMS = sa.text("""
     INSERT INTO item (id, job_id, position, index, variant, name, prompt, model, bundle, seed, settings, tags, text_key,
                       generate_batch_key, stage, queue, batch_key, state, reason, finished_at)
-    SELECT CAST('01900000-0001-7000-8000-' || lpad(to_hex(n), 12, '0') AS uuid), CAST(:job AS uuid), CAST(n % CAST(:size AS bigint) AS int), CAST(n % CAST(:size AS bigint) AS int), 0,
+    SELECT CAST('01900000-0001-7000-8000-' || lpad(to_hex(n), 12, '0') AS uuid), CAST(:job AS uuid),
+           CAST(n % CAST(:size AS bigint) AS int), CAST(n % CAST(:size AS bigint) AS int), 0,
            CASE WHEN n < 0.3 * CAST(:motions AS bigint) THEN 'old' WHEN n % 10 BETWEEN 3 AND 5 THEN 'take'
                 WHEN n % 10000 = 8 THEN 'hero' ELSE 'sc' END || n,
            'a person ' || CASE WHEN n % 10 < 3 THEN 'walks ' WHEN n % 10 < 6 THEN 'crawls ' ELSE 'turns ' END || n
-           || ' steps forward and waves with the right hand' || CASE WHEN n % 10000 = 7 THEN ' in a pirouette' ELSE '' END
+           || ' steps forward and waves with the right hand'
+           || CASE WHEN n % 10000 = 7 THEN ' in a pirouette' ELSE '' END
            || CASE WHEN n < 0.3 * CAST(:motions AS bigint) THEN ', jumping' ELSE '' END,
            'toy', 'toy@0', n % 100000, '{}',
            CASE WHEN n % 10 BETWEEN 2 AND 4 THEN ARRAY['show=one'] WHEN n % 10000 = 9 THEN ARRAY['shot=7', 'show=two']
@@ -91,7 +93,8 @@ def main() -> None:
         print(f"{MOTIONS:,} motions loaded in {time.perf_counter() - began:.0f} s; load {os.getloadavg()[0]:.1f}\n")
         cluster.serve()
         print(
-            "| statistics | page | filters | median | p95 | slowest filter, p95 | over 150 ms |\n|---|---|---|---|---|---|---|"
+            "| statistics | page | filters | median | p95 | slowest filter, p95 | over 150 ms |\n"
+            "|---|---|---|---|---|---|---|"
         )
         rows = [*_measured(cluster, "none")]
         with cluster.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as conn:

@@ -85,7 +85,7 @@ def listed(found: Sequence[Reference]) -> str:
     return ", ".join(map(str, found)) if len(found) <= LISTED else f"{len(found)} {found[0].kind}s"
 
 
-def choose(kind: str, text: str, matches: list[Mapping[str, Any]]) -> Reference:
+def choose(kind: str, text: str, matches: Sequence[Mapping[str, Any]]) -> Reference:
     """The one match.
 
     Raises:

@@ -20,7 +20,6 @@ import sqlalchemy as sa
 from shared.errors import InvalidInput
 from shared.jobs import schema
 from shared.jobs.journal import among
-from shared.jobs.pages import Order
 from shared.jobs.schema.base import short_id
 from shared.jobs.searching import motions_at
 from shared.jobs.submit import check_text
@@ -130,7 +129,7 @@ def _rows(conn: sa.Connection, tenant: str, kind: ReferenceKind, reference: str)
     readings = _by_id(reference, c.id)
     if not _WHOLE.fullmatch(reference):
         readings.append(c.name == reference)
-    rows = _read(conn, query, readings, Order(c.created_at, c.id), last=reference == LAST)
+    rows = _read(conn, query, readings, c.created_at, c.id, last=reference == LAST)
     return [ReferenceMatch(kind, *row) for row in rows]
 
 
@@ -138,7 +137,8 @@ def _read(
     conn: sa.Connection,
     query: sa.Select[*tuple[Any, ...]],
     readings: Sequence[sa.ColumnElement[bool]],
-    order: Order,
+    created: sa.Column[Any],
+    identifier: sa.Column[Any],
     *,
     last: bool,
 ) -> list[Sequence[Any]]:
@@ -147,10 +147,10 @@ def _read(
     for reading in readings:
         # A fence: by the order of creation the planner would walk the whole listing for what is rare.
         fitting = query.where(reading).offset(0).subquery("fitting")
-        order_of_fitting = Order(fitting.c[order.created.name], fitting.c[order.id.name])
-        rows += conn.execute(sa.select(fitting).order_by(*order_of_fitting.by()).limit(MOST)).all()
+        newest = fitting.c[created.name].desc(), fitting.c[identifier.name].desc()
+        rows += conn.execute(sa.select(fitting).order_by(*newest).limit(MOST)).all()
     if last:
-        rows += conn.execute(query.order_by(*order.by()).limit(1)).all()
+        rows += conn.execute(query.order_by(created.desc(), identifier.desc()).limit(1)).all()
     return rows
 
 
@@ -172,8 +172,7 @@ def _motions(conn: sa.Connection, tenant: str, reference: str) -> list[Reference
     table = schema.motion_search.c
     query = sa.select(table.motion_id, table.created_at).where(table.tenant_id == tenant)
     readings = _by_id(reference, table.motion_id)
-    order = Order(table.created_at, table.motion_id)
-    ids = [row[0] for row in _read(conn, query, readings, order, last=reference == LAST)]
+    ids = [row[0] for row in _read(conn, query, readings, table.created_at, table.motion_id, last=reference == LAST)]
     if place := _PLACE.fullmatch(reference):
         jobs = _newest(_rows(conn, tenant, ReferenceKind.JOB, place["job"]))
         if len(jobs) > 1:
@@ -182,14 +181,15 @@ def _motions(conn: sa.Connection, tenant: str, reference: str) -> list[Reference
     variant = None if place is None or place["variant"] is None else int(place["variant"])
     motion, item = schema.motion.c, schema.item.c
     found = (
-        sa.select(motion.id, item.name, motion.created_at, motion.review, motion.job_id, item.index, item.variant)
+        sa.select(
+            *(motion.id, item.name, motion.created_at, motion.review),
+            *(motion.job_id.label("job"), item.index.label("place"), item.variant),
+        )
         .join(schema.item, item.id == motion.item_id)
         .where(among(motion.id, ids), motion.tenant_id == tenant)
     )
     return [
-        ReferenceMatch(
-            ReferenceKind.MOTION, row.id, row.name, row.created_at, row.review, None, row.job_id, row.index, row.variant
-        )
+        ReferenceMatch(ReferenceKind.MOTION, *row[:4], job=row.job, index=row.place, variant=row.variant)
         for row in conn.execute(found)
         if variant is None or row.variant == variant
     ]
@@ -203,5 +203,5 @@ def _deliveries(conn: sa.Connection, webhook: UUID, reference: str) -> list[Refe
         .where(c.webhook_id == webhook)
     )
     readings = _by_id(reference, c.event_id)
-    rows = _read(conn, query, readings, Order(c.created_at, c.event_id), last=reference == LAST)
+    rows = _read(conn, query, readings, c.created_at, c.event_id, last=reference == LAST)
     return [ReferenceMatch(ReferenceKind.DELIVERY, *row) for row in rows]

@@ -49,6 +49,17 @@ CHECKS = {
         SELECT id, failed, dead, total, fail_early FROM job
         WHERE failed + dead > fail_early * total AND ready + leased > 0
     """,
+    "a motion is found by other terms than its own": """
+        WITH made AS (
+            SELECT motion.id, motion.job_id, motion.created_at, motion.tenant_id,
+                   motion_terms(motion.tenant_id, motion.job_id, item.index, item.name, item.tags, motion.review,
+                                item.prompt) AS terms
+            FROM motion JOIN item ON item.id = motion.item_id
+        )
+        (SELECT * FROM made EXCEPT SELECT motion_id, job_id, created_at, tenant_id, terms FROM motion_search)
+        UNION ALL
+        (SELECT motion_id, job_id, created_at, tenant_id, terms FROM motion_search EXCEPT SELECT * FROM made)
+    """,
     "a motion's file is not stored": """
         SELECT motion_file.motion_id, asset.sha256 FROM motion_file JOIN asset ON asset.id = motion_file.asset_id
         WHERE asset.state <> 'stored'

@@ -188,13 +188,14 @@ def new_evaluation(
     repeats: int = 1,
     baseline: UUID | None = None,
     tenant: str = DEFAULT_TENANT,
+    id: UUID | None = None,
 ) -> UUID:
     """A planned evaluation of these prompts; None = those of the evaluator's bundle."""
     source = "test" if prompts is None else "mine"
     request = EvaluationRequest(bundle, evaluator, source=source, repeats=repeats, seed=7, baseline=baseline)
     with transaction(engine) as conn:
         sha256 = None if prompts is None else store_prompts(conn, tenant, prompts)
-        made = create_evaluation(conn, NewEvaluation(tenant, request, sha256))
+        made = create_evaluation(conn, NewEvaluation(tenant, request, sha256, **({} if id is None else {"id": id})))
     assert made is not None
     return made
 

@@ -22,6 +22,7 @@ app = typer.Typer(
 COLUMNS = ("id", "name", "url", "events", "paused", "pending", "failed")
 DELIVERY_COLUMNS = ("event", "kind", "state", "attempts", "status", "created", "next", "error")
 LOOK_SECONDS = 0.25
+DELIVERIES = "Deliveries: the id of the event, its last 8 digits, or last."
 
 Id = Annotated[str, typer.Argument(metavar="WEBHOOK", help=f"The webhook: {FORMS}.")]
 Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help=f"Webhooks: of each {FORMS}.")]
@@ -157,9 +158,7 @@ def replay(
     webhook: Id,
     events: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="EVENT…", help="Deliveries: the id of the event, its last 8 digits, or last.", show_default=False
-        ),
+        typer.Argument(metavar="EVENT…", help=DELIVERIES, show_default=False),
     ] = None,
     failed: Annotated[bool, typer.Option("--failed", help="All whose tries are used up.")] = False,
     as_json: console.Json = False,

@@ -228,32 +228,3 @@ def test_motions_are_found_by_all_that_is_asked(engine: sa.Engine) -> None:
     for wrong in ({"text": "a\0"}, {"name": "\ud800"}, {"tags": ["\0"]}):
         with pytest.raises(InvalidInput):
             found(**wrong)
-
-
-def test_a_search_uses_its_index(engine: sa.Engine) -> None:
-    """Asked of the planner with scans of the table forbidden: an index that does not fit the words is not used then."""
-    plans = {
-        "ix_item_tags": MotionFilter(tags=["a"]),
-        "ix_item_name": MotionFilter(name="a"),
-        "ix_item_words": MotionFilter(text="walk"),
-        "ix_motion_review": MotionFilter(reviews=[Review.KEPT]),
-    }
-    seen: list[str] = []
-
-    def explain(conn: sa.Connection, _cursor: object, statement: str, parameters: object, *_: object) -> None:
-        if statement.startswith("SELECT motion.id"):
-            raw = conn.connection.cursor()
-            raw.execute("EXPLAIN " + statement, parameters)
-            seen.append("\n".join(row[0] for row in raw.fetchall()))
-
-    sa.event.listen(engine, "before_cursor_execute", explain)
-    with transaction(engine) as conn:
-        for setting in ("enable_seqscan", "enable_sort", "enable_hashjoin", "enable_mergejoin"):
-            conn.execute(sa.text(f"SET LOCAL {setting} = off"))
-        conn.execute(sa.text("DROP INDEX ix_motion_tenant_id_id, ix_motion_job_id_id"))
-        conn.execute(sa.text("ALTER TABLE item DROP CONSTRAINT pk_item CASCADE"))
-        for found in plans.values():
-            list_motions(conn, "default", found=found)
-        sa.event.remove(engine, "before_cursor_execute", explain)
-        conn.rollback()
-    assert [index for index, plan in zip(plans, seen, strict=True) if index not in plan] == [], "\n\n".join(seen)

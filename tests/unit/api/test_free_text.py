@@ -19,7 +19,7 @@ READ_BY_HAND = {
     "NewStreamBody": {"prompt", "name", "model"},  # shared.items
     "ParseBody": {"prompts"},  # shared.text.prompts
 }
-NOT_STORED = {"cursor", "Range", "If-Range", "If-None-Match", "Last-Event-ID"}
+NOT_STORED = {"cursor", "reference", "Range", "If-Range", "If-None-Match", "Last-Event-ID"}
 """Parsed into something else, or only compared."""
 
 

@@ -1,0 +1,106 @@
+"""Commands take what a person can type, say what they met, and never guess; tables of 80 columns keep ids whole."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import subprocess
+import sys
+from uuid import uuid4
+
+import pytest
+
+from shared.jobs import create_key, create_tenant, transaction
+from tests.support.command import Command
+from tests.support.live_api import LiveApi
+
+
+@pytest.fixture(scope="module")
+def job(api: LiveApi) -> str:
+    with api.client() as client:
+        prompts = [{"prompt": f"a person walks {n} steps", "name": f"take {n}", "variants": 2} for n in range(3)]
+        job = client.submit(prompts, name="day 1")["id"]
+        api.work()
+    return job
+
+
+def short(identifier: str) -> str:
+    return identifier[-8:]
+
+
+def test_a_job_is_named_by_digits_name_last_or_whole(marey: Command, job: str) -> None:
+    for text in (job, short(job), short(job).upper(), "day 1", "last"):
+        assert marey("jobs", "show", text, "--json").ok().lines[0]["id"] == job
+        assert marey("jobs", "wait", text, "--json").ok().lines[0]["id"] == job
+    marey("jobs", "show", "day 2").refused(3, "there is no such job", "marey jobs list")
+    marey("jobs", "show", str(uuid4())).refused(3)
+
+
+def test_a_motion_is_named_by_its_place_and_verdicts_go_where_they_belong(marey: Command, job: str) -> None:
+    listed = marey("motions", "list", "--job", "day 1", "--json").ok().lines
+    motions = {(m["index"], m["variant"]): m["id"] for m in listed}
+    assert len(motions) == 6
+    for text in (f"{job}:1.0", f"{short(job)}:1.0", "day 1:1.0", "last:1.0", short(motions[1, 0])):
+        assert marey("motions", "keep", text, "--json").ok().lines[0]["id"] == motions[1, 0]
+    said = marey("motions", "keep", "last:1").refused(2, "may be any of these", motions[1, 0], motions[1, 1])
+    assert f"{short(job)}:1.1" in said.err
+    stdin = f"day 1:2.0\n{motions[2, 1]} {short(motions[0, 0])}\n"
+    assert {m["id"] for m in marey("motions", "reject", "-", "--json", stdin=stdin).ok().lines} == {
+        motions[2, 0], motions[2, 1], motions[0, 0],
+    }  # fmt: skip
+    marey("motions", "keep", "last:9").refused(3, "there is no such motion")
+
+
+def test_an_ambiguous_name_lists_its_candidates_and_nothing_is_done(marey: Command, api: LiveApi, job: str) -> None:
+    with api.client() as client:
+        made = [client.submit([{"prompt": "a person waits"}], name="twice")["id"] for _ in range(2)]
+    for command in (("jobs", "cancel", "twice"), ("jobs", "delete", "-y", short(job), "twice")):
+        marey(*command).refused(2, "'twice' may be any of these", *made, short(made[0]), "(1 item)")
+    assert marey("jobs", "show", job).ok()
+    assert "cancelled job " + short(made[0]) + " 'twice' (1 item)" in marey("jobs", "cancel", short(made[0])).ok().err
+    assert f"deleted job {short(made[0])} 'twice' (1 item)" in marey("jobs", "delete", "-y", made[0]).ok().err
+    assert f"cancelled job {short(made[1])}" in marey("jobs", "cancel", "twice").ok().err
+
+
+def test_another_tenants_job_is_not_there(api: LiveApi, job: str) -> None:
+    with transaction(api.engine) as conn:
+        create_tenant(conn, "elsewhere")
+        key = create_key(conn, "ann", ["admin"], tenant="elsewhere").secret
+    other = Command({"MAREY_SERVER": api.url, "MAREY_KEY": key})
+    for text in (job, short(job), "day 1", "last"):
+        other("jobs", "show", text).refused(3, "there is no such job")
+
+
+def drawn(api: LiveApi, *arguments: str) -> str:
+    """What a command draws on a terminal of 80 columns."""
+    master, slave = pty.openpty()
+    environment = {**os.environ, "COLUMNS": "80", "TERM": "xterm", "MAREY_SERVER": api.url, "MAREY_KEY": api.key}
+    command = [sys.executable, "-m", "services.cli", *arguments]
+    process = subprocess.Popen(command, stdout=slave, env=environment)
+    os.close(slave)
+    output = b""
+    while True:
+        try:
+            piece = os.read(master, 65536)
+        except OSError:
+            break
+        if not piece:
+            break
+        output += piece
+    assert process.wait(60) == 0
+    os.close(master)
+    return re.sub(r"\x1b\[[0-9;]*m", "", output.decode())
+
+
+def test_tables_fit_eighty_columns_with_ids_on_one_line(api: LiveApi, marey: Command, job: str) -> None:
+    for arguments in (("jobs", "list"), ("motions", "list")):
+        ids = [row["id"] for row in marey(*arguments, "--json").ok().lines]
+        lines = drawn(api, *arguments).splitlines()
+        assert max(map(len, lines)) <= 80
+        for identifier in ids:
+            assert sum(line.startswith(short(identifier)) for line in lines) == 1
+        assert not any(ids[0] in line for line in lines)
+        whole = drawn(api, *arguments, "-l").splitlines()
+        assert all(any(line.startswith(identifier) for line in whole) for identifier in ids)
+        assert ids == [line.split("\t")[0] for line in marey(*arguments).ok().out.splitlines()], "a pipe gets whole ids"
