@@ -6,9 +6,6 @@ import getpass
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
-from uuid import UUID
-
-from shared.errors import InvalidInput
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
@@ -74,15 +71,3 @@ def operator() -> Actor:
     except (KeyError, OSError):  # a container's user without a name
         name = "?"
     return Actor(f"marey admin ({name})")
-
-
-def identifier(text: str, what: str, hint: str) -> UUID:
-    """An id that was given on the command line.
-
-    Raises:
-        InvalidInput: it is none.
-    """
-    try:
-        return UUID(text)
-    except ValueError:
-        raise InvalidInput(f"{text!r} is not the id of {what}", hint=hint) from None

@@ -11,7 +11,9 @@ import typer
 
 from services.cli import console
 from services.cli.commands import backup, keys, tenants
-from services.cli.database import connection, engine_of, identifier, operator, settings_here
+from services.cli.commands.keys import find_key
+from services.cli.database import connection, engine_of, operator, settings_here
+from services.cli.references import FORMS
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
@@ -68,16 +70,16 @@ def gc(as_json: console.Json = False) -> None:
 @app.command()
 def audit(
     tenant: Annotated[str | None, typer.Option("--tenant", help="In this tenant alone.")] = None,
-    key: Annotated[str | None, typer.Option("--key", help="By the key of this id alone.")] = None,
+    key: Annotated[str | None, typer.Option("--key", help=f"By one key alone: {FORMS}.")] = None,
     verb: Annotated[str | None, typer.Option("--verb", help="As job.cancel; or a noun, as job.")] = None,
     days: Annotated[float | None, typer.Option("--days", min=0, help="In the last so many days.")] = None,
     limit: console.Limit = None,
     as_json: console.Json = False,
 ) -> None:
     """Show who did what, newest first: by name of the key, or of whoever ran `marey admin`."""
-    wanted = None if key is None else identifier(key, "a key", "`marey admin keys list` shows them.")
     since = None if days is None else datetime.now(UTC) - timedelta(days=days)
     with connection() as conn:
+        wanted = None if key is None else find_key(conn, tenant, key)
         found = _audited(conn, console.page_size(limit), tenant=tenant, key=wanted, verb=verb, since=since)
         console.listing(map(_audit_row, found), AUDIT_COLUMNS, _audit_cell, as_json=as_json, limit=limit)
 

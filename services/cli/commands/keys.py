@@ -92,7 +92,7 @@ def rotate(
     with connection() as conn:
         from shared.jobs import audit, rotate_key
 
-        wanted = _find(conn, tenant, key)
+        wanted = find_key(conn, tenant, key)
         made = rotate_key(conn, tenant, wanted, overlap=hours * 3600)
         audit(conn, tenant, operator(), "key.rotate", wanted, new=str(made.key.id), overlap_hours=hours)
     _show_secret(made, as_json)
@@ -106,21 +106,21 @@ def revoke(key: Key, tenant: Tenant = "default") -> None:
     with connection() as conn:
         from shared.jobs import audit, revoke_key
 
-        wanted = _find(conn, tenant, key)
+        wanted = find_key(conn, tenant, key)
         revoked = revoke_key(conn, tenant, wanted)
         audit(conn, tenant, operator(), "key.revoke", wanted, name=revoked.name)
     console.say(f"revoked key {console.short_id(str(wanted))} {revoked.name!r}")
 
 
-def _find(conn: sa.Connection, tenant: str, key: str) -> UUID:
-    """The key that is meant; raises as `services.cli.references.find`."""
-    from shared.jobs import ReferenceKind, resolve_reference
+def find_key(conn: sa.Connection, tenant: str | None, key: str) -> UUID:
+    """The key that is meant, of a tenant or, with None, of any; raises as `services.cli.references.find`."""
+    from shared.jobs import ReferenceKind, list_tenants, resolve_reference
 
     if (identifier := whole_id(key)) is not None:
         return UUID(identifier)
-    found = resolve_reference(conn, tenant, ReferenceKind.KEY, key)
-    matches = [{**vars(each), "created": each.created.isoformat()} for each in found]
-    return UUID(choose("key", key, matches).id)
+    tenants = [each.id for each in list_tenants(conn)] if tenant is None else [tenant]
+    found = [match for each in tenants for match in resolve_reference(conn, each, ReferenceKind.KEY, key)]
+    return UUID(choose("key", key, [{**vars(each), "created": each.created.isoformat()} for each in found]).id)
 
 
 def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:

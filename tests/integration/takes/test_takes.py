@@ -133,5 +133,5 @@ def test_nothing_of_it_is_another_tenants_or_a_readers(api: LiveApi, http: httpx
 
 
 def test_an_id_that_is_none_says_where_it_stands(marey: Command) -> None:
-    marey("motions", "keep", "-", stdin=f"{uuid4()}\nwalk\n").refused(2, "line 2", "'walk' is not the id of a motion")
+    marey("motions", "keep", "-", stdin=f"{uuid4()}\nwalk\n").refused(3, "'walk'", "there is no such motion")
     marey("motions", "keep", uuid4()).refused(3, "there is no such motion")
