@@ -36,7 +36,7 @@ from services.api.process import prepare_process
 from services.api.queries import known_query
 from services.api.rates import Rates
 from services.api.reference import build_reference
-from services.api.references.routes import router as references_router
+from services.api.resolving.routes import router as references_router
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
 from services.api.streams.hub import Hub
