@@ -13,7 +13,7 @@ import argparse
 import itertools
 import json
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,7 @@ def measure(
 
 
 def choose(prompts: Sequence[EvaluationPrompt], obeyed: dict[str, list[bool]]) -> list[dict[str, Any]]:
-    """The best prompt of each act, the surest act first."""
+    """The best prompt of each act: first one of every act, then of its other sides; the surest first."""
     best: dict[Act, dict[str, Any]] = {}
     for prompt in prompts:
         sessions = obeyed[prompt.text]
@@ -99,7 +99,12 @@ def choose(prompts: Sequence[EvaluationPrompt], obeyed: dict[str, list[bool]]) -
         known = best.get(act_of(prompt))
         if share >= LEAST and (known is None or share > known["obeyed"] / known["sessions"]):
             best[act_of(prompt)] = row
-    return sorted(best.values(), key=lambda row: -row["obeyed"] / row["sessions"])
+    seen: Counter[str] = Counter()
+    ranked: list[tuple[int, float, dict[str, Any]]] = []
+    for (act, _), row in best.items():
+        ranked.append((seen[act], -row["obeyed"] / row["sessions"], row))
+        seen[act] += 1
+    return [row for *_, row in sorted(ranked, key=lambda each: each[:2])]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -16,7 +16,7 @@ from shared.motion.live_page import live_page
 
 router = APIRouter()
 
-MOST_EXAMPLES = 8
+MOST_EXAMPLES = 6
 
 
 @cache
