@@ -11,11 +11,12 @@ import pytest
 from fastapi.routing import APIRoute
 
 from services.api.app import ROUTERS, create_app
+from services.api.docs.routes import FILES
 from shared.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi
 
-PAGES = {"GET /", "GET /live"}
+PAGES = {"GET /", "GET /live", "GET /docs", "GET /openapi.json", *(f"GET /docs/{name}" for name in FILES)}
 NOBODYS = {"GET /livez", "GET /readyz", *PAGES}
 """What wants no key: another one is put here on purpose, or the tests fail."""
 SCOPES = {"GET": "read", "PATCH": "operate", "DELETE": "operate", "POST": "operate"}
