@@ -14,9 +14,10 @@ from uuid import uuid4
 
 import httpx2
 import pytest
+import sqlalchemy as sa
 
 from shared.errors import NotFound
-from shared.jobs import WorkerBeat, beat, transaction
+from shared.jobs import WorkerBeat, beat, beat_scheduler, retire, transaction
 from shared.spool import IN_MEMORY
 from tests.support.live_api import BUNDLE, LiveApi, wait_until
 
@@ -412,6 +413,18 @@ def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:
     with transaction(api.engine) as conn:
         beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu"))
     assert httpx2.get(f"{api.url}/readyz").status_code == 200
+
+
+def test_a_stalled_scheduler_is_told_and_leaves_the_api_ready(api: LiveApi) -> None:
+    with transaction(api.engine) as conn:
+        beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
+        beat_scheduler(conn, "stalled", host="here", pid=1)
+        conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 minute' WHERE id = 'stalled'"))
+    wait_until(lambda: not httpx2.get(f"{api.url}/readyz").json()["checks"]["scheduler"]["ok"])
+    wait_until(lambda: httpx2.get(f"{api.url}/readyz").json()["ready"])
+    with transaction(api.engine) as conn:
+        retire(conn, "stalled")
+    wait_until(lambda: httpx2.get(f"{api.url}/readyz").json()["checks"]["scheduler"]["ok"])
 
 
 def test_metrics_count_the_items_that_wait_by_queue(api: LiveApi, http: httpx2.Client) -> None:

@@ -9,13 +9,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import structlog
 
 from shared.errors import MareyError, Unreachable
-from shared.jobs import TEXT_QUEUE, check_revision, list_workers, transaction
+from shared.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
 from shared.runtime.queue import check_queue
 
 if TYPE_CHECKING:
@@ -32,10 +32,16 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True)
 class Result:
-    """How a check ended. `message` is for everybody: what is down, never where or how."""
+    """How a check ended.
+
+    Attributes:
+        message: for everybody: what is down, never where or how.
+        required: requests cannot be answered without it.
+    """
 
     ok: bool
     message: str | None = None
+    required: bool = True
 
 
 @dataclass(frozen=True)
@@ -45,10 +51,12 @@ class Check:
     Attributes:
         run: raises MareyError when it does not.
         message: what everybody is told then; the log has the error itself.
+        required: requests cannot be answered without it; else it is told, and the API stays ready.
     """
 
     run: Callable[[Context], object]
     message: str
+    required: bool = True
 
 
 def _ping(shared: Context) -> None:
@@ -69,6 +77,14 @@ def _model(shared: Context) -> None:
     shared.seen_ready = True
 
 
+def _scheduler(shared: Context) -> None:
+    """One that was heard of has made progress lately. An API that never saw one says nothing: it may come later."""
+    with transaction(shared.engine) as conn:
+        known = list_schedulers(conn)
+    if known and not known[0].live:
+        raise Unreachable(f"no scheduler has made progress for {known[0].silence:.0f} s")
+
+
 CHECKS: Mapping[str, Check] = {
     "database": Check(
         lambda shared: check_revision(shared.engine), "the database does not answer, or it or its tables are too old"
@@ -76,6 +92,8 @@ CHECKS: Mapping[str, Check] = {
     "queue": Check(_ping, "the queue does not answer, or is too old"),
     "store": Check(lambda shared: shared.store.check(), "the asset store does not answer"),
     "model": Check(_model, "no worker has its model loaded yet"),
+    # Submits and reads work without it, so a load balancer must not take this API away.
+    "scheduler": Check(_scheduler, "the scheduler stalls or was killed", required=False),
 }
 UNCHECKED = Result(False, "not checked yet")
 
@@ -105,7 +123,8 @@ class Readiness:
         found: dict[str, Result] = {}
         for name, check in self._checks.items():
             at, result = self._results.get(name, (float("inf"), UNCHECKED))
-            found[name] = Result(False, check.message) if at < oldest else result
+            current = Result(False, check.message) if at < oldest else result
+            found[name] = replace(current, required=check.required)
         return found
 
     def _repeat(self, name: str, check: Check) -> None:

@@ -36,14 +36,16 @@ async def livez() -> str:
 
 @router.get("/readyz", response_model=ReadyView, responses={503: {"model": ReadyView, "description": "Not yet"}})
 async def readyz(shared: Shared) -> JSONResponse:
-    """Database, queue and store answered within seconds, and a worker has had its model loaded.
+    """Database, queue and store answered within seconds, and a worker has had its model loaded. A scheduler that
+    stalls is told too, and leaves the API ready.
 
     The checks run in the background, so the answer comes at once whatever is down. It says what is down, to everybody;
     the server's log says why.
     """
     results = shared.readiness.results()
     checks = {name: Check(ok=result.ok, message=result.message) for name, result in results.items()}
-    view = ReadyView(ready=all(check.ok for check in checks.values()), checks=checks)
+    ready = all(result.ok for result in results.values() if result.required)
+    view = ReadyView(ready=ready, checks=checks)
     return JSONResponse(view.model_dump(mode="json"), 200 if view.ready else 503)
 
 

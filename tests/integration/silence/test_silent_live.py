@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from typing import Any
 from uuid import UUID
 
 import pytest
 import redis
 import sqlalchemy as sa
 
+from shared.errors import Unreachable
 from shared.jobs import StreamState
 from shared.runtime.live.main import REDIS_SECONDS
 from shared.runtime.queue import SOCKET_SCHEME, redis_client
 from shared.streams.frames import Frame
+from shared.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.live_loop import LiveWorker, Studio
 from workers.mogo.bundle import random_bundle
@@ -48,8 +51,19 @@ def goes_on(studio: Studio, streams: list[UUID]) -> float:
 
 
 def test_frames_go_on_after_redis_fell_silent(
-    engine: sa.Engine, client: redis.Redis, queue_url: str, generator: Generator
+    engine: sa.Engine, client: redis.Redis, queue_url: str, generator: Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    refused: list[float] = []
+    write = FrameStream.write
+
+    def noted(*arguments: Any) -> None:
+        try:
+            write(*arguments)
+        except Unreachable:
+            refused.append(worker.loop.ticked)
+            raise
+
+    monkeypatch.setattr(FrameStream, "write", noted)
     studio = Studio(engine, client, generator.bundle.reference)
     with (
         StallingProxy(queue_url.removeprefix(SOCKET_SCHEME)) as proxy,
@@ -68,6 +82,8 @@ def test_frames_go_on_after_redis_fell_silent(
             time.sleep(4 * REDIS_SECONDS)  # leases are lost, and taken again
             proxy.resume()
             print(f"everything silent: frames of a second after {goes_on(studio, streams):.1f} s")
+            assert refused
+            assert len(set(refused)) == len(refused)  # one deadline a tick, whatever the number of streams
             for stream in streams:
                 numbers = [frame.number for frame in studio.frames(stream) if isinstance(frame, Frame)]
                 assert numbers == list(range(len(numbers)))
