@@ -66,3 +66,11 @@ def test_any_text_is_normalised_once_or_refused(prompt: str) -> None:
     assert checked == check_prompt(checked)
     assert checked.encode("utf-8")
     assert checked.split() == checked.split(" ")
+
+
+@pytest.mark.parametrize("control", ["\u202e", "\u2066", "\x9b", "\x1c"])
+def test_a_prompt_that_an_earlier_release_accepted_is_still_read(control: str) -> None:
+    prompt = f"a person{control} walks"
+    with pytest.raises(InvalidInput, match=f"U\\+{ord(control):04X}"):
+        check_prompt(prompt)
+    assert check_prompt(prompt, stored=True).replace(control, "") == "a person walks"
