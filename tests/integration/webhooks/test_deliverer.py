@@ -277,3 +277,26 @@ def test_a_scheduler_that_is_killed_loses_nothing_and_sweeps_while_receivers_han
     assert "webhook_delivered" in logs
     for hidden in ("secret-path", SECRET, KEY):
         assert hidden not in logs
+
+
+def test_two_scheduler_processes_tell_each_event_once_and_take_a_lease_back_once(
+    engine: sa.Engine, receiver: Receiver, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
+) -> None:
+    webhook = new_webhook(engine, receiver.url())
+    processes = [start(), start()]
+    happen(engine, 20)
+    job = submit_items(engine, 1)
+    parse_texts(engine)
+    let_expire(engine, claim_some(engine).lease_token)
+    happen(engine, 20)
+    wait(lambda: job_row(engine, job).leased == 0 and len(deliveries(engine, webhook)) == 40)
+    wait(lambda: all_delivered(engine, webhook))
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    assert [process.wait(60) for process in processes] == [0, 0]
+    assert len({request.id for request in receiver.received}) == len(receiver.received) == 40
+    logs = [log.read_text() for log in sorted(tmp_path.glob("scheduler*.log"))]
+    assert all("webhook_delivered" in log for log in logs), "one of the two did nothing"
+    with transaction(engine) as conn:
+        lost = "SELECT count(*) FROM job_event WHERE kind = 'lease_lost'"
+        assert conn.execute(sa.text(lost)).scalar_one() == 1
