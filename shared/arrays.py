@@ -42,7 +42,8 @@ def check_array(
     Raises:
         InvalidFile: it is something else.
     """
-    if array.dtype.kind not in kinds and array.dtype.name != kinds:
+    is_name = kinds[-1].isdigit()
+    if array.dtype.name != kinds if is_name else array.dtype.kind not in kinds:
         raise InvalidFile(f"`{name}` holds {array.dtype}", where=where, hint=hint)
     if array.ndim != len(shape) or any(s is not None and s != n for s, n in zip(shape, array.shape, strict=True)):
         wanted = "(" + ", ".join("any" if s is None else str(s) for s in shape) + ")"
@@ -141,6 +142,18 @@ def parse_safetensors(
         return load(data)
     except Exception as failure:  # SafetensorError, and KeyError or TypeError for kinds of numbers
         raise error(f"is not a safetensors file: {failure}", where=where, hint=hint) from None
+
+
+def text_of(array: Array, name: str, where: str) -> str:
+    """The text that an array of one string holds.
+
+    Raises:
+        InvalidFile: it holds something else.
+    """
+    try:
+        return str(check_array(array, name, where, kinds="U", shape=())[()])
+    except ValueError:  # characters that are none
+        raise InvalidFile(f"`{name}` is no text", where=where) from None
 
 
 def _is_finite(array: Array) -> bool:

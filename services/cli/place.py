@@ -7,7 +7,11 @@ import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from shared.errors import InvalidFile, InvalidInput, Unauthenticated, Unreachable
+from shared.documents import read_json
+from shared.errors import InvalidFile, InvalidInput, NotFound, Unauthenticated, Unreachable
+
+MAX_BYTES = 2**16
+HINT = "Delete it and start `marey serve` again."
 
 
 @dataclass(frozen=True)
@@ -64,14 +68,12 @@ def read_server(folder: Path) -> Server | None:
     """The server that `folder/server.json` names; None = no such file."""
     path = folder / "server.json"
     try:
-        fields = json.loads(path.read_text(encoding="utf-8"))
+        fields = read_json(path, limit=MAX_BYTES, hint=HINT)
         return Server(str(fields["url"]), str(fields["key"]), int(fields["pid"]))
-    except FileNotFoundError:
+    except NotFound:
         return None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InvalidFile(
-            f"cannot be read: {error}", where=str(path), hint="Delete it and start `marey serve` again."
-        ) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidFile(f"cannot be read: {error!r}", where=str(path), hint=HINT) from error
 
 
 def _local_server() -> Server:

@@ -5,10 +5,10 @@ Standard library only. The rest of a report is the evaluator's own (`workers.eva
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Any, cast
 
+from shared.documents import parse_json
 from shared.errors import InvalidFile, InvalidInput
 
 SCHEMA, VERSION = "marey.evaluation-report", 1
@@ -56,10 +56,7 @@ def read_scores(data: bytes, where: str) -> tuple[MotionScore, ...]:
     Raises:
         InvalidFile: no such JSON, of another version, or scores that are none.
     """
-    try:
-        document = json.loads(data)
-    except ValueError as error:
-        raise InvalidFile(f"is no JSON: {error}", where=where) from None
+    document = parse_json(data, where)
     rows: Any = check_document(document, where).get("scores")
     try:
         return tuple(MotionScore(**_numbers(row)) for row in rows)

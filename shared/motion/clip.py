@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.arrays import check_array
+from shared.arrays import check_array, text_of
 from shared.arrays import parse_npz as parse_arrays
 from shared.documents import parse_json
 from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
@@ -186,7 +186,7 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         raise InvalidFile("`rotations` holds quaternions that are not of unit length", where=where)
     try:
         names = tuple(str(n) for n in need("names", "U", count).tolist())
-        manifest = parse_json(str(need("manifest", "U")[()]), f"{where}: manifest", allow_nan=True)
+        manifest = parse_json(text_of(arrays["manifest"], "manifest", where), f"{where}: manifest", allow_nan=True)
         skeleton = skeleton_of(names, parents, floats("offsets", count, 3))
     except (ValueError, InvalidInput) as error:
         raise InvalidFile(str(error), where=where) from None

@@ -9,9 +9,10 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
+from shared.arrays import parse_safetensors
+from shared.documents import parse_json
 from shared.errors import InvalidFile
 from shared.text.features import TextFeatures
 
@@ -54,10 +55,10 @@ class Recording:
             InvalidFile: damaged, or of another version.
         """
         try:
-            arrays = load(blob)
+            arrays = parse_safetensors(blob, "recording")
             if "recording" not in arrays:
                 return None
-            about = json.loads(arrays["recording"].tobytes())
+            about = parse_json(arrays["recording"].tobytes(), "recording")
             if about["format"] != FORMAT:
                 raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
             tokens = arrays["tokens"]
@@ -65,5 +66,5 @@ class Recording:
                 raise ValueError(f"tokens are {tokens.dtype} {tokens.shape}")
             prompts = [(int(frame), str(text)) for frame, text in about["prompts"]]
             return cls(str(about["stream"]), tokens, prompts, TextFeatures.from_blob(arrays["text"].tobytes()))
-        except (SafetensorError, ValueError, KeyError, TypeError) as error:
+        except (InvalidFile, ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidFile(f"this is not a recording of this version: {error}", where="recording") from error

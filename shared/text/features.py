@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
+from safetensors.numpy import save
 
+from shared.arrays import parse_safetensors
+from shared.documents import parse_json
 from shared.errors import InvalidFile
 from shared.text.graph import SemanticGraph
 
@@ -67,8 +68,8 @@ class TextFeatures:
             InvalidFile: not such a blob, or a damaged one.
         """
         try:
-            nodes = load(blob)["nodes"]
-            about = json.loads(_metadata(blob)["features"])
+            nodes = parse_safetensors(blob, "features")["nodes"]
+            about = parse_json(_metadata(blob)["features"], "features", allow_nan=True)
             if about["format"] != FORMAT:
                 raise ValueError(f"format {about['format']!r} is not {FORMAT!r}")
             graph = SemanticGraph.from_json(about["graph"])
@@ -79,7 +80,7 @@ class TextFeatures:
             return cls(
                 about["prompt"], about["rewritten"], graph, nodes[:count], about.get("not_rewritten"), acts, rows
             )
-        except (SafetensorError, ValueError, KeyError, TypeError, struct.error) as error:
+        except (InvalidFile, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
             raise InvalidFile(
                 f"these are not text features of this version: {error}",
                 hint="Delete the row of text_features; the text stage makes it again.",
@@ -91,4 +92,4 @@ def _metadata(blob: bytes) -> dict[str, Any]:
     (length,) = struct.unpack("<Q", blob[:8])
     if length > MAX_HEADER_BYTES:
         raise ValueError(f"a header of {length} bytes")
-    return json.loads(blob[8 : 8 + length])["__metadata__"]
+    return parse_json(blob[8 : 8 + length], "features")["__metadata__"]

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, cast
 
-from shared.errors import InvalidFile
+from shared.documents import read_json
+from shared.errors import InvalidFile, NotFound
 
 
 def read_config(folder: Path) -> dict[str, Any]:
     """The folder's `config.json`. Raises InvalidFile."""
     file = folder / "config.json"
     try:
-        config = json.loads(file.read_bytes())
-    except (OSError, ValueError) as error:
-        raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Fetch the encoder again.") from error
+        config = read_json(file, hint="Fetch the encoder again.")
+    except NotFound as error:
+        raise InvalidFile("is missing", where=str(file), hint="Fetch the encoder again.") from error
     if not isinstance(config, dict):
         raise InvalidFile("is not a model configuration", where=str(file), hint="Fetch the encoder again.")
     return cast("dict[str, Any]", config)

@@ -20,7 +20,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from shared.bundles import Bundle
 from shared.bundles.reference import expected_of
-from shared.errors import InvalidFile, InvalidInput
+from shared.documents import read_json
+from shared.errors import InvalidFile, InvalidInput, NotFound
 from shared.jobs import BUNDLE_SOURCES
 from shared.motion.features import FeatureLayout, layout
 from shared.nn.motion_tokenizer import MotionTokenizer
@@ -75,10 +76,10 @@ def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | N
         InvalidFile: it is damaged, or was measured by another evaluator.
     """
     file = _file(evaluator, generator)
-    if not file.is_file():
-        return None
     try:
-        found = Reconstruction.model_validate_json(file.read_bytes())
+        found = Reconstruction.model_validate(read_json(file))
+    except NotFound:
+        return None
     except ValidationError as error:
         raise InvalidFile(f"is no reconstruction: {error.errors()[0]['msg']}", where=str(file)) from error
     if (found.generator, found.evaluator) != (generator, evaluator.reference):

@@ -27,6 +27,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from shared.arrays import read_npy
 from shared.bundles import Bundle, BundleWriter, DataSource
 from shared.characters import escape
 from shared.errors import InvalidFile, MareyError
@@ -127,10 +128,7 @@ def _read_words(folder: Path, config: T2MConfig) -> tuple[list[str], NDArray[np.
 
 
 def _array(file: Path) -> NDArray[Any]:
-    try:
-        return np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InvalidFile(f"is no array: {error}", where=str(file)) from error
+    return read_npy(file)
 
 
 class _PlainValues(pickle.Unpickler):

@@ -13,6 +13,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
+from shared.documents import read_json
 from shared.errors import InvalidFile, NotFound
 from shared.nn.ema import WeightAverage
 
@@ -66,9 +67,8 @@ def read_state(folder: Path) -> TrainingState:
         else:
             raise NotFound("there is no checkpoint", where=str(folder), hint="Start the run without --resume.")
     try:
-        values = json.loads(file.read_text(encoding="utf-8"))
-        state = TrainingState(**values)
-    except (json.JSONDecodeError, TypeError) as error:
+        state = TrainingState(**read_json(file, allow_nan=True))
+    except TypeError as error:
         raise InvalidFile(f"is not a checkpoint's state: {error}", where=str(file)) from error
     if state.format != FORMAT:
         raise InvalidFile(f"is of format {state.format}, this version reads {FORMAT}", where=str(file))
@@ -84,7 +84,7 @@ def load_checkpoint(
         module.load_state_dict(load_file(folder / "model.safetensors"))
         average.load(load_file(folder / "average.safetensors"))
         _restore_optimizer(optimizer, load_file(folder / "optimizer.safetensors"))
-    except (SafetensorError, RuntimeError, KeyError, FileNotFoundError) as error:
+    except (SafetensorError, RuntimeError, KeyError, ValueError, OSError) as error:
         raise InvalidFile(f"the checkpoint does not fit this run: {error}", where=str(folder)) from error
     return state
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
@@ -71,8 +71,11 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
     file = run / FILE
     if not file.is_file():
         return None
-    with safe_open(file, "pt") as opened:
-        key = opened.metadata()["key"]
+    try:
+        with safe_open(file, "pt") as opened:
+            key = (opened.metadata() or {}).get("key")
+    except (SafetensorError, OSError) as error:
+        raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Remove it.") from error
     if key != _key(tokenizer, prepared):
         hint = "Remove it, or draw again (`python -m workers.hgm3.practice`)."
         raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import random
 import re
 from collections import defaultdict
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shared.documents import read_json
 from shared.errors import InvalidFile
 from shared.text.roles import Argument, Frame
 from workers.training.labeller_grammar import SUBJECTS, Example
@@ -48,11 +48,11 @@ def read_gold(file: Path) -> list[Example]:
         InvalidFile: not such a file.
     """
     try:
-        found = json.loads(file.read_bytes())
+        found = read_json(file)
         if isinstance(found, dict):
             found = [_listed(entry) for clip in found.values() for entry in clip]
         return [_gold(entry) for entry in found]
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise InvalidFile(f"is not a file of role labels: {error!r}", where=str(file)) from error
 
 

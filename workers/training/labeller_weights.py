@@ -10,6 +10,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from shared.documents import parse_json
 from shared.errors import InvalidFile
 from shared.text.light import LightLabeller, WordStates, light_config
 from shared.text.light_network import LightConfig, LightNetwork
@@ -45,7 +46,7 @@ class Weights:
         """
         try:
             with safe_open(file, "pt") as opened:
-                network = light_config(json.loads(opened.metadata()["network"]))
+                network = light_config(parse_json(opened.metadata()["network"], str(file)))
                 tensors = {name: opened.get_tensor(name) for name in opened.keys()}  # noqa: SIM118
         except (SafetensorError, OSError, ValueError, KeyError, TypeError) as error:
             raise InvalidFile(f"holds no weights of the labeller: {error}", where=str(file)) from error

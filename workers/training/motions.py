@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
+from shared.errors import InvalidFile
 from shared.nn import distributed
 from shared.nn.motion_tokenizer import MotionTokenizer
 from workers.training.data.manifest import Clip
@@ -133,8 +135,11 @@ def made_once(
 ) -> Mapping[str, Tensor]:
     """Whole numbers, int64, among them `tokens`: read from a file that has this key, else made, and kept there."""
     if file.is_file():
-        values = load_file(file)
-        if values.pop("key").numpy().tobytes() == key.encode():
+        try:
+            values = load_file(file)
+        except (SafetensorError, OSError) as error:
+            raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Remove it.") from error
+        if "key" in values and values.pop("key").numpy().tobytes() == key.encode():
             return {name: value.to(device).long() for name, value in values.items()}
     made = {name: value.long() for name, value in make().items()}
     if distributed.rank() == 0:

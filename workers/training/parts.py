@@ -11,6 +11,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
+from shared.documents import read_json
 from shared.errors import InvalidFile, NotFound
 
 
@@ -42,11 +43,14 @@ def load_part(folder: Path) -> Part:
         NotFound: the stage has not finished.
         InvalidFile: damaged.
     """
-    if not (folder / "part.json").is_file():
-        raise NotFound("this stage has not finished", where=str(folder.parent), hint="Train it first, or resume it.")
     try:
-        values = json.loads((folder / "part.json").read_text(encoding="utf-8"))
+        values = read_json(folder / "part.json", allow_nan=True)
+    except NotFound:
+        raise NotFound(
+            "this stage has not finished", where=str(folder.parent), hint="Train it first, or resume it."
+        ) from None
+    try:
         state = load_file(folder / "weights.safetensors")
         return Part(state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}))
-    except (json.JSONDecodeError, KeyError, SafetensorError, FileNotFoundError) as error:
+    except (AttributeError, KeyError, TypeError, SafetensorError, OSError) as error:
         raise InvalidFile(f"is no trained part: {error}", where=str(folder)) from error

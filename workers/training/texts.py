@@ -8,7 +8,6 @@ their caption · `spec`, `clips_sha256`: strings.
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,8 +17,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
+from shared.arrays import check_array, read_npz, text_of
 from shared.bundles import TextSpec
+from shared.documents import parse_json
 from shared.errors import InvalidFile, NotFound
 from shared.hashing import sha256_of
 from shared.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
@@ -28,6 +30,17 @@ from workers.training.data.manifest import CLIPS, TEXTS
 from workers.training.data.prepared import PreparedData
 
 CHUNK = 256
+MAX_BYTES = 8 * 2**30
+KINDS = {
+    "strings": "float16",
+    "caption_start": "int64",
+    "node_start": "int64",
+    "node_string": "int32",
+    "node_level": "int8",
+    "edge_start": "int64",
+    "edges": "int16",
+}
+"""Arrays of the file, in the order of the fields."""
 
 
 @dataclass(frozen=True)
@@ -116,19 +129,50 @@ class CaptionTexts:
             InvalidFile: broken, or made for other captions.
         """
         file = data.path / TEXTS
-        if not file.is_file():
-            raise NotFound("captions have no text features yet", where=str(file), hint="Run `marey data text`.")
+        where, hint = str(file), "Run `marey data text` again."
         try:
-            with np.load(file, allow_pickle=False) as arrays:
-                spec = TextSpec.model_validate(json.loads(str(arrays["spec"])))
-                clips = str(arrays["clips_sha256"])
-                names = ("strings", "caption_start", "node_start", "node_string", "node_level", "edge_start", "edges")
-                texts = cls(spec, *(arrays[name] for name in names))
-        except (ValueError, KeyError, OSError, EOFError) as error:
-            raise InvalidFile(f"these are no text features: {error}", where=str(file)) from error
-        if clips != data.manifest.files[CLIPS].sha256 or len(texts.first) != len(data.clips) + 1:
-            raise InvalidFile("made for other captions", where=str(file), hint="Run `marey data text` again.")
+            arrays = read_npz(file, ("spec", "clips_sha256", *KINDS), limit=MAX_BYTES, hint=hint)
+        except NotFound:
+            raise NotFound("captions have no text features yet", where=where, hint="Run `marey data text`.") from None
+        try:
+            spec = TextSpec.model_validate(parse_json(text_of(arrays["spec"], "spec", where), f"{where}: spec"))
+        except ValidationError as error:
+            message = f"these are no text features: {error.errors()[0]['msg']}"
+            raise InvalidFile(message, where=where, hint=hint) from error
+        for name, kind in KINDS.items():
+            width = {"strings": (spec.width,), "edges": (3,)}.get(name, ())
+            check_array(arrays[name], name, where, kinds=kind, shape=(None, *width), hint=hint)
+        texts = cls(spec, *(arrays[name] for name in KINDS))
+        if (
+            text_of(arrays["clips_sha256"], "clips_sha256", where) != data.manifest.files[CLIPS].sha256
+            or len(texts.first) != len(data.clips) + 1
+        ):
+            raise InvalidFile("made for other captions", where=where, hint=hint)
+        if problem := texts._problem():
+            raise InvalidFile(f"these are no text features: {problem}", where=where, hint=hint)
         return texts
+
+    def _problem(self) -> str | None:
+        """What does not fit together; None = nothing."""
+        captions = int(self.first[-1])
+        for name, starts, size in (
+            ("caption_start", self.first, captions),
+            ("node_start", self.node_start, len(self.node_string)),
+            ("edge_start", self.edge_start, len(self.edges)),
+        ):
+            if len(starts) == 0 or starts[0] != 0 or starts[-1] != size or (np.diff(starts) < 0).any():
+                return f"`{name}` does not lead through all rows"
+        if len(self.node_start) != captions + 1 or len(self.edge_start) != captions + 1:
+            return "graphs and captions differ in number"
+        if len(self.node_level) != len(self.node_string) or not _within(self.node_level, len(LEVELS)):
+            return "`node_level` holds a level that is none"
+        if not _within(self.node_string, len(self.strings)):
+            return "`node_string` names a string that is not there"
+        nodes = np.repeat(np.diff(self.node_start), np.diff(self.edge_start))
+        ends = self.edges[:, :2]
+        if (ends < 0).any() or (ends >= nodes[:, None]).any() or not _within(self.edges[:, 2], len(EDGE_TYPES)):
+            return "`edges` names a node or a type that is not there"
+        return None
 
     def slots(self, max_actions: int, max_specifics: int) -> tuple[NDArray[np.int32], NDArray[np.int8]]:
         """Strings and edge types in fixed slots, as `SemanticGraph.slots` and `.adjacency` put them.
@@ -156,6 +200,10 @@ class CaptionTexts:
         adjacency[owner, source, target] = kind
         adjacency[owner, target, source] = kind
         return strings, adjacency
+
+
+def _within(values: NDArray[np.integer], size: int) -> bool:
+    return bool(((values >= 0) & (values < size)).all())
 
 
 Read = Callable[[Sequence[Sequence[str]]], Iterator[list[SemanticGraph]]]

@@ -50,7 +50,7 @@ def test_a_pickle_in_the_pack_is_refused(tmp_path):
 def test_a_table_that_does_not_fit_the_arrays_is_refused(tmp_path):
     made = pack()
     JointsPack(made.clips, made.local[:-1], made.root[:-1]).save(tmp_path / "p.npz")
-    with pytest.raises(InvalidFile, match="frames are listed"):
+    with pytest.raises(InvalidFile, match="`local` has shape"):
         JointsPack.load(tmp_path / "p.npz")
 
 

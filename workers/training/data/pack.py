@@ -7,16 +7,19 @@ every time. Joints are stored relative to the root, where float16 is off by at m
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 
+from shared.arrays import check_array, read_npz, text_of
+from shared.documents import parse_json
 from shared.errors import InvalidFile, NotFound
 
+MAX_BYTES = 8 * 2**30
+"""A day of motion takes 1.5 GB."""
 FORMAT = "marey-joints-pack-1"
 SPLITS = ("train", "val", "test", "compositional")
 
@@ -87,20 +90,25 @@ class JointsPack:
             NotFound: no such file.
             InvalidFile: not a pack, truncated, or its table does not fit its arrays.
         """
-        if not path.is_file():
-            raise NotFound("no joints pack", where=str(path))
+        where = str(path)
         try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                table = json.loads(str(file["table"]))
-                local, root = file["local"], file["root"]
-            if table.get("format") != FORMAT:
-                raise InvalidFile(f"not a joints pack of format {FORMAT}", where=str(path))
-            clips = tuple(PackClip(**row) for row in table["clips"])
-        except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise InvalidFile(f"not a joints pack: {error}", where=str(path)) from error
-        rows = sum(clip.frames for clip in clips)
-        if local.shape != (rows, 21, 3) or root.shape != (rows, 3):
-            raise InvalidFile(f"{rows} frames are listed, arrays are {local.shape} and {root.shape}", where=str(path))
+            arrays = read_npz(path, ("table", "local", "root"), limit=MAX_BYTES)
+        except NotFound:
+            raise NotFound("no joints pack", where=where) from None
+        table = parse_json(text_of(arrays["table"], "table", where), f"{where}: table")
+        if not isinstance(table, dict) or table.get("format") != FORMAT:
+            raise InvalidFile(f"not a joints pack of format {FORMAT}", where=where)
+        try:
+            clips = TypeAdapter(tuple[PackClip, ...]).validate_python(table.get("clips"))
+        except ValidationError as error:
+            raise InvalidFile(f"not a joints pack: {error.errors()[0]['msg']}", where=where) from error
+        rows = 0
+        for clip in clips:
+            if clip.start != rows or clip.frames < 1 or clip.split not in SPLITS:
+                raise InvalidFile(f"the clip {clip.id!r} does not follow the one before it", where=where)
+            rows += clip.frames
+        local = check_array(arrays["local"], "local", where, kinds="float16", shape=(rows, 21, 3))
+        root = check_array(arrays["root"], "root", where, kinds="float32", shape=(rows, 3))
         return cls(clips, local, root)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from shared.documents import read_json
 from shared.errors import InvalidFile, NotFound
 from shared.motion.bvh import parse_bvh
 from workers.training.data.archive import bvh_files
@@ -47,12 +47,12 @@ class Splits(BaseModel):
             NotFound: no such file.
             InvalidFile: another shape, or a clip in two splits.
         """
-        if not path.is_file():
+        try:
+            splits = cls.model_validate(read_json(path))
+        except NotFound:
             raise NotFound(
                 "no split file", where=str(path), hint="Give it with --splits, or put it beside the archive."
-            )
-        try:
-            splits = cls.model_validate_json(path.read_bytes())
+            ) from None
         except ValidationError as error:
             raise InvalidFile(f"not a split file: {error.errors()[0]['msg']}", where=str(path)) from error
         if len(splits.by_clip()) != sum(map(len, (splits.train, splits.val, splits.test, splits.compositional))):
@@ -105,13 +105,13 @@ def pack_cmu(
         NotFound, InvalidFile, TooLarge: what is wrong, with the trial's name.
     """
     path = captions or source.parent / "cmu-captions.json"
-    if not path.is_file():
+    try:
+        table = {name: str(row["description"]) for name, row in read_json(path).items()}
+    except NotFound:
         raise NotFound(
             "no caption file", where=str(path), hint="Give it with --captions, or put it beside the archive."
-        )
-    try:
-        table = {name: str(row["description"]) for name, row in json.loads(path.read_text("utf-8")).items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        ) from None
+    except (KeyError, TypeError, AttributeError) as error:
         raise InvalidFile("not a table of trials with descriptions", where=str(path)) from error
 
     def label(name: str) -> PackClip:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,12 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from shared.arrays import check_array, map_npy, read_npz
+from shared.documents import parse_json, read_json
 from shared.errors import InvalidFile, NotFound
 from shared.hashing import sha256_of
 from shared.motion.features import FeatureLayout, layout
 from workers.training.data import manifest as names
 from workers.training.data.manifest import Clip, Manifest
 from workers.training.data.pack import SPLITS, join
+
+HINT = "Prepare the data again."
+MAX_LINE = 2**20
+"""Bytes of a clip's line, a hundred times what one takes."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,8 @@ class PreparedData:
 
         Args:
             path: the folder.
-            verify: compare each file with its sha256 (about a second per gigabyte); sizes are always compared.
+            verify: compare each file with its sha256, and look for numbers that are not finite (about two seconds
+                per gigabyte); sizes, kinds and shapes are always compared.
 
         Raises:
             NotFound: no such folder, or no manifest in it.
@@ -59,22 +66,12 @@ class PreparedData:
         for name, entry in manifest.files.items():
             _check_file(path / name, entry.sha256 if verify else None, entry.bytes)
         clips = tuple(_read_clips(path / names.CLIPS))
-        features = _open_array(path / names.FEATURES, np.float32)
-        local = _open_array(path / names.JOINTS, np.float16)
-        roots = _open_array(path / names.ROOTS, np.float32)
-        with np.load(path / names.STATISTICS, allow_pickle=False) as file:
-            mean, std = file["mean"], file["std"]
-        if (
-            features.shape != (manifest.frames, manifest.dim)
-            or mean.shape != std.shape
-            or mean.shape != (manifest.dim,)
-        ):
-            raise InvalidFile(f"features have shape {features.shape}", where=str(path))
-        last = clips[-1]
-        if len(clips) != manifest.clips or last.start + last.length != manifest.frames:
-            raise InvalidFile("clips do not fit the arrays", where=str(path / names.CLIPS))
-        if len(local) != manifest.frames + manifest.clips or len(roots) != len(local):
-            raise InvalidFile("joints do not fit the clips", where=str(path))
+        rows = manifest.frames + manifest.clips
+        features = _map(path / names.FEATURES, "float32", (manifest.frames, manifest.dim), finite=verify)
+        local = _map(path / names.JOINTS, "float16", (rows, 21, 3), finite=verify)
+        roots = _map(path / names.ROOTS, "float32", (rows, 3), finite=verify)
+        mean, std = _statistics(path / names.STATISTICS, manifest.dim)
+        _check_clips(clips, manifest, path / names.CLIPS)
         return cls(path, manifest, clips, features, mean, std, local, roots)
 
     @property
@@ -128,10 +125,12 @@ def read_manifest(path: Path) -> Manifest:
         InvalidFile: broken, or of another format.
     """
     file = path / names.MANIFEST
-    if not file.is_file():
-        raise NotFound("no prepared data here", where=str(path), hint="Make it with `marey data prepare`.")
     try:
-        manifest = Manifest.model_validate_json(file.read_bytes())
+        document = read_json(file)
+    except NotFound:
+        raise NotFound("no prepared data here", where=str(path), hint="Make it with `marey data prepare`.") from None
+    try:
+        manifest = Manifest.model_validate(document)
     except ValidationError as error:
         raise InvalidFile(f"not a manifest: {error.errors()[0]['msg']}", where=str(file)) from error
     if manifest.format != names.FORMAT:
@@ -139,35 +138,66 @@ def read_manifest(path: Path) -> Manifest:
     missing = [name for name in names.FILES if name not in manifest.files]
     if missing:
         raise InvalidFile(f"names no {missing[0]}", where=str(file))
-    if any(Path(name).name != name for name in manifest.files):
+    if any(Path(name).name != name or name == names.MANIFEST for name in manifest.files):
         raise InvalidFile("names files outside its folder", where=str(file))
+    if min(manifest.frames, manifest.clips, manifest.dim) < 1 or not 0 < manifest.fps < math.inf:
+        raise InvalidFile("holds no clips", where=str(file))
     return manifest
 
 
 def _check_file(path: Path, sha256: str | None, size: int) -> None:
-    hint = "Prepare the data again."
-    if not path.is_file():
-        raise InvalidFile("is missing", where=str(path), hint=hint)
-    if path.stat().st_size != size:
-        raise InvalidFile(f"has {path.stat().st_size:,} bytes, not {size:,}: truncated?", where=str(path), hint=hint)
-    if sha256 is not None and sha256_of(path) != sha256:
-        raise InvalidFile("has been changed since it was written", where=str(path), hint=hint)
-
-
-def _open_array(path: Path, dtype: type[np.generic]) -> NDArray:
+    hint = HINT
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InvalidFile(f"not an array: {error}", where=str(path)) from error
-    if array.dtype != dtype:
-        raise InvalidFile(f"holds {array.dtype}, not {np.dtype(dtype)}", where=str(path))
-    return array
+        if not path.is_file():
+            raise InvalidFile("is missing", where=str(path), hint=hint)
+        found = path.stat().st_size
+        if found != size:
+            raise InvalidFile(f"has {found:,} bytes, not {size:,}: truncated?", where=str(path), hint=hint)
+        if sha256 is not None and sha256_of(path) != sha256:
+            raise InvalidFile("has been changed since it was written", where=str(path), hint=hint)
+    except OSError as error:
+        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path), hint=hint) from None
+
+
+def _map(path: Path, kind: str, shape: tuple[int, ...], *, finite: bool) -> NDArray:
+    return check_array(map_npy(path, hint=HINT), path.name, str(path), kinds=kind, shape=shape, finite=finite)
+
+
+def _statistics(path: Path, width: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean and deviation (D,) of the training split."""
+    arrays = read_npz(path, ("mean", "std"), hint=HINT)
+    for name, values in arrays.items():
+        check_array(values, name, str(path), kinds="float32", shape=(width,))
+    if (arrays["std"] <= 0).any():
+        raise InvalidFile("`std` holds a deviation that is not positive", where=str(path), hint=HINT)
+    return arrays["mean"], arrays["std"]
 
 
 def _read_clips(path: Path) -> Iterable[Clip]:
-    with path.open(encoding="utf-8") as file:
-        for number, line in enumerate(file, start=1):
-            try:
-                yield Clip.model_validate(json.loads(line))
-            except (ValueError, ValidationError) as error:
-                raise InvalidFile(f"not a clip: {error}", where=f"{path}:{number}") from error
+    try:
+        with path.open("rb") as file:
+            for number, line in enumerate(iter(lambda: file.readline(MAX_LINE + 1), b""), start=1):
+                where = f"{path}:{number}"
+                if len(line) > MAX_LINE:
+                    raise InvalidFile(f"is over {MAX_LINE:,} bytes", where=where)
+                try:
+                    yield Clip.model_validate(parse_json(line, where))
+                except ValidationError as error:
+                    raise InvalidFile(f"not a clip: {error.errors()[0]['msg']}", where=where) from error
+    except OSError as error:
+        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path), hint=HINT) from None
+
+
+def _check_clips(clips: tuple[Clip, ...], manifest: Manifest, path: Path) -> None:
+    """Each clip lies within the arrays, behind the one before it, and so do its acts."""
+    if len(clips) != manifest.clips:
+        raise InvalidFile(f"holds {len(clips)} clips, the manifest says {manifest.clips}", where=str(path))
+    frame, row = 0, 0
+    for number, clip in enumerate(clips, start=1):
+        if (clip.start, clip.joints_start) != (frame, row) or clip.length < 1 or clip.split not in SPLITS:
+            raise InvalidFile("clips do not fit the arrays", where=f"{path}:{number}")
+        if not all(0 <= seam <= clip.length for seam in clip.seams):
+            raise InvalidFile("seams do not lie within the clip", where=f"{path}:{number}")
+        frame, row = frame + clip.length, row + clip.length + 1
+    if frame != manifest.frames:
+        raise InvalidFile("clips do not fit the arrays", where=str(path))
