@@ -38,7 +38,7 @@ class _File:
 
 @cache
 def _file(name: str) -> _File:
-    content = (resources.files(__package__) / "assets" / name).read_bytes()
+    content = (resources.files("services.api.docs") / "assets" / name).read_bytes()
     return _File(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', TYPES[name.rpartition(".")[2]])
 
 

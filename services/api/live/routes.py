@@ -21,7 +21,7 @@ MOST_EXAMPLES = 6
 
 @cache
 def _measured() -> dict[str, list[dict[str, Any]]]:
-    return json.loads((resources.files(__package__) / "examples.json").read_text(encoding="utf-8"))
+    return json.loads((resources.files("services.api.live") / "examples.json").read_text(encoding="utf-8"))
 
 
 def examples(catalogue: Catalogue) -> tuple[str, ...]:
