@@ -15,6 +15,7 @@ import typer
 
 from services.cli import console
 from services.cli.options import ExtraColumns
+from services.cli.references import FORMS
 from shared.characters import escape
 from shared.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
 from shared.evaluation_prompts import PromptCheck
@@ -61,7 +62,9 @@ Regenerate = Annotated[
     bool, typer.Option("--regenerate", help=f"Generate anew in all {ANEW} repeats: as --repeats {ANEW}, and as long.")
 ]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first motion; none given = 0.")]
-Baseline = Annotated[str | None, typer.Option("--baseline", metavar="RUN", help="An evaluation to compare with.")]
+Baseline = Annotated[
+    str | None, typer.Option("--baseline", metavar="RUN", help=f"An evaluation to compare with: {FORMS}.")
+]
 Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
 FailOnRegression = Annotated[
     bool, typer.Option("--fail-on-regression", help="Wait; exit 8 when it is worse than what it is compared with.")

@@ -63,6 +63,8 @@ def run(
 
     waits = wait or fail_on_regression
     with Client.here() as client:
+        if baseline is not None:
+            body["baseline"] = find(client, "evaluation", baseline).id
         with asked.in_source():
             made = client.post_new("/v1/evaluations", body)
         if not as_json:

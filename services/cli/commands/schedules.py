@@ -58,6 +58,8 @@ def add(
     from services.cli.client import Client
 
     with Client.here() as client, asked.in_source():
+        if baseline is not None:
+            body["baseline"] = find(client, "evaluation", baseline).id
         made = client.post_once("/v1/schedules", body)
     if as_json:
         console.result_json(made)
