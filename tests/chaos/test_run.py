@@ -115,6 +115,7 @@ def chaos(home: Path, place: Place, plan: Plan, seconds: float) -> dict[str, Any
             folder = Path(REPORTS)
             folder.mkdir(parents=True, exist_ok=True)
             (folder / f"seed-{plan.seed}.json").write_text(json.dumps(report | {"wrong": wrong}, indent=1) + "\n")
+            (folder / f"seed-{plan.seed}.log").write_text(cluster.logs(lines=20_000))
         assert wrong == []
         assert report["states"]["succeeded"] > 0
         return report
