@@ -24,10 +24,8 @@ POOL_SECONDS = 10
 GROUP, DEADLINE = "marey_group", "marey_deadline"
 """Execution options of an engine: its connection group, and the limits its sessions are set up with."""
 SNAPSHOT = sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
-SET_LOCAL = sa.text("""
-    SELECT set_config('statement_timeout', :statement, true),
-        set_config('idle_in_transaction_session_timeout', :idle, true)
-""")
+SET_LOCAL = "SET LOCAL statement_timeout = {}; SET LOCAL idle_in_transaction_session_timeout = {}"
+"""No query: a transaction may still choose its isolation level afterwards."""
 
 
 def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadline: Deadline = ORDINARY) -> sa.Engine:
@@ -108,8 +106,7 @@ def _limit(connection: sa.Connection, deadline: Deadline) -> None:
     assert isinstance(driver, DeadlineConnection)
     driver.limit = deadline.answer
     if driver.pooled or driver.deadline != deadline:
-        statement, idle = milliseconds(deadline)
-        connection.execute(SET_LOCAL, {"statement": statement, "idle": idle})
+        connection.exec_driver_sql(SET_LOCAL.format(*milliseconds(deadline)))
 
 
 def outages(engine: sa.Engine) -> int:

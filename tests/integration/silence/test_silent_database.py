@@ -267,3 +267,5 @@ def test_the_server_knows_the_limits_of_each_kind(engine: sa.Engine, kind: Deadl
         limits = [conn.execute(sa.text(query), {"name": name}).scalar_one() / 1000 for name in names]
     assert limits == [kind.statement, kind.idle]
     assert kind.answer > kind.statement
+    with transaction(engine, kind) as conn:
+        conn.execute(sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
