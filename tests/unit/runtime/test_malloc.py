@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from services.api import app
+from services.api import app, process
 from shared.runtime import malloc
 
 THREADS = """
@@ -72,6 +72,6 @@ def test_the_api_asks_for_it_before_it_starts_anything(monkeypatch: pytest.Monke
     def asked() -> None:
         raise Asked
 
-    monkeypatch.setattr(app, "one_heap", asked)
+    monkeypatch.setattr(process, "one_heap", asked)
     with pytest.raises(Asked):
         app.serve()
