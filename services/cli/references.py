@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
@@ -68,16 +68,14 @@ def find_all(client: Client, kind: str, texts: Iterable[str], *, webhook: str | 
     return list({each.id: each for each in found}.values())
 
 
-def named(client: Client, kind: str, path: str, texts: Iterable[str]) -> list[Reference]:
-    """`find_all` for a verb that cannot be taken back: each with its name, so that the command can say what it met.
+def named(client: Client, path: str, found: Iterable[Reference]) -> Iterator[Reference]:
+    """Each with its name, so that a verb that cannot be taken back says what it met.
 
     Args:
         path: of the noun, such as `/v1/jobs`.
     """
-    return [
-        each if each.match is not None else of_view(kind, client.get(f"{path}/{each.id}"))
-        for each in find_all(client, kind, texts)
-    ]
+    for each in found:
+        yield each if each.match is not None else of_view(each.kind, client.get(f"{path}/{each.id}"))
 
 
 def listed(found: Sequence[Reference]) -> str:

@@ -158,9 +158,9 @@ def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = named(client, "job", "/v1/jobs", jobs)
+        found = find_all(client, "job", jobs)
         console.confirm(f"Delete {listed(found)} with all motions?", yes=yes)
-        for job in found:
+        for job in named(client, "/v1/jobs", found):
             client.delete(f"/v1/jobs/{job.id}")
             console.say(f"deleted {job}")
 
@@ -175,9 +175,9 @@ def erase(
     from services.cli.client import Client
 
     with Client.here() as client:
-        wanted = named(client, "job", "/v1/jobs", jobs)
+        wanted = find_all(client, "job", jobs)
         console.confirm(f"Forget the prompts of {listed(wanted)} for good?", yes=yes)
-        for job in wanted:
+        for job in named(client, "/v1/jobs", wanted):
             found = client.post(f"/v1/jobs/{job.id}/erase")
             if as_json:
                 console.result_json(found)

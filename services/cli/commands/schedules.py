@@ -125,9 +125,9 @@ def delete(schedules: Ids, yes: console.Yes = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = named(client, "schedule", "/v1/schedules", schedules)
+        found = find_all(client, "schedule", schedules)
         console.confirm(f"Delete {listed(found)}?", yes=yes)
-        for each in found:
+        for each in named(client, "/v1/schedules", found):
             client.delete(f"/v1/schedules/{each.id}")
             console.say(f"deleted {each}")
 

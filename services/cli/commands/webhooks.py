@@ -121,9 +121,9 @@ def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     from services.cli.client import Client
 
     with Client.here() as client:
-        found = named(client, "webhook", "/v1/webhooks", webhooks)
+        found = find_all(client, "webhook", webhooks)
         console.confirm(f"Remove {listed(found)}?", yes=yes)
-        for each in found:
+        for each in named(client, "/v1/webhooks", found):
             client.delete(f"/v1/webhooks/{each.id}")
             console.say(f"removed {each}")
 
