@@ -31,11 +31,11 @@ def paused(marey: Marey) -> str:
 def test_not_found_is_3(marey: Marey) -> None:
     marey("jobs", "show", uuid4()).refused(3, "no such job")
     marey("fetch", uuid4()).refused(3, "no such job")
+    for command in (("jobs", "show"), ("fetch",)):
+        marey(*command, "nope").refused(3, "marey: job 'nope': there is no such job", "marey jobs list")
 
 
 def test_usage_is_2(marey: Marey) -> None:
-    for command in (("jobs", "show"), ("fetch",)):
-        marey(*command, "nope").refused(2, "marey: job: 'nope' is no id: that is a UUID")
     marey("submit", "walk", "--priority", 99999).refused(2, "priority: '99999' cannot be used", "1000")
     marey("motions", "list", "--tag", "").refused(2, "tag", "'' cannot be used: it should have at least 1 character")
     marey("webhooks", "add", "https://x.example", "--event", "nope").refused(2, "events.0: 'nope'", "job.ended")

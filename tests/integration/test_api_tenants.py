@@ -98,6 +98,8 @@ class Mine:
 
     def send(self, http: httpx2.Client, method: str, template: str) -> httpx2.Response:
         own = {"before": self.ids["evaluation"]} if template.endswith("/comparison") else None
+        if template == "/v1/resolve":
+            own = {"kind": "job", "reference": self.ids["job"][-8:]}
         return http.request(method, self.path(template), json=self.body(f"{method} {template}"), params=own)
 
     def secrets(self) -> list[str]:
