@@ -23,6 +23,8 @@ def _whose(phrase: str) -> tuple[str, ...]:
 
 
 _JOINS = [tuple(phrase.replace("~", who).split()) for phrase in LISTS["joins"] for who in _whose(phrase)]
+_JOINS_BY_FIRST = {word: [join for join in _JOINS if join[0] == word] for word, *_ in _JOINS}
+"""In the same order: long prompts ask at every word, and most words begin none."""
 _EDGES = [phrase.split() for phrase in LISTS["edges"]]
 _FRONTED = [phrase.split() for phrase in LISTS["fronted"]]
 _ADVERBS, _PAUSES, _STILL, _REFERRING, _SMALL, _ASKING, _ASKED, _NOUNS = (
@@ -80,7 +82,7 @@ def _by_connective(text: Clause) -> Iterator[Clause]:
         yield from [*rest, said] if " ".join(opening) in LISTS["fronted_last"] else [said, *rest]
         return
     for at in range(1, len(text)):
-        join = next((j for j in _JOINS if _joins(text, at, j)), None)
+        join = next((j for j in _JOINS_BY_FIRST.get(text.bare(at), ()) if _joins(text, at, j)), None)
         if join is not None:
             before, after = text.cut(0, at), list(_by_connective(text.cut(at + len(join))))
             yield from [*after, before] if " ".join(join) in LISTS["backward"] else [before, *after]
