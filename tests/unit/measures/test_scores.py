@@ -26,7 +26,7 @@ def broken(**changes: Any) -> bytes:
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"{", "is no JSON"),
+        (b"{", "is not JSON"),
         (b"[]", "is no report"),
         (broken(schema="other"), "is no report"),
         (broken(version=2), "has version 2; this reads version 1"),
