@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from shared.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
 from shared.bundles.find import log_broken
-from shared.bundles.limits import check_seconds, check_settings, seconds_of
+from shared.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
 from shared.errors import InvalidBundle, MareyError
 from shared.items import MAX_SEED, Item
 from shared.jobs import NewItem
@@ -73,6 +73,7 @@ def offer_of(bundle: Bundle, config: Settings) -> Offer:
             f"{manifest.name!r} is of the kind {manifest.kind}, not a text-to-motion generator", where=str(bundle.path)
         )
     low, high = seconds_of(bundle)
+    settings_of(bundle)
     return Offer(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
 
 

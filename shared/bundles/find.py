@@ -18,6 +18,7 @@ from shared.settings import Settings, settings
 log = logging.getLogger(__name__)
 
 MAX_LOGGED = 1000
+MAX_REASON = 500  # characters: a manifest may hold numbers of 4,000 digits
 Kind = Literal["generator", "labeller", "evaluator"]
 
 
@@ -35,7 +36,8 @@ class BrokenBundle:
     def of(cls, name: str, error: MareyError) -> BrokenBundle:
         """From the error of opening it; the file's name is told, the folders above are not."""
         file = Path(error.where).name if error.where else ""
-        return cls(name, f"{file}: {error.message}" if file and file != name else error.message, error)
+        reason = f"{file}: {error.message}" if file and file != name else error.message
+        return cls(_shown(name), _shown(reason)[:MAX_REASON], error)
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,11 @@ class Bundles:
     found: tuple[Bundle, ...]
     """By folder; sizes are checked, hashes are not."""
     broken: tuple[BrokenBundle, ...]
+
+
+def _shown(text: str) -> str:
+    """With bytes that are no UTF-8, which a file's name may hold, as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def find_bundle(reference: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, cast
 
 from shared.bundles.bundle import Bundle
 from shared.errors import InvalidBundle, InvalidInput
 from shared.items import OUTPUT_FPS, SETTINGS, outside_range
+
+MAX_FRAMES = 2**53
+"""What a float counts exactly: JSON holds whole numbers that no float can."""
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
@@ -27,7 +30,7 @@ def seconds_of(bundle: Bundle) -> tuple[float, float]:
 
 def _frames(bundle: Bundle, name: str) -> float:
     value = bundle.manifest.parameters.get(name)
-    if not isinstance(value, int | float) or isinstance(value, bool):
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < MAX_FRAMES:
         raise InvalidBundle(f"its parameters give no number as {name!r}", where=str(bundle.path))
     return float(value)
 
@@ -43,13 +46,25 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
         raise InvalidInput(outside_range(seconds, low, high, bundle.manifest.name))
 
 
+def settings_of(bundle: Bundle) -> Mapping[str, Any]:
+    """The settings that a model has, with their defaults.
+
+    Raises:
+        InvalidBundle: its manifest says something else of them.
+    """
+    own = bundle.manifest.parameters.get("inference") or {}
+    if not isinstance(own, dict):
+        raise InvalidBundle("its parameters give no object as 'inference'", where=str(bundle.path))
+    return cast("dict[str, Any]", own)
+
+
 def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
     """Nothing, if the model has all these settings.
 
     Raises:
         InvalidInput: it has not.
     """
-    own: dict[str, Any] = bundle.manifest.parameters.get("inference") or {}
+    own = settings_of(bundle)
     for name in names:
         if name != OUTPUT_FPS and name not in own:
             model = bundle.manifest.name

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from services.api.models.schemas import ModelsView
 from shared.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
 from shared.errors import InvalidBundle, MareyError
 from shared.offers import offers
@@ -114,6 +115,15 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "no lengths": (edit(parameters={}), "no number as 'min_frames'"),
     "lengths that are texts": (edit(parameters={"min_frames": "1", "max_frames": []}), "no number as 'min_frames'"),
     "lengths that are none": (edit(parameters={"min_frames": 9, "max_frames": 1}), "makes motions of"),
+    "lengths of 400 digits": (edit(parameters={"min_frames": 10**400, "max_frames": 10**401}), "no number as 'min_"),
+    "settings that are a number": (
+        edit(parameters={"min_frames": 16, "max_frames": 196, "inference": 5}),
+        "no object as 'inference'",
+    ),
+    "a file of 4,000 digits": (
+        edit(files={"masked.safetensors": {"sha256": "0" * 64, "bytes": 10**4000}}),
+        "masked.safetensors: has",
+    ),
     "no text": (edit(text=None), "not a text-to-motion generator"),
     "a labeller that is not here": (
         edit(text={"encoder_sha256": "0" * 64, "labeller": "nobody"}),
@@ -133,8 +143,18 @@ def test_a_broken_bundle_is_told_and_hides_no_other(
     assert [broken.name for broken in made.broken] == [BAD]
     assert reason in made.broken[0].reason
     assert "secret-server-path" not in made.broken[0].reason
+    assert len(made.broken[0].reason) <= 500
     assert BAD in caplog.text
     assert choose_bundle("hgm3", config=config).manifest.name == GOOD
+
+
+def test_a_folder_whose_name_is_no_unicode_can_be_told(config: Settings) -> None:
+    name = os.fsdecode(b"b-\xff")
+    (config.models / BAD).rename(config.models / name)
+    (config.models / name / "manifest.json").write_bytes(b"{}")
+    (broken,) = offers(config).broken
+    assert broken.name == "b-\\udcff"
+    assert b"b-" in ModelsView.of(offers(config)).model_dump_json().encode()
 
 
 def test_a_reason_is_logged_once(config: Settings, caplog: pytest.LogCaptureFixture) -> None:
