@@ -17,6 +17,9 @@ from shared.errors import InvalidFile, MareyError, NotFound, TooLarge
 
 MAX_UNPACKED = 2**30
 """Bytes of the arrays of an npz file that is read whole."""
+PACKED = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
+"""The two that numpy writes. bzip2 and LZMA are unpacked in whole blocks, whatever size a member declares: 600 bytes
+became a gigabyte."""
 CHUNK = 2**22
 """Numbers looked at in one go by the check for finite ones: a mapped file is not read into memory at once."""
 
@@ -108,7 +111,10 @@ def parse_npz(
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(member.file_size for member in archive.infolist())
+            members = archive.infolist()
+            if any(member.compress_type not in PACKED for member in members):
+                raise InvalidFile("is packed by a method that numpy does not use", where=where, hint=hint)
+            size = sum(member.file_size for member in members)
             if size > limit:
                 raise TooLarge(
                     f"{size / 2**30:.1f} GiB unpacked, over the limit of {limit / 2**30:g} GiB", where=where, hint=hint

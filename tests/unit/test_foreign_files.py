@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,15 @@ def test_arrays_are_checked_by_kind_shape_and_finite_numbers() -> None:
     large[-1, -1] = np.nan
     with pytest.raises(InvalidFile, match="NaN"):
         check_array(large, "x", "file", kinds="f", shape=(None, None))
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_npz_file_packed_by_another_method_is_not_unpacked(method: int) -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(npz(x=np.zeros(3)))) as made, zipfile.ZipFile(file, "w", method) as packed:
+        packed.writestr("x.npy", made.read("x.npy"))
+    with pytest.raises(InvalidFile, match="a method that numpy does not use"):
+        parse_npz(file.getvalue(), "x", ("x",))
 
 
 def test_an_npz_file_that_unpacks_to_too_much_is_refused() -> None:
