@@ -22,8 +22,9 @@ from typing import Any, NoReturn, TypeVar
 import psycopg
 import sqlalchemy as sa
 import structlog
+from psycopg.waiting import Ready
 
-from shared.jobs.deadlines import CONNECT_SECONDS, ORDINARY, PING_SECONDS, ROLLBACK_SECONDS, Deadline
+from shared.jobs.deadlines import CONNECT_SECONDS, ORDINARY, PING_SECONDS, ROLLBACK_SECONDS, Deadline, in_all
 
 log = structlog.get_logger(__name__)
 
@@ -33,6 +34,8 @@ INTERVAL = 0.1
 """Seconds between two looks at the deadline of a call that waits."""
 HEARD_LATELY = 2.0
 """A connection that heard from the server this recently is not silent. Shorter than any deadline."""
+STOPPED = 1.0
+"""Longer than between two looks this process was stopped itself; that counts as so many seconds of waiting."""
 TURN_SECONDS = 1.0
 """A caller waits so long for another that already tries whether a silent server answers again."""
 
@@ -228,25 +231,34 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         """Drive a round trip until it is done.
 
         Raises:
-            SilentConnection: nothing came for `limit` seconds. Not with a `timeout`, by which the caller waits for
-                notifications.
+            SilentConnection: nothing came for `limit` seconds, or bytes came too slowly (`in_all`). Not with a
+                `timeout`, by which the caller waits for notifications.
         """
         if timeout is not None:
             return super().wait(gen, interval, timeout)
         return super().wait(self._watched(gen), interval)
 
     def _watched(self, gen: _Waiting[RV]) -> Generator[Any, Any, RV]:
-        """`gen`, but given up when it has made no progress for `limit` seconds."""
+        """`gen`, but given up when nothing came for `limit` seconds, or when it is not done after `in_all` of them."""
+        limit_in_all = in_all(self.limit)
+        spent = 0.0
         try:
             wanted = next(gen)
-            moved = time.monotonic()
+            looked = moved = time.monotonic()
             while True:
                 ready = yield wanted
+                now = time.monotonic()
+                spent += min(now - looked, STOPPED)
+                looked = now
                 if ready:
-                    moved = time.monotonic()
-                elif time.monotonic() - moved >= self.limit and not self._has_data():
-                    self._give_up()
+                    moved = now
+                    if ready & Ready.R:
+                        self._heard = now
+                elif now - moved >= self.limit and not self._has_data():
+                    self._give_up(self.limit)
                 wanted = gen.send(ready)
+                if spent >= limit_in_all:
+                    self._give_up(limit_in_all)
         except StopIteration as end:
             self._heard = time.monotonic()
             return end.value
@@ -257,12 +269,11 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         poll.register(self.pgconn.socket, select.POLLIN)
         return bool(poll.poll(0))
 
-    def _give_up(self) -> NoReturn:
-        limit = self.limit
+    def _give_up(self, seconds: float) -> NoReturn:
         self._heard = -HEARD_LATELY
-        self.group.missed(limit)
+        self.group.missed(seconds)
         self.close()
-        raise SilentConnection(f"no answer for {limit:g} seconds; the connection is closed")
+        raise SilentConnection(f"no whole answer for {seconds:g} seconds; the connection is closed")
 
 
 _groups: weakref.WeakValueDictionary[str, ConnectionGroup] = weakref.WeakValueDictionary()

@@ -38,6 +38,11 @@ PING_SECONDS = 3.0
 """For the check of a pooled connection before use, and for a probe of a LISTEN connection: no lock, no table."""
 ROLLBACK_SECONDS = 3.0
 """A rollback writes nothing and waits for no lock."""
+SHORT_SECONDS = 4.0
+"""Round trips with a limit of at most this long have answers of a few bytes: the limit counts the whole of them."""
+SLOWNESS = 3
+"""Others may take this many times their limit as long as bytes come: a large answer on a slow line is no fault, a
+connection that lets a byte through now and then is one."""
 PROBE_EVERY = 3.0
 """Seconds without a notification after which a LISTEN connection is probed."""
 
@@ -55,5 +60,11 @@ BACKUP = Deadline("backup", statement=300.0, idle=120.0)
 """Export and import of a tenant: whole jobs are read in one snapshot and checked in between."""
 MIGRATION = Deadline("migration", statement=3600.0, idle=600.0)
 """Indexes over all items. Waits for tables have a limit of their own (`shared.jobs.migrate`)."""
+
+
+def in_all(limit: float) -> float:
+    """Seconds that one round trip may take in all, of a connection that may be silent for `limit` seconds."""
+    return limit if limit <= SHORT_SECONDS else limit * SLOWNESS
+
 
 KINDS = (HEARTBEAT, ORDINARY, SEARCH, BULK, MAINTENANCE, BACKUP, MIGRATION)

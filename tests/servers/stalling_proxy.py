@@ -17,6 +17,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 CHUNK = 64 * 1024
+DRIP_SECONDS = 0.2
 
 
 class _Link:
@@ -28,6 +29,7 @@ class _Link:
         self.writer = writer
         self.flowing = asyncio.Event()
         self.flowing.set()
+        self.dripping = False
 
 
 class StallingProxy:
@@ -87,6 +89,10 @@ class StallingProxy:
         """
         self._call(self._resume(old))
 
+    def drip(self) -> None:
+        """Let the server's answers on every open connection through byte by byte, `DRIP_SECONDS` apart."""
+        self._call(self._drip())
+
     def cut(self, *, silent: bool = False) -> None:
         """Close every open connection, also towards the server.
 
@@ -125,6 +131,10 @@ class StallingProxy:
             for link in self._links:
                 link.flowing.set()
 
+    async def _drip(self) -> None:
+        for link in self._links:
+            link.dripping = True
+
     async def _cut(self, silent: bool = False) -> None:
         tasks = [link.task for link in self._links if not (silent and link.flowing.is_set())]
         for task in tasks:
@@ -156,7 +166,7 @@ class StallingProxy:
             reader, writer = await asyncio.open_connection(*self._target)
         pumps = [
             asyncio.create_task(_pump(link, link.reader, writer, self._pace)),
-            asyncio.create_task(_pump(link, reader, link.writer, self._pace)),
+            asyncio.create_task(_pump(link, reader, link.writer, self._pace, answers=True)),
         ]
         try:
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
@@ -167,9 +177,20 @@ class StallingProxy:
             writer.close()
 
 
-async def _pump(link: _Link, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, pace: float | None) -> None:
+async def _pump(
+    link: _Link,
+    reader: asyncio.StreamReader,
+    writer: asyncio.StreamWriter,
+    pace: float | None,
+    *,
+    answers: bool = False,
+) -> None:
     while data := await reader.read(CHUNK):
         await link.flowing.wait()
+        while answers and link.dripping and data:
+            writer.write(data[:1])
+            data = data[1:]
+            await asyncio.sleep(DRIP_SECONDS)
         writer.write(data)
         await writer.drain()
         if pace is not None:

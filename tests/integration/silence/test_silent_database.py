@@ -14,7 +14,17 @@ import sqlalchemy as sa
 from shared.errors import Unreachable
 from shared.jobs import EVENT_CHANNEL, Deadline, Listener, create_engine, outages, transaction
 from shared.jobs.connections import HEARD_LATELY, SilentConnection
-from shared.jobs.deadlines import BULK, CONNECT_SECONDS, ORDINARY, PING_SECONDS, PROBE_EVERY
+from shared.jobs.deadlines import (
+    BULK,
+    CONNECT_SECONDS,
+    HEARTBEAT,
+    KINDS,
+    ORDINARY,
+    PING_SECONDS,
+    PROBE_EVERY,
+    ROLLBACK_SECONDS,
+    in_all,
+)
 from tests.servers.stalling_proxy import StallingProxy
 
 QUICK = Deadline("quick", statement=0.8, idle=30.0, margin=0.4)
@@ -224,6 +234,53 @@ def test_a_living_server_raises_no_alarm_and_keeps_what_it_answers(proxied: str,
     silent.close()
     engine.dispose()
     busy.dispose()
+
+
+def test_a_connection_that_lets_a_byte_through_now_and_then_is_given_up(
+    behind: sa.Engine, proxy: StallingProxy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("shared.jobs.connections.in_all", lambda limit: limit)
+
+    def ask() -> None:
+        with transaction(behind) as conn:
+            conn.execute(sa.text("SELECT 1"))
+            proxy.drip()
+            conn.execute(sa.text("SELECT repeat('x', 1000)"))
+
+    assert took(ask) < QUICK.answer + SLACK
+    assert outages(behind) == 1
+
+
+def test_short_calls_count_the_whole_round_trip_and_long_ones_have_more() -> None:
+    for short in (PING_SECONDS, ROLLBACK_SECONDS, HEARTBEAT.answer):
+        assert in_all(short) == short
+    for kind in KINDS:
+        assert kind is HEARTBEAT or in_all(kind.answer) > 2 * kind.answer
+
+
+def test_an_answer_that_still_comes_survives_the_alarm_of_another_connection(
+    proxied: str, proxy: StallingProxy
+) -> None:
+    """Rows that take longer than `HEARD_LATELY` in all, and never stop for as long."""
+    reading, other = create_engine(proxied), create_engine(proxied, deadline=QUICK)
+    silent = other.raw_connection()
+    proxy.stall()
+    rows = "SELECT repeat('x', 1000), pg_sleep(0.01) FROM generate_series(1, 600)"
+
+    def read() -> int:
+        with transaction(reading) as conn:
+            return len(conn.execute(sa.text(rows)).all())
+
+    with ThreadPoolExecutor(1) as pool:
+        all_rows = pool.submit(read)
+        time.sleep(HEARD_LATELY + 1)
+        with pytest.raises(SilentConnection):
+            silent.cursor().execute("SELECT 1")
+        assert all_rows.result() == 600
+    assert outages(other) == 1
+    silent.close()
+    reading.dispose()
+    other.dispose()
 
 
 def test_a_process_that_was_stopped_itself_raises_no_alarm(behind: sa.Engine, monkeypatch: pytest.MonkeyPatch) -> None:
