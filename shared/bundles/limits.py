@@ -52,7 +52,7 @@ def settings_of(bundle: Bundle) -> Mapping[str, Any]:
     Raises:
         InvalidBundle: its manifest says something else of them.
     """
-    own = bundle.manifest.parameters.get("inference") or {}
+    own: Any = bundle.manifest.parameters.get("inference") or {}
     if not isinstance(own, dict):
         raise InvalidBundle("its parameters give no object as 'inference'", where=str(bundle.path))
     return cast("dict[str, Any]", own)
