@@ -17,7 +17,8 @@ TENANT_BYTES = 2 * MAX_BODY_BYTES
 """Of one tenant: another always finds room."""
 WAIT_SECONDS = 10.0
 WAITING = 32
-"""Requests that wait at the same time; their clients have sent nothing but what fits into the buffers of a socket."""
+"""Requests that wait at the same time; their clients have sent nothing but what fits into the buffers of a socket. A
+tenant may have no more of them than places are free: another always finds one."""
 RETRY_SECONDS = 5
 
 
@@ -56,14 +57,12 @@ class BodyRoom:
         try:
             yield
         finally:
-            self._used -= size
-            self._by_tenant[tenant] -= size
-            if not self._by_tenant[tenant]:
-                del self._by_tenant[tenant]
+            self._give_back(tenant, size)
             self._admit()
 
     async def _wait(self, tenant: str, size: int) -> None:
-        if len(self._waiting) >= WAITING:
+        of_tenant = sum(waiter.tenant == tenant for waiter in self._waiting)
+        if of_tenant >= WAITING - len(self._waiting):
             raise _overloaded()
         waiter = _Waiter(tenant, size)
         self._waiting.append(waiter)
@@ -77,10 +76,15 @@ class BodyRoom:
                 raise _overloaded() from None
         except asyncio.CancelledError:
             if waiter.turn.done():  # it was given, and nobody takes it
-                self._used -= size
-                self._by_tenant[tenant] -= size
+                self._give_back(tenant, size)
             self._forget(waiter)
             raise
+
+    def _give_back(self, tenant: str, size: int) -> None:
+        self._used -= size
+        self._by_tenant[tenant] -= size
+        if not self._by_tenant[tenant]:
+            del self._by_tenant[tenant]
 
     def _forget(self, waiter: _Waiter) -> None:
         if waiter in self._waiting:

@@ -110,3 +110,27 @@ def test_too_many_who_wait_are_refused_at_once(monkeypatch: pytest.MonkeyPatch) 
         assert room.used == 0
 
     asyncio.run(scenario())
+
+
+def test_those_who_wait_leave_room_for_another_tenant(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(body_room, "WAITING", 8)
+
+    async def scenario() -> None:
+        room = BodyRoom(TOTAL, TENANT, seconds=30)
+
+        async def request(tenant: str, size: int) -> str:
+            try:
+                async with room.take(tenant, size):
+                    return "taken"
+            except Overloaded:
+                return "refused"
+
+        async with room.take("ann", TENANT):
+            waiting = [asyncio.ensure_future(request("ann", TENANT)) for _ in range(20)]
+            await asyncio.sleep(0)
+            assert await request("bob", 1) == "taken"
+        found = Counter(await asyncio.gather(*waiting))
+        assert found == {"taken": 4, "refused": 16}, "half of the places"
+        assert room.used == 0
+
+    asyncio.run(scenario())
