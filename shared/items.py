@@ -25,6 +25,8 @@ MAX_ITEMS = 100_000
 MAX_BODY_BYTES = 64 * 2**20
 MAX_PROBLEMS = 1000
 """More than these are counted, not listed."""
+MAX_UNKNOWN = 100
+"""Unknown fields of one item that are told one by one."""
 MAX_SEED = 2**31 - 1
 MAX_VARIANTS = 100
 MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
@@ -181,11 +183,14 @@ def read_fields(
     if not isinstance(raw, Mapping):
         return {}, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
     given = cast("Mapping[object, object]", raw)
+    unknown = [name for name in given if name not in checks]
+    known = ", ".join(checks)
     problems = [
-        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {', '.join(checks)}")
-        for name in given
-        if name not in checks
+        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {known}")
+        for name in unknown[:MAX_UNKNOWN]
     ]
+    if len(unknown) > MAX_UNKNOWN:
+        problems.append(Problem(line, None, f"has {len(unknown)} fields that are not known; known are {known}"))
     values: dict[str, Any] = {}
     for name, check in checks.items():
         if given.get(name) is None:

@@ -19,6 +19,10 @@ from shared.jobs import NewItem
 from shared.offers import Offer, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
+MAX_MODELS = 100
+"""Names of models in one body: each is looked for on the disk."""
+MAX_LINES = 1_000_000
+"""Of NDJSON, blank ones too."""
 Raws = Callable[[], Iterator[tuple[int, object]]]
 """What a body holds, with its lines, from its beginning at each call."""
 
@@ -63,6 +67,8 @@ def _lines(body: BinaryIO) -> Iterator[tuple[int, object]]:
     number = 0
     while line := body.readline(MAX_VALUE + 1):
         number += 1
+        if number > MAX_LINES:
+            raise TooLarge(f"has over {MAX_LINES:,} lines", where="body", hint="Leave out the blank ones.")
         if len(line) > MAX_VALUE:
             hint = "Write one item a line."
             raise TooLarge(f"is over {MAX_VALUE:,} bytes", where=f"line {number}", hint=hint)
@@ -89,6 +95,8 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
     offers: dict[str | None, Offer] = {}
+    failed: dict[str | None, MareyError] = {}
+    """What is not there is looked for once, however many lines name it."""
     default_model: set[Problem] = set()
     line = 0
 
@@ -102,15 +110,22 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
         """What the model of an item cannot do."""
         model = values.get("model")
-        try:
-            offers[model] = offer = catalogue.offer(model)
-        except MareyError as error:
+        if model not in failed:
+            if model not in offers and len(offers) + len(failed) == MAX_MODELS:
+                hint = "Submit them as several jobs."
+                raise TooLarge(f"names over {MAX_MODELS} models", where=f"line {line}", hint=hint)
+            try:
+                offers[model] = catalogue.offer(model)
+            except MareyError as error:
+                failed[model] = error
+        if (error := failed.get(model)) is not None:
             problem = _problem(error, None if model is None else line, "model")  # the default stands in no line
             if problem not in default_model:
                 yield problem
             if model is None:
                 default_model.add(problem)
             return
+        offer = offers[model]
         for field, hold in (("seconds", offer.check_seconds), ("settings", offer.check_settings)):
             try:
                 if field in values:
