@@ -1,13 +1,16 @@
 """Pages of listings, in the order of the database's clock. Cursors are opaque.
 
-A cursor holds the creation time and the id of the last row. Those of earlier releases hold its id alone, and are read
-too: the time is that of the row, or, when that is gone, the time in its UUIDv7.
+A cursor holds the id and the creation time of the last row. Those of earlier releases hold its id alone, and are read
+too: the time is that of the row, or, when that is gone, the time in its UUIDv7. In turn an API process of an earlier
+release reads the id of ours, and goes on in its own order: the id in braces is base64 that ends in padding, where its
+decoder stops; the time stands behind it.
 """
 
 from __future__ import annotations
 
 import base64
 import binascii
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -22,6 +25,7 @@ from shared.jobs.types import Page
 
 LARGEST_PAGE = 1000
 SEPARATOR = "|"
+_PADDED = re.compile(r"[^=]+=*|=+")
 Row = TypeVar("Row")
 Mark = TypeVar("Mark")
 Place = sa.ColumnElement[Any]
@@ -74,19 +78,19 @@ class _Mark:
 
     @classmethod
     def read(cls, text: str) -> _Mark:
-        time, separator, identifier = text.rpartition(SEPARATOR)
+        identifier, separator, time = text.partition(SEPARATOR)
+        own = UUID(identifier)
         if not separator:
-            own = UUID(text)
             return cls(datetime.fromtimestamp((own.int >> 80) / 1000).astimezone(), own, by_id=True)
         at = datetime.fromisoformat(time)
         if at.tzinfo is None:
             raise ValueError("a time without its zone")
-        return cls(at, UUID(identifier), by_id=False)
+        return cls(at, own, by_id=False)
 
 
 def mark_of(created: datetime, identifier: UUID) -> str:
     """The mark of a row for `cut_page`."""
-    return f"{created.isoformat()}{SEPARATOR}{identifier}"
+    return f"{{{identifier}}}{SEPARATOR}{created.isoformat()}"
 
 
 def page_limit(limit: int) -> int:
@@ -105,7 +109,8 @@ def cut_page(rows: Sequence[Row], limit: int, mark: Callable[[Row], str]) -> Pag
     kept = tuple(rows[:limit])
     if len(rows) <= limit:
         return Page(kept, None)
-    return Page(kept, base64.urlsafe_b64encode(mark(kept[-1]).encode()).decode().rstrip("="))
+    parts = mark(kept[-1]).split(SEPARATOR)
+    return Page(kept, "".join(base64.urlsafe_b64encode(part.encode()).decode() for part in parts).rstrip("="))
 
 
 def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
@@ -115,7 +120,8 @@ def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
         InvalidInput: it is none of ours.
     """
     try:
-        return kind(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
+        parts = _PADDED.findall(cursor + "=" * (-len(cursor) % 4))
+        return kind(SEPARATOR.join(base64.urlsafe_b64decode(part).decode() for part in parts))
     except (binascii.Error, ValueError, OverflowError, OSError) as error:
         raise InvalidInput(
             "this is no cursor of this listing", where="cursor", hint="Use the one the last page gave."
