@@ -49,7 +49,7 @@ class WordLimit:
         Raises:
             Busy: they are too many beside those in flight.
         """
-        words = sum(1 + prompt.count(" ") for prompt in prompts)
+        words = sum(max(1, len(prompt.split())) for prompt in prompts)  # any white space is between words
         with self._lock:
             if self._words and self._words + words > self._limit:
                 raise Busy(

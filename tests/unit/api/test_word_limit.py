@@ -37,3 +37,10 @@ def test_a_request_that_fails_gives_its_share_back() -> None:
     with pytest.raises(ZeroDivisionError), limit.take(["walk"]):
         _ = 1 / 0
     assert limit.in_flight == 0
+
+
+def test_words_count_whatever_white_space_is_between_them() -> None:
+    for space in " \n\t\u00a0\u3000":
+        limit = WordLimit(LIMIT)
+        with limit.take([space.join(["walk"] * 60)] * 2):
+            assert limit.in_flight == 120
