@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import re
 
 import httpx2
 import structlog
+from anyio import to_thread
+from pydantic import ValidationError
 from starlette.responses import Response
 
-from services.api.problems import MEDIA_TYPE, RETRY_AFTER
+from services.api.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
 from services.text.limits import WordLimit
-from services.text.routes import ParseBody, too_late
+from services.text.routes import GraphsView, ParseBody, too_late
 from shared import tracing
 from shared.errors import InvalidInput, Unreachable
 from shared.settings import Settings
@@ -18,6 +21,10 @@ from shared.settings import Settings
 CONNECT_SECONDS = 2.0
 SOCKET = "unix://"
 PATH = "/v1/texts/parse"
+JSON = "application/json"
+MAX_ANSWER = 8 * 2**20
+"""Bytes. The graphs of 64 prompts that are as long as they may be take one of them."""
+RETRY = re.compile(r"[0-9]{1,5}")
 PASSED_ON = (200, 404, 413, 422, 429, 503)
 """Answers that are the caller's business; any other is a fault of ours."""
 
@@ -50,20 +57,20 @@ class TextService:
                 hint="Start `marey text serve` and name it by MAREY_TEXT_URL.",
                 public="this server does not parse texts",
             )
-        headers = {"Content-Type": "application/json"}
+        headers = {"Content-Type": JSON, "Accept-Encoding": "identity"}
         if (trace := tracing.current()) is not None:
             headers[tracing.HEADER] = trace
         with self._limit.take(body.prompts):
             try:
-                async with asyncio.timeout(self._seconds):
-                    answer = await self._http.post(PATH, content=body.model_dump_json(), headers=headers)
+                async with (
+                    asyncio.timeout(self._seconds),
+                    self._http.stream("POST", PATH, content=body.model_dump_json(), headers=headers) as answer,
+                ):
+                    return await _passed_on(answer)
             except TimeoutError:
                 raise too_late(self._seconds) from None
-            except httpx2.TransportError as error:
+            except httpx2.HTTPError as error:
                 raise _away(f"{type(error).__name__}: {error}") from error
-        if answer.status_code not in PASSED_ON:
-            raise _away(f"it answered {answer.status_code}")
-        return _passed_on(answer)
 
     async def close(self) -> None:
         """Close the connections."""
@@ -88,10 +95,28 @@ def _client(config: Settings, url: str) -> httpx2.AsyncClient:
     )
 
 
-def _passed_on(answer: httpx2.Response) -> Response:
-    headers = {"Retry-After": answer.headers.get("Retry-After", RETRY_AFTER)} if answer.status_code >= 429 else {}
-    media_type = "application/json" if answer.status_code == 200 else MEDIA_TYPE
-    return Response(answer.content, answer.status_code, headers, media_type)
+async def _passed_on(answer: httpx2.Response) -> Response:
+    """The same answer, if it is one of the text service: what else listens there is not for clients to see.
+
+    Raises:
+        Unreachable: it is another.
+    """
+    status = answer.status_code
+    view, media_type = (GraphsView, JSON) if status == 200 else (ProblemBody, MEDIA_TYPE)
+    if status not in PASSED_ON or answer.headers.get("Content-Type", "").partition(";")[0].strip() != media_type:
+        raise _away(f"it answered {status}")
+    content = bytearray()
+    async for part in answer.aiter_raw():  # nothing is decompressed: it was not asked for
+        content += part
+        if len(content) > MAX_ANSWER:
+            raise _away(f"its answer is over {MAX_ANSWER:,} bytes")
+    try:
+        await to_thread.run_sync(view.model_validate_json, bytes(content))
+    except ValidationError as error:
+        raise _away(f"it answered {status} with something else than {view.__name__}") from error
+    wait = answer.headers.get("Retry-After", "")
+    headers = {"Retry-After": wait if RETRY.fullmatch(wait) else RETRY_AFTER} if status >= 429 else {}
+    return Response(bytes(content), status, headers, media_type)
 
 
 def _away(why: str) -> Unreachable:
