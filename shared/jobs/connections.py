@@ -77,7 +77,7 @@ class ConnectionGroup:
         self._lock = threading.Lock()
         self._connections: weakref.WeakSet[DeadlineConnection] = weakref.WeakSet()
         self._probing = threading.Lock()
-        self._lost: list[Session] = []
+        self._lost: set[Session] = set()
         self.silent = False
         """A deadline was missed, and nothing was heard since."""
         self.misses = 0
@@ -98,19 +98,25 @@ class ConnectionGroup:
             self.silent = True
             self.misses += 1
             silent = [one for one in self._connections if not (one.closed or one.heard_lately())]
-            self._lost += [one.session for one in silent if one.session is not None]
+            self._lost |= {one.session for one in silent if one.session is not None}
         for one in silent:
             one.shut_down()
         log.warning("database_silent", seconds=seconds, connections_closed=len(silent))
 
+    def lose(self, session: Session | None) -> None:
+        """Note that a connection broke: a middlebox that cut it may not have told the server."""
+        if session is not None:
+            with self._lock:
+                self._lost.add(session)
+
     def end_lost(self, connection: DeadlineConnection) -> None:
-        """End the sessions of closed silent connections on the server, which may not have noticed.
+        """End the sessions of closed silent and of broken connections on the server, which may not have noticed.
 
         Such a session would keep its locks until a timeout of the server, a COPY that waits for data for ever (no
         timeout of Postgres applies to it), and its place among `max_connections` until the network gives it up.
         """
         with self._lock:
-            lost, self._lost = self._lost, []
+            lost, self._lost = self._lost, set[Session]()
         if not lost:
             return
         values = ([one.pid for one in lost], [one.seen for one in lost])
@@ -118,12 +124,13 @@ class ConnectionGroup:
             (ended,) = connection.execute(END_SESSIONS, values).fetchone() or (0,)
         except psycopg.Error as error:
             with self._lock:
-                self._lost += lost
+                self._lost |= lost
             log.warning("lost_sessions_not_ended", sessions=len(lost), error=type(error).__name__)
             if connection.closed:
                 raise
         else:
-            log.info("lost_sessions_ended", sessions=ended)
+            if ended:
+                log.info("lost_sessions_ended", sessions=ended)
 
     def answered(self) -> None:
         """The server answered."""
@@ -212,6 +219,8 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
 
     def close(self) -> None:
         """Close the connection; never waits for the server."""
+        if self._line is not None and (self.broken or self._is_cut(self._line)):
+            self.group.lose(self.session)
         super().close()
         if self._line is not None:
             with self._line_lock:
@@ -236,7 +245,14 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         """
         if timeout is not None:
             return super().wait(gen, interval, timeout)
-        return super().wait(self._watched(gen), interval)
+        try:
+            return super().wait(self._watched(gen), interval)
+        except psycopg.OperationalError as error:
+            if error.sqlstate is None and not self.closed:
+                # psycopg leaves the connection "active" where poll finds the socket broken. It is of no use any more,
+                # and SQLAlchemy takes an error of its check before use for a lost connection only if it is closed.
+                self.close()
+            raise
 
     def _watched(self, gen: _Waiting[RV]) -> Generator[Any, Any, RV]:
         """`gen`, but given up when nothing came for `limit` seconds, or when it is not done after `in_all` of them."""
@@ -267,6 +283,13 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         """Return True if the answer is here after all: this process, not the server, may have been stopped."""
         poll = select.poll()
         poll.register(self.pgconn.socket, select.POLLIN)
+        return bool(poll.poll(0))
+
+    @staticmethod
+    def _is_cut(line: socket.socket) -> bool:
+        """Return True if the connection was reset, or the other side has closed it."""
+        poll = select.poll()
+        poll.register(line, getattr(select, "POLLRDHUP", 0))  # Linux alone tells of a half-closed one
         return bool(poll.poll(0))
 
     def _give_up(self, seconds: float) -> NoReturn:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import struct
 import threading
 from collections.abc import Coroutine
 from concurrent.futures import Future
@@ -30,6 +31,7 @@ class _Link:
         self.flowing = asyncio.Event()
         self.flowing.set()
         self.dripping = False
+        self.abandoned = False
 
 
 class StallingProxy:
@@ -93,6 +95,10 @@ class StallingProxy:
         """Let the server's answers on every open connection through byte by byte, `DRIP_SECONDS` apart."""
         self._call(self._drip())
 
+    def reset(self) -> None:
+        """Reset every open connection of a client, and keep that to the server open, as some firewalls do."""
+        self._call(self._reset())
+
     def cut(self, *, silent: bool = False) -> None:
         """Close every open connection, also towards the server.
 
@@ -130,6 +136,13 @@ class StallingProxy:
         if old:
             for link in self._links:
                 link.flowing.set()
+
+    async def _reset(self) -> None:
+        for link in self._links:
+            link.abandoned = True
+            connected = link.writer.get_extra_info("socket")
+            connected.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            link.writer.transport.abort()
 
     async def _drip(self) -> None:
         for link in self._links:
@@ -170,6 +183,8 @@ class StallingProxy:
         ]
         try:
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            if link.abandoned:
+                await asyncio.Event().wait()  # until the proxy stops
         finally:
             for pump in pumps:
                 pump.cancel()

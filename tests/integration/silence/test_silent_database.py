@@ -283,6 +283,47 @@ def test_an_answer_that_still_comes_survives_the_alarm_of_another_connection(
     other.dispose()
 
 
+def test_connections_that_are_reset_are_replaced_and_their_sessions_ended(
+    behind: sa.Engine, proxy: StallingProxy, engine: sa.Engine
+) -> None:
+    """Also where psycopg reports the broken socket and leaves the connection as if it were in use."""
+    pids = "SELECT count(*) FROM pg_stat_activity WHERE pid = ANY(:pids)"
+    with transaction(behind) as one, transaction(behind) as two:
+        lost = [conn.execute(sa.text("SELECT pg_backend_pid()")).scalar_one() for conn in (one, two)]
+    proxy.reset()
+    time.sleep(0.2)
+    for _ in range(2):
+        with transaction(behind) as one, transaction(behind) as two:
+            assert [conn.execute(sa.text("SELECT 1")).scalar_one() for conn in (one, two)] == [1, 1]
+    until = time.monotonic() + SLACK
+    left = -1
+    while left and time.monotonic() < until:
+        with transaction(engine) as conn:
+            left = conn.execute(sa.text(pids), {"pids": lost}).scalar_one()
+        time.sleep(0.05)
+    assert left == 0
+    assert outages(behind) == 0
+
+
+def test_an_error_of_the_socket_closes_the_connection(behind: sa.Engine, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise psycopg.OperationalError("connection socket closed")
+
+    with transaction(behind):
+        pass
+    raw = behind.raw_connection()
+    driver = raw.driver_connection
+    assert isinstance(driver, psycopg.Connection)
+    raw.close()
+    with monkeypatch.context() as patched:
+        patched.setattr("psycopg.connection.waiting.wait", broken)
+        with pytest.raises(psycopg.OperationalError):
+            driver.cursor().execute("SELECT 1")
+    assert driver.closed
+    with transaction(behind) as conn:
+        assert conn.execute(sa.text("SELECT 1")).scalar_one() == 1
+
+
 def test_a_process_that_was_stopped_itself_raises_no_alarm(behind: sa.Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     """Time that passes here while the answer lies ready is no silence."""
     with transaction(behind) as conn:
