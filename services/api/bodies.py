@@ -15,6 +15,7 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from services.api.body_room import BodyRoom
 from services.api.problems import problem_response
 from shared.errors import InvalidInput, MareyError, TooLarge, TooSlow
 from shared.items import MAX_BODY_BYTES
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20
 """Bytes of any body but those that hold many prompts."""
+SMALL_BODY = 2**16
+"""Bytes that any request may have in memory."""
+OTHER_BODIES = 64 * MAX_OTHER_BODY
+"""Bytes of bodies over that in memory at the same time. They are read before it is known who sends them."""
 NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
 PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
 """Where such bodies go; their routes read them, once they know who sends them."""
@@ -123,6 +128,7 @@ class BodyGuard:
     def __init__(self, app: ASGIApp, patience: Patience) -> None:
         self.app = app
         self.patience = patience
+        self.room = BodyRoom(OTHER_BODIES, OTHER_BODIES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the whole body, or refuse."""
@@ -135,21 +141,40 @@ class BodyGuard:
             scope[INCOMING] = incoming
             await self.app(scope, incoming, answer)
             return
-        try:
-            body = await read_body(Request(scope, incoming), MAX_OTHER_BODY)
-        except MareyError as error:
-            await problem_response(error)(scope, incoming, answer)
-            return
-        sent = False
+        async with AsyncExitStack() as held:
+            try:
+                body = await self._read(Request(scope, incoming), incoming, held)
+            except MareyError as error:
+                await problem_response(error)(scope, incoming, answer)
+                return
+            await self.app(scope, _replay(body, receive), send)
 
-        async def replay() -> Message:
-            nonlocal sent
-            if sent:
-                return await receive()
-            sent = True
-            return {"type": "http.request", "body": body, "more_body": False}
+    async def _read(self, request: Request, incoming: Incoming, held: AsyncExitStack) -> bytes:
+        """The body; one that is not small waits for room, which it has while `held` lasts. Raises as `kept_body`."""
+        parts, size, roomy = list[bytes](), 0, False
+        declared = _declared(request, MAX_OTHER_BODY)
+        async for part in _parts(request, MAX_OTHER_BODY):
+            size += len(part)
+            if not roomy and max(size, declared) > SMALL_BODY:
+                roomy = True
+                async with incoming.paused():
+                    await held.enter_async_context(self.room.take("", declared or MAX_OTHER_BODY))
+            parts.append(part)
+        return b"".join(parts)
 
-        await self.app(scope, replay, send)
+
+def _replay(body: bytes, receive: Receive) -> Receive:
+    """A `receive` that gives the whole body first."""
+    sent = False
+
+    async def replay() -> Message:
+        nonlocal sent
+        if sent:
+            return await receive()
+        sent = True
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    return replay
 
 
 class _Answer:
@@ -169,15 +194,6 @@ class _Answer:
             await self._incoming.linger()
             message = {"type": "http.response.body", "body": b""}
         await self._send(message)
-
-
-async def read_body(request: Request, limit: int) -> bytes:
-    """The body of a request.
-
-    Raises:
-        TooLarge, TooSlow, InvalidInput: as `_parts`.
-    """
-    return b"".join([part async for part in _parts(request, limit)])
 
 
 class KeptBody:

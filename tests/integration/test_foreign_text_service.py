@@ -18,7 +18,7 @@ from shared.errors import Unreachable
 from shared.settings import Settings
 
 JSON, PROBLEM = "application/json", "application/problem+json"
-BODY = ParseBody(prompts=["a person walks"])
+BODY = ParseBody(prompts=["a person walks"], model="hgm3")
 GOOD = b'{"items": []}'
 TOLD = b'{"type": "urn:marey:problem:busy", "title": "Busy", "status": 429, "detail": "too many"}'
 FOREIGN: dict[str, tuple[int, dict[str, str], bytes]] = {
