@@ -42,14 +42,16 @@ class Part(threading.Thread):
         self._between_rounds = pause
         self._allowed_wait = allowance
         self._ticked = time.monotonic()
+        self._in_round = False
 
-    def progressed(self) -> None:
-        """Note progress."""
+    def progressed(self, *, in_round: bool = False) -> None:
+        """Note progress; in the middle of a round, no pause between two rounds is due before the next."""
         self._ticked = time.monotonic()
+        self._in_round = in_round
 
     def silence(self) -> float:
         """Seconds without progress; below 0 between two rounds."""
-        return time.monotonic() - self._ticked - self._between_rounds
+        return time.monotonic() - self._ticked - (0.0 if self._in_round else self._between_rounds)
 
     def stalled(self, seconds: float) -> bool:
         """Return True if there was no progress for `seconds`, or the thread has ended."""
@@ -63,7 +65,7 @@ def note_progress(engine: sa.Engine) -> None:
     def _answered(*_: Any) -> None:
         part = threading.current_thread()
         if isinstance(part, Part):
-            part.progressed()
+            part.progressed(in_round=True)
 
 
 def watch(

@@ -45,7 +45,7 @@ class Periodic(Part):
 
     def run(self) -> None:
         while not self._stopping.wait(self._seconds):
-            self.progressed()
+            self.progressed(in_round=True)
             try:
                 self.once()
                 outcome = "done"

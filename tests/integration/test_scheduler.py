@@ -251,6 +251,19 @@ def test_a_periodic_action_that_hangs_is_told_by_its_silence() -> None:
     thread.join(5.0)
 
 
+def test_a_round_that_hangs_is_told_long_before_the_next_would_be_due() -> None:
+    stopping, released = threading.Event(), threading.Event()
+    thread = Periodic("test", lambda: released.wait() and None, seconds=0.2, stopping=stopping)
+    thread._between_rounds = 600.0  # pyright: ignore[reportPrivateUsage] - it comes at once all the same
+    thread.start()
+    assert not thread.stalled(0.0)
+    wait(lambda: thread.stalled(0.3))
+    released.set()
+    wait(lambda: not thread.stalled(0.0))
+    stopping.set()
+    thread.join(5.0)
+
+
 def test_after_an_outage_heartbeats_come_before_the_sweeper() -> None:
     """Leases run out while the database is away; taking them at its return would blame the workers."""
     stopping = threading.Event()
