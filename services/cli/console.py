@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
@@ -29,8 +30,11 @@ Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
 FullIds = Annotated[
     bool, typer.Option("--full-ids", "-l", help="Whole ids in the table; else their last 8 digits, which will do.")
 ]
-ID_COLUMNS = frozenset({"id", "job", "stream", "event", "item", "motion", "replaced by"})
+ID_COLUMNS = frozenset({"id", "job", "stream", "event", "item", "motion", "key", "replaced by"})
 """Columns of drawn tables that hold ids: they are short there, and never wrap."""
+TARGET_COLUMNS = frozenset({"target"})
+"""Columns that hold ids among other things: ids are short there too."""
+_WHOLE_ID = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 TIME_COLUMNS = frozenset({"created", "next", "due", "at", "last used", "expires", "revoked", "started", "finished"})
 SHORT = 8
 PAGE = 1000
@@ -233,7 +237,8 @@ def _shown(column: str, cell: str, *, full_ids: bool) -> str:
     """A cell of a drawn table."""
     if column in TIME_COLUMNS:
         return moment(cell) if cell[:1].isdigit() else cell
-    return short_id(cell) if column in ID_COLUMNS and not full_ids else cell
+    is_id = column in ID_COLUMNS | TARGET_COLUMNS and _WHOLE_ID.fullmatch(cell)  # the id of a tenant is its name
+    return short_id(cell) if is_id and not full_ids else cell
 
 
 def _cell(value: object) -> str:

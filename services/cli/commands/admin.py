@@ -74,6 +74,7 @@ def audit(
     verb: Annotated[str | None, typer.Option("--verb", help="As job.cancel; or a noun, as job.")] = None,
     days: Annotated[float | None, typer.Option("--days", min=0, help="In the last so many days.")] = None,
     limit: console.Limit = None,
+    full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
     """Show who did what, newest first: by name of the key, or of whoever ran `marey admin`."""
@@ -81,7 +82,8 @@ def audit(
     with connection() as conn:
         wanted = None if key is None else find_key(conn, tenant, key)
         found = _audited(conn, console.page_size(limit), tenant=tenant, key=wanted, verb=verb, since=since)
-        console.listing(map(_audit_row, found), AUDIT_COLUMNS, _audit_cell, as_json=as_json, limit=limit)
+        rows = map(_audit_row, found)
+        console.listing(rows, AUDIT_COLUMNS, _audit_cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 def doctor(as_json: console.Json = False) -> None:

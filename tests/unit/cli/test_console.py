@@ -112,3 +112,22 @@ def test_the_traceback_of_a_bug_is_escaped() -> None:
     assert "RuntimeError" in done.stderr
     assert r"a\x1b[2Jb" in done.stderr
     assert "\x1b" not in done.stderr
+
+
+def test_drawn_tables_shorten_ids_alone_and_fit_eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The id of a tenant is its name, the target of an audited act an id or a name."""
+    identifier = "019a1b2c-3d4e-7f00-8000-0123456789ab"
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "dumb")
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stdout", terminal)
+    console.table(["id", "queued"], [["studio-north", 3]])
+    audited = ["2026-11-24T09:50:43+00:00", "studio-north", "ann", identifier, "job.cancel", identifier, "name=day 1"]
+    columns = ["at", "tenant", "actor", "key", "verb", "target", "data"]
+    console.table(columns, [audited, [*audited[:5], "studio-north", ""]])
+    text = terminal.getvalue()
+    assert "\nstudio-north  3" in text
+    assert text.count("456789ab") == 3 and identifier not in text
+    assert max(map(len, text.splitlines())) <= 80
+    console.table(["id"], [[identifier]], full_ids=True)
+    assert identifier in terminal.getvalue()
