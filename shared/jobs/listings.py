@@ -12,7 +12,7 @@ from shared.errors import NotFound
 from shared.jobs import schema
 from shared.jobs.files import files_of
 from shared.jobs.journal import among, no_such_job
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit, read_cursor
+from shared.jobs.pages import Order, cursor_at, cut_page, mark_of, page_limit, read_cursor
 from shared.jobs.searching import fetching_by_id, find_motions
 from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
 from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionFilter, MotionRow, Page, Problem
@@ -106,11 +106,16 @@ def list_motions(
     """
     if job is not None:
         get_job(conn, tenant, job)
-    ids = find_motions(conn, tenant, found, job=job, cursor=cursor, limit=page_limit(limit) + 1)
-    with fetching_by_id(conn):
-        rows = {row.id: row for row in _motions(conn, among(schema.motion.c.id, ids))}
-    # Between the two statements another transaction may have deleted some.
-    return cut_page([rows[each] for each in ids if each in rows], limit, lambda row: mark_of(row.created, row.id))
+    while True:
+        ids = find_motions(conn, tenant, found, job=job, cursor=cursor, limit=page_limit(limit) + 1)
+        with fetching_by_id(conn):
+            rows = {row.id: row for row in _motions(conn, among(schema.motion.c.id, ids))}
+        # Between the two statements another transaction may have deleted some: that is not the end of the listing.
+        kept = tuple(rows[each] for each in ids[:limit] if each in rows)
+        if len(ids) <= limit:
+            return Page(kept, None)
+        if kept:
+            return Page(kept, cursor_at(mark_of(kept[-1].created, kept[-1].id)))
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:

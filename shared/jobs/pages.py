@@ -107,10 +107,13 @@ def page_limit(limit: int) -> int:
 def cut_page(rows: Sequence[Row], limit: int, mark: Callable[[Row], str]) -> Page[Row]:
     """The first `limit` rows of one more than asked for; the cursor is the mark of the last."""
     kept = tuple(rows[:limit])
-    if len(rows) <= limit:
-        return Page(kept, None)
-    parts = mark(kept[-1]).split(SEPARATOR)
-    return Page(kept, "".join(base64.urlsafe_b64encode(part.encode()).decode() for part in parts).rstrip("="))
+    return Page(kept, cursor_at(mark(kept[-1])) if len(rows) > limit else None)
+
+
+def cursor_at(mark: str) -> str:
+    """The cursor of the page that comes after a mark."""
+    parts = mark.split(SEPARATOR)
+    return "".join(base64.urlsafe_b64encode(part.encode()).decode() for part in parts).rstrip("=")
 
 
 def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
