@@ -98,7 +98,7 @@ def check_url(text: str, allowed: Allowed) -> str:
         url = httpx2.URL(text)
     except (httpx2.InvalidURL, ValueError) as error:
         raise _wrong(f"is no URL: {error}") from error
-    if url.scheme not in ("https", "http") or not url.host:
+    if url.scheme not in ("https", "http") or not url.host.strip(".") or "%" in url.host:
         raise _wrong("is no https URL", hint="Write it as https://studio.example/marey.")
     if url.userinfo or url.fragment:
         raise _wrong("holds a user, a password or a fragment", hint="Leave them out: messages are signed.")
@@ -117,6 +117,7 @@ def check_url(text: str, allowed: Allowed) -> str:
 
 def _literal(host: str) -> str | None:
     """The address that a host is, however it is written (`2130706433`, `0x7f.1`); None for a name."""
+    host = host.rstrip(".")  # which names the same
     if host == "localhost" or host.endswith(".localhost"):
         return "127.0.0.1"
     try:

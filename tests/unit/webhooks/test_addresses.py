@@ -53,7 +53,9 @@ def test_networks_that_are_named_may_be_told_without_tls_and_nothing_beside_them
         choose_address(["8.8.8.8"], "https", Allowed.of(["10.1.0.0/16"]))
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "2130706433", "0x7f.1", "127.1", "[::1]", "localhost"])
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "2130706433", "0x7f.1", "127.1", "[::1]", "localhost", "localhost.", "127.0.0.1."]
+)
 def test_an_address_is_seen_however_it_is_written(host: str) -> None:
     with pytest.raises(InvalidInput, match="may not be told") as refused:
         check_url(f"https://{host}/hook", DEFAULT)
@@ -67,7 +69,7 @@ def test_an_address_is_seen_however_it_is_written(host: str) -> None:
     [
         *("ftp://studio.example/", "studio.example/hook", "https://", "https:///hook", "", "https://a:99999/"),
         *("https://user:secret@studio.example/", "https://studio.example/#x", "https://a/" + "x" * 2000),
-        *("http://studio.example/", "https://[::1", "https://0177.0.0.1/", "https://a\n.example/"),
+        *("https://127.0.0.1%2f.example.com/", "http://studio.example/", "https://[::1", "https://0177.0.0.1/", "https://a\n.example/"),
     ],
 )  # fmt: skip
 def test_what_is_no_address_of_a_receiver_is_refused_at_the_door(url: str) -> None:
