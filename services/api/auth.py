@@ -9,9 +9,9 @@ from fastapi import Depends, Security
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityScopes
 from starlette.requests import HTTPConnection
 
-from services.api.context import Context, Shared
+from services.api.context import Context, Shared, no_key
 from services.api.queries import check_query
-from shared.errors import Refused, Unauthenticated
+from shared.errors import Refused
 from shared.jobs import ApiKey, authenticate, transaction
 
 METRICS = "metrics"
@@ -31,7 +31,7 @@ def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials |
 def authenticated(shared: Context, secret: str | None) -> ApiKey:
     """The key of this secret; raises as `caller`."""
     if not secret:
-        raise Unauthenticated("no API key was sent", hint="Send the header `Authorization: Bearer <key>`.")
+        raise no_key()
     with transaction(shared.engine) as conn:
         return authenticate(conn, secret)
 

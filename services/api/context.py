@@ -19,6 +19,7 @@ from services.api.rates import Rates
 from services.api.streams.hub import Hub
 from services.api.tailer import Tailer
 from services.api.texts.service import TextService
+from shared.errors import Unauthenticated
 from shared.jobs import Deadline, transaction
 from shared.metrics import EVENT_STREAMS
 from shared.settings import Settings
@@ -89,8 +90,19 @@ def deadline(kind: Deadline) -> Callable[[Route], Route]:
     return mark
 
 
+def no_key() -> Unauthenticated:
+    """The error of a request that shows no key."""
+    return Unauthenticated("no API key was sent", hint="Send the header `Authorization: Bearer <key>`.")
+
+
 def connection(shared: Shared, asked: HTTPConnection) -> Iterator[sa.Connection]:
-    """A transaction that lasts as long as the route's function, and commits before the answer is sent."""
+    """A transaction that lasts as long as the route's function, and commits before the answer is sent.
+
+    Raises:
+        Unauthenticated: no key is shown. Strangers take no connection; whether a key is valid is looked up later.
+    """
+    if not asked.headers.get("authorization"):
+        raise no_key()
     with transaction(shared.engine, getattr(asked.scope.get("endpoint"), DEADLINE, None)) as conn:
         yield conn
 
