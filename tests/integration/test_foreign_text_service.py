@@ -30,7 +30,7 @@ FOREIGN: dict[str, tuple[int, dict[str, str], bytes]] = {
     "a redirect": (302, {"Location": "http://secret-host/"}, b""),
     "packed": (200, {"Content-Type": JSON, "Content-Encoding": "gzip"}, gzip.compress(GOOD)),
     "packed wrongly": (200, {"Content-Type": JSON, "Content-Encoding": "gzip"}, GOOD[:-1]),
-    "without end": (200, {"Content-Type": JSON}, b" " * (4 * MAX_ANSWER)),
+    "without end": (200, {"Content-Type": JSON}, GOOD + b" " * (2 * MAX_ANSWER)),
 }
 
 
