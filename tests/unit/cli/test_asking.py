@@ -38,7 +38,9 @@ def test_without_a_terminal_it_is_a_wrong_use_and_y_is_named(command: tuple[str,
         [*COMMAND, *command, str(uuid4())], input=stdin, capture_output=True, timeout=120, check=False,
         cwd=REPOSITORY, env={**os.environ, **NOWHERE},
     )  # fmt: skip
-    Ran(done.returncode, done.stdout.decode(), done.stderr.decode()).refused(2, "there is none", "-y")
+    Ran(done.returncode, done.stdout.decode(), done.stderr.decode()).refused(
+        2, "There is no terminal to ask this at", "-y"
+    )
 
 
 @pytest.mark.parametrize("typed", [b"n\n", b"\n", b"\x04"], ids=["n", "enter", "end"])

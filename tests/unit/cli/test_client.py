@@ -176,3 +176,38 @@ def test_text_that_no_request_can_hold_is_refused_with_what_to_do(scripted: Scri
         with pytest.raises(InvalidInput, match=r"udc.. is no UTF-8|'\\udc..' is no UTF-8"):
             send()
     assert script.asked == []
+
+
+DEEP = "[" * 100_000
+
+
+@pytest.mark.parametrize("answer", [["no", "object"], 1, None])
+def test_an_answer_that_is_no_object_is_not_the_api_s(scripted: Scripted, answer: object) -> None:
+    client, _ = scripted((200, answer))
+    with client, pytest.raises(InvalidInput, match="the API answers JSON"):
+        client.get("/v1/jobs")
+
+
+@pytest.mark.parametrize(
+    "problems", [[{"line": 1}], [{"line": "a", "message": "b"}], ["a"], 3, [{"line": [], "message": "b"}]]
+)
+def test_problems_of_items_that_cannot_be_read_are_not_the_api_s(scripted: Scripted, problems: object) -> None:
+    client, _ = scripted((422, problem("invalid-items", problems=problems)))
+    with client, pytest.raises(InvalidInput, match="and not the API"):
+        client.submit([{"prompt": "a person walks"}])
+
+
+@pytest.mark.parametrize("status", [200, 422])
+def test_json_nested_without_end_is_not_the_api_s(scripted: Scripted, status: int) -> None:
+    client, script = scripted()
+    script.answers.append((status, DEEP.encode()))
+    with client, pytest.raises(InvalidInput, match="the API"):
+        client.get("/v1/jobs")
+
+
+def test_what_no_url_can_hold_is_a_wrong_input(scripted: Scripted) -> None:
+    client, _ = scripted()
+    with client, pytest.raises(InvalidInput, match="cannot be asked for"):
+        client.get("/v1/models/x\x1b[31m")
+    with pytest.raises(InvalidInput, match="is no address"):
+        Client(Server("http://127.0.0.1:9/\x1b[31m", "key"))

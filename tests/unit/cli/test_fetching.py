@@ -1,0 +1,71 @@
+"""Fetching from a server that names and sends what it should not."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from services.cli.client import Client
+from services.cli.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
+from services.cli.place import Server
+from shared.errors import InvalidFile
+
+ITEM: dict[str, Any] = {
+    "id": "i",
+    "index": 0,
+    "name": "a",
+    "prompt": "a person walks",
+    "seed": 1,
+    "variant": 0,
+    "model": "hgm3",
+    "bundle": "b",
+    "job": "j",
+    "tags": [],
+}
+
+
+@pytest.mark.parametrize("ending", ["x/../../evil", "../evil", "bvh\x1b[31m", "", "npz/", "NPZ\n", "n.z", "a" * 17])
+def test_a_format_that_a_server_names_leads_out_of_no_folder(tmp_path: Path, ending: str) -> None:
+    file = {"format": ending, "sha256": "0" * 64, "size": 1}
+    with pytest.raises(InvalidFile, match="file format"):
+        plan([{**ITEM, "motion": {"id": "m", "files": [file]}}], tmp_path, None)
+
+
+class Endless(BaseHTTPRequestHandler):
+    """Sends more and more, until nobody reads it."""
+
+    sent = 0
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.end_headers()
+        try:
+            for _ in range(400):
+                self.wfile.write(bytes(BLOCK))
+                type(self).sent += BLOCK
+        except OSError:
+            pass
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def endless() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Endless) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_no_more_is_read_than_the_size_that_was_told(tmp_path: Path, endless: str) -> None:
+    wanted = Download("/file", "0" * 64, 1000, tmp_path / "a.npz")
+    with Client(Server(endless, "key")) as client, pytest.raises(InvalidFile, match="another sha256"):
+        download_all(client, [wanted], overwrite=False, done=lambda _: None)
+    assert list(tmp_path.iterdir()) == []
+    assert Endless.sent < ATTEMPTS * 100 * BLOCK
