@@ -1,0 +1,42 @@
+"""Motions of the shipped bundles: the same prompt and seed give the same tokens and files, release after release."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from shared.bundles import Bundle
+from shared.settings import Settings
+
+MODELS = Path(__file__).resolve().parents[2] / "models"
+BUNDLES = ("hgm3-starter", "mogo-starter")
+PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 5, 2.0
+
+
+def processor() -> str:
+    """What decides the order in which a matrix product is added up: only equal machines give equal bits."""
+    flags = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")).split()
+    known = [flag for flag in ("avx2", "avx512f", "avx512_bf16", "amx_bf16") if flag in flags]
+    vendor = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("vendor_id"))
+    return " ".join([vendor.split()[-1], *known, f"torch {torch.__version__.partition('+')[0]}"])
+
+
+def motion(name: str) -> dict[str, Any]:
+    """Tokens of one motion, and the hash of its npz and BVH files."""
+    from services.cli.roles.oneshot import OneShot, Wanted
+    from shared.motion.bvh import format_bvh
+
+    torch.set_num_threads(1)
+    studio = OneShot(Bundle.open(MODELS / name), Settings(device="cpu", threads=1))
+    ((_, clip, _),) = studio.make([Wanted(PROMPT, SEED, SECONDS, {})])
+    return {
+        "frames": clip.frames,
+        "joints": np.round(clip.joints[:: max(clip.frames // 8, 1)], 3).tolist(),
+        "npz": hashlib.sha256(clip.to_npz()).hexdigest(),
+        "bvh": hashlib.sha256(format_bvh(clip).encode()).hexdigest(),
+        "manifest": sorted(clip.manifest),
+    }

@@ -1,0 +1,300 @@
+"""Read each surface of the product as plain JSON values, without words: help texts and descriptions may change."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import enum
+import re
+import subprocess
+import typing
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+ROOTS = ("shared", "services", "workers")
+WORDS = frozenset({"description", "summary", "title", "examples", "example"})
+
+
+def sources() -> Iterator[tuple[Path, ast.Module]]:
+    """Every module of the product."""
+    for root in ROOTS:
+        for path in sorted((REPOSITORY / root).rglob("*.py")):
+            yield path, ast.parse(path.read_text(encoding="utf-8"))
+
+
+# --- HTTP ---
+
+
+def http_api() -> Any:
+    """The OpenAPI document without its words."""
+    from services.api.app import create_app, openapi
+    from shared.settings import Settings
+
+    document = openapi(create_app(Settings()))
+    return _without_words({name: document[name] for name in ("paths", "components")})
+
+
+def _without_words(value: Any, *, names: bool = False) -> Any:
+    """Leave out texts for people; `names`: the keys of this object are names of fields, which all count."""
+    if isinstance(value, dict):
+        return {
+            key: _without_words(each, names=key in ("properties", "schemas", "paths"))
+            for key, each in sorted(value.items())
+            if names or key not in WORDS
+        }
+    return [_without_words(each) for each in value] if isinstance(value, list) else value
+
+
+def errors() -> Any:
+    """Every error type a client can meet: its problem type, HTTP status and exit code."""
+    import services.api.app  # noqa: F401  (errors of other modules are defined on import)
+    from shared import errors as tree
+
+    found: dict[str, dict[str, int]] = {}
+    open_classes: list[type[tree.MareyError]] = [tree.MareyError]
+    while open_classes:
+        cls = open_classes.pop()
+        open_classes += cls.__subclasses__()
+        if cls.__module__.partition(".")[0] != "tests":
+            found[cls.problem_type] = {"status": cls.status, "exit_code": cls.exit_code}
+    return dict(sorted(found.items()))
+
+
+# --- the command line ---
+
+
+def command_line() -> Any:
+    """Every command with its arguments and options: names, kind, whether required or repeatable, default."""
+    import typer
+
+    from services.cli.main import app
+
+    return _command(typer.main.get_command(app))
+
+
+def _command(command: Any) -> Any:
+    parameters = {
+        (parameter.name or ""): {
+            "flags": sorted([*parameter.opts, *parameter.secondary_opts]),
+            "kind": _kind(parameter.type_descriptor.annotation),
+            "required": parameter.required,
+            "many": parameter.multiple or parameter.nargs != 1,
+            "default": _default(parameter.default),
+        }
+        for parameter in command.params
+        if not getattr(parameter, "hidden", False)
+    }
+    children = getattr(command, "commands", {})
+    nested = {name: _command(each) for name, each in sorted(children.items()) if not each.hidden}
+    return {"parameters": dict(sorted(parameters.items()))} | ({"commands": nested} if nested else {})
+
+
+def _kind(annotation: Any) -> Any:
+    """Values of a choice, else the name of the type; of a list, that of its elements."""
+    inner = [each for each in typing.get_args(annotation) if each is not type(None)]
+    if inner and typing.get_origin(annotation) is not typing.Literal:
+        return _kind(inner[0])
+    if isinstance(annotation, type) and issubclass(annotation, enum.Enum):
+        return [each.value for each in annotation]
+    return list(inner) or getattr(annotation, "__name__", str(annotation))
+
+
+def _default(value: Any) -> Any:
+    plain = isinstance(value, bool | int | float | str | None)
+    return value if plain else "computed" if callable(value) else str(value)
+
+
+# --- configuration ---
+
+
+def settings() -> Any:
+    """Every environment variable with its kind and default."""
+    from shared.settings import Settings
+
+    found = {f"MAREY_{name.upper()}": _setting(field) for name, field in Settings.model_fields.items()}
+    read = re.compile(r"\"(MAREY_[A-Z0-9_]+)\"")
+    for path, _ in sources():
+        for name in read.findall(path.read_text(encoding="utf-8")):
+            found.setdefault(name, "read by hand")
+    return dict(sorted(found.items()))
+
+
+def _setting(field: Any) -> Any:
+    default = field.default if field.default_factory is None else "computed"
+    return {"default": _default(default if not isinstance(default, Path) else "computed")}
+
+
+# --- telemetry ---
+
+
+def metrics() -> Any:
+    """Every Prometheus metric: kind, labels, buckets, and which processes show it."""
+    from shared import metrics as declared
+
+    found: dict[str, Any] = {}
+    for part, registry in sorted(declared.PARTS.items()):
+        for collector in list(registry._collector_to_names):  # pyright: ignore[reportPrivateUsage]
+            name = getattr(collector, "_name", None)
+            if name is None:
+                continue
+            entry = found.setdefault(
+                name,
+                {
+                    "kind": collector._type,  # type: ignore[attr-defined]
+                    "labels": list(collector._labelnames),  # type: ignore[attr-defined]
+                    "shown_by": [],
+                },
+            )
+            if hasattr(collector, "_kwargs") and "buckets" in collector._kwargs:  # type: ignore[attr-defined]
+                entry["buckets"] = [str(b) for b in collector._kwargs["buckets"]]  # type: ignore[attr-defined]
+            entry["shown_by"].append(part)
+    return dict(sorted(found.items()))
+
+
+LEVELS = frozenset({"debug", "info", "warning", "error", "exception", "critical"})
+
+
+def log_events() -> Any:
+    """Every log event with the fields it carries, `…` where a name is computed."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for _, tree in sources():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute) or not node.args:
+                continue
+            if node.func.attr in LEVELS and isinstance(node.func.value, ast.Name) and node.func.value.id == "log":
+                fields = {keyword.arg or "…" for keyword in node.keywords} - {"exc_info"}
+                found[_pattern(node.args[0])] |= fields
+    return {event: sorted(fields) for event, fields in sorted(found.items())}
+
+
+def _pattern(node: ast.expr) -> str:
+    if isinstance(node, ast.Constant):
+        return str(node.value)
+    if isinstance(node, ast.JoinedStr):
+        return "".join(str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)
+    return "…"
+
+
+# --- queues and Redis ---
+
+
+def queue() -> Any:
+    """Names on Redis and in Celery: other releases and other processes use the same."""
+    from services.api import rates
+    from shared.jobs import EVENT_CHANNEL, TEXT_QUEUE
+    from shared.jobs.database import QUEUE_CHANNEL
+    from shared.runtime.app import DRAIN, create_app
+    from shared.streams.bell import KEY
+    from shared.streams.redis import stream_key
+
+    app = create_app("redis://127.0.0.1:6379/0")
+    return {
+        "task": DRAIN,
+        "serializer": app.conf.task_serializer,
+        "text_queue": TEXT_QUEUE,
+        "channels": sorted([QUEUE_CHANNEL, EVENT_CHANNEL]),
+        "stream_keys": [stream_key("ID", part) for part in ("frames", "lease", "fence", "control")],
+        "streams_begun": KEY,
+        "rates_prefix": rates.PREFIX,
+    }
+
+
+# --- files ---
+
+
+def files() -> Any:
+    """Keys of the files that the product writes."""
+    from services.cli.manifest import COLUMNS
+    from shared.bundles.manifest import BundleManifest, TextSpec
+    from shared.items import FIELDS
+    from shared.motion.clip import KEYS
+    from shared.streams.frames import HEADER, MAGIC, VERSION
+    from workers.evaluator.report import Report
+    from workers.training.checkpoint import TrainingState
+    from workers.training.data import manifest as prepared
+    from workers.training.parts import Part
+
+    def fields(cls: Any) -> list[str]:
+        names = cls.model_fields if hasattr(cls, "model_fields") else [field.name for field in dataclasses.fields(cls)]
+        return sorted(names)
+
+    return {
+        "npz": sorted(KEYS),
+        "item": sorted(FIELDS),
+        "manifest_csv": list(COLUMNS),
+        "bundle_manifest": {"manifest": fields(BundleManifest), "text": fields(TextSpec)},
+        "report": fields(Report),
+        "live_frame": {"magic": MAGIC.decode(), "version": VERSION, "header": HEADER.format},
+        "prepared": {
+            "format": prepared.FORMAT,
+            "files": sorted([*prepared.FILES, prepared.MANIFEST, prepared.TEXTS]),
+            "manifest": fields(prepared.Manifest),
+            "clip": fields(prepared.Clip),
+            "measured": fields(prepared.Measured),
+        },
+        "checkpoint": {"state": fields(TrainingState), "part": fields(Part)},
+    }
+
+
+def bundle_tensors() -> Any:
+    """Names, shapes and kinds of the tensors in the shipped bundles, and the configuration's keys."""
+    import json
+
+    from safetensors import safe_open
+
+    from shared.bundles import Bundle
+
+    found: dict[str, Any] = {}
+    for manifest in sorted((REPOSITORY / "models").glob("*/manifest.json")):
+        document = json.loads(manifest.read_text(encoding="utf-8"))
+        tensors: dict[str, str] = {}
+        for shard in sorted(manifest.parent.glob("*.safetensors")):
+            with safe_open(shard, "numpy") as opened:
+                for name in opened.keys():  # noqa: SIM118  (not a mapping)
+                    part = opened.get_slice(name)
+                    tensors[f"{shard.name}:{name}"] = f"{part.get_dtype()} {part.get_shape()}"
+        found[manifest.parent.name] = {
+            "reference": Bundle.open(manifest.parent, verify=False).reference,
+            "parameters": _keys(document["parameters"]),
+            "tensors": tensors,
+        }
+    return found
+
+
+def _keys(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _keys(each) for key, each in sorted(value.items())}
+    return type(value).__name__
+
+
+# --- the database ---
+
+
+def database(pg_dump: Path, url: str) -> list[str]:
+    """The schema as `pg_dump` writes it, without comments and session settings."""
+    text = subprocess.run(
+        [pg_dump, "--schema-only", "--no-owner", "--no-privileges", "--dbname", url.replace("+psycopg", "")],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    ).stdout
+    noise = re.compile(r"^(--.*|SET .*|SELECT pg_catalog\..*|\\(un)?restrict .*)?$")
+    return [line.rstrip() for line in text.splitlines() if not noise.match(line)]
+
+
+SURFACES: dict[str, Callable[[], Any]] = {
+    "http_api": http_api,
+    "errors": errors,
+    "command_line": command_line,
+    "settings": settings,
+    "metrics": metrics,
+    "log_events": log_events,
+    "queue": queue,
+    "files": files,
+    "bundle_tensors": bundle_tensors,
+}
+"""By the name of the recorded file; `database` and `events` want a server and stand apart."""
