@@ -30,10 +30,10 @@ def sources() -> Iterator[tuple[Path, ast.Module]]:
 
 def http_api() -> Any:
     """The OpenAPI document without its words."""
-    from services.api.app import create_app, openapi
+    from services.api.app import create_app
     from shared.settings import Settings
 
-    document = openapi(create_app(Settings()))
+    document = create_app(Settings()).openapi()
     return _without_words({name: document[name] for name in ("paths", "components")})
 
 

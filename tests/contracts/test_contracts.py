@@ -53,8 +53,10 @@ def test_events_and_webhooks_are_as_recorded(engine: sa.Engine) -> None:
 
 @pytest.mark.parametrize("name", BUNDLES)
 def test_a_motion_of_a_shipped_bundle_is_as_recorded(name: str) -> None:
-    """Bit for bit on the kind of processor it was recorded on; elsewhere its length and its keys (a sum in another order
-    may draw another token)."""
+    """Bit for bit on the kind of processor it was recorded on; elsewhere its length and its keys.
+
+    There a sum is added in another order, which may draw another token.
+    """
     known, found = recorded("motions")[name], motion(name)
     assert found["frames"] == known["frames"]
     assert found["manifest"] == known["manifest"]
