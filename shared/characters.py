@@ -22,7 +22,7 @@ MARKS = "\u200c\u200d\u200e\u200f"
 """ZWNJ, ZWJ, LRM and RLM are not forbidden: Persian, Hindi, Hebrew and emoji need them."""
 FORBIDDEN = re.compile(rf"[{_CLASS}\ud800-\udfff]")
 STORED = "".join(map(chr, (*range(1, 0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A))))
-"""What rows stored by earlier releases may hold, and Postgres can: all forbidden characters but NUL and surrogates."""
+"""Forbidden characters that rows of earlier releases may hold: all but NUL and surrogates, which Postgres refuses."""
 _SHOWN_RAW = re.compile(rf"(?![{LINES}])[{_CLASS}\ud800-\udfff]")
 LINE_PATTERN = rf"^[^{_CLASS}]*$"
 """Of JSON Schema, for text of one line; surrogates cannot be written there."""

@@ -109,7 +109,7 @@ def read_json(
 
 
 def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:
-    """What forbids the use of a parsed document, without recursion."""
+    """Return why a parsed document cannot be used, or None; works without recursion."""
     level = [value]
     for _ in range(max_depth):
         inner: list[Any] = []

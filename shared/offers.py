@@ -39,7 +39,7 @@ class Offer:
 
 @dataclass(frozen=True)
 class Offers:
-    """What this machine can make motions with."""
+    """List the bundles that this machine can make motions with."""
 
     found: tuple[Offer, ...]
     broken: tuple[BrokenBundle, ...]

@@ -48,7 +48,7 @@ class Context:
     large_threads: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(LARGE_THREADS))
     """In which such bodies are read and written on; the threads of other requests stay free."""
     readiness: Readiness = field(init=False)
-    """What `/readyz` says."""
+    """The cached checks of `/readyz`."""
 
     event_streams: Places = field(init=False)
     """Open streams of server-sent events."""

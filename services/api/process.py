@@ -1,4 +1,4 @@
-"""What every HTTP server process of ours does before it serves."""
+"""Set-up shared by the HTTP server processes."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class InputFormat(StrEnum):
 
 
 class ExtraColumns(StrEnum):
-    """What happens to columns of a CSV that are not known."""
+    """The treatment of unknown columns of a CSV."""
 
     REFUSE = "refuse"
     TAG = "tag"

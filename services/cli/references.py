@@ -29,7 +29,7 @@ LISTS = {
 
 @dataclass(frozen=True)
 class Reference:
-    """What a command was pointed at."""
+    """The object that a command was given."""
 
     kind: str
     id: str
@@ -50,7 +50,7 @@ def whole_id(text: str) -> str | None:
 
 
 def find(client: Client, kind: str, text: str, *, webhook: str | None = None) -> Reference:
-    """What a person means; the server is asked where it is not a whole id.
+    """Resolve a reference; the server is asked where it is not a whole id.
 
     Raises:
         NotFound: nothing.
@@ -79,7 +79,7 @@ def named(client: Client, path: str, found: Iterable[Reference]) -> Iterator[Ref
 
 
 def listed(found: Sequence[Reference]) -> str:
-    """What a question is about: each by name, or how many there are."""
+    """Describe the objects of a question: each by name, or their number."""
     return ", ".join(map(str, found)) if len(found) <= LISTED else f"{len(found)} {found[0].kind}s"
 
 
@@ -114,6 +114,6 @@ def describe(match: Mapping[str, Any]) -> str:
 
 
 def of_view(kind: str, view: Mapping[str, Any]) -> Reference:
-    """What a view of the API shows."""
+    """Describe an object by its view in the API."""
     match = {"kind": kind, "id": view["id"], "name": view.get("name"), "items": view.get("total")}
     return Reference(kind, str(view["id"]), match)

@@ -21,7 +21,7 @@ ExtraColumns = Literal["refuse", "tag", "ignore"]
 
 DELIMITERS = (",", ";", "\t")
 BLANK = " \t\r\n\ufeff\xa0"
-"""What is trimmed from cells; control characters are not, so that the check of the field refuses them."""
+"""White space trimmed from cells; control characters are not, so that the check of the field refuses them."""
 EXTRA_HINT = "Rename or remove the columns, or choose --extra-columns tag or ignore."
 
 

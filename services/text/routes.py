@@ -69,11 +69,11 @@ class GraphView(BaseModel):
     prompt: str
     """The prompt as it was checked and stored."""
     text: str
-    """What the model reads: the prompt, or the prompt rewritten."""
+    """The text that the model reads: the prompt, or the prompt rewritten."""
     rewrite_reason: str | None
     """Why `text` differs from `prompt`, or why a rewrite was not used."""
     warnings: list[str]
-    """What the author should know: no action found, or parts over the model's limits."""
+    """Notes for the author: no action found, or parts over the model's limits."""
     words: list[str]
     nodes: list[NodeView]
     edges: list[EdgeView]

@@ -42,7 +42,7 @@ class BrokenBundle:
 
 @dataclass(frozen=True)
 class Bundles:
-    """What the folders of models hold."""
+    """The content of the folders of models."""
 
     found: tuple[Bundle, ...]
     """By folder; sizes are checked, hashes are not."""

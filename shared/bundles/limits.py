@@ -11,7 +11,7 @@ from shared.errors import InvalidBundle, InvalidInput
 from shared.items import OUTPUT_FPS, SETTINGS, outside_range
 
 MAX_FRAMES = 2**53
-"""What a float counts exactly: JSON holds whole numbers that no float can."""
+"""The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from shared.documents import parse_json
 from shared.errors import InvalidBundle
 
 FORMAT = 2
-"""What new bundles are written in. Format 1, whose hash covers the files alone, is read with the same hash as ever."""
+"""The format of new bundles. Format 1, whose hash covers the files alone, is read with the same hash as ever."""
 MANIFEST_NAME = "manifest.json"
 DESCRIPTIVE = {"name", "version", "metrics", "training"}
 """Fields that only describe a bundle: format 2 hashes all others."""

@@ -34,7 +34,7 @@ Place = sa.ColumnElement[Any]
 
 @dataclass(frozen=True)
 class Order:
-    """What a listing is ordered by: a creation time, then an id."""
+    """The order of a listing: by creation time, then id."""
 
     created: sa.ColumnElement[Any]
     id: sa.ColumnElement[Any]

@@ -37,7 +37,7 @@ _PLACE = re.compile(r"(?P<job>.+):(?P<index>[0-9]{1,9})(\.(?P<variant>[0-9]{1,9}
 
 
 class ReferenceKind(StrEnum):
-    """What a reference may stand for."""
+    """Kinds of objects that a reference may name."""
 
     JOB = "job"
     MOTION = "motion"
@@ -88,7 +88,7 @@ _NOUNS = {
 def resolve_reference(
     conn: sa.Connection, tenant: str, kind: ReferenceKind, reference: str, *, webhook: UUID | None = None
 ) -> list[ReferenceMatch]:
-    """What a reference stands for in a tenant, newest first: nothing, one match, or up to `MOST` if it is ambiguous.
+    """Find the matches of a reference in a tenant, newest first: none, one, or up to `MOST` if it is ambiguous.
 
     Args:
         reference: a whole id; its last 8 to 31 digits; a name; `last` for the newest; of a motion also `JOB:INDEX` or

@@ -215,7 +215,7 @@ def _headings(strip: Strip) -> NDArray[np.floating]:
 
 
 def draw_legend(paper: Paper) -> None:
-    """What the colours mean, at the foot of a sheet."""
+    """Draw the legend of the colours at the foot of a sheet."""
     width, height = paper.image.size
     y = height - 34
     x: float = MARGIN

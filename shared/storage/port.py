@@ -14,7 +14,7 @@ from shared.errors import InvalidInput, NotFound
 CHUNK = 1 << 20
 PRESIGN_SECONDS = 900
 PUBLIC = "the asset store does not answer"
-"""What clients of the API are told when it is down: never where it is."""
+"""The message for clients of the API when the store is down, without its address."""
 KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
 
 

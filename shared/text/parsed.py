@@ -46,7 +46,7 @@ class ParsedPrompt:
 
 
 def warnings_of(graph: SemanticGraph) -> tuple[str, ...]:
-    """What the author of a prompt should know about its graph."""
+    """Return notes for the author of a prompt about its graph."""
     if not graph.level("action") and not graph.cut.actions:
         return (NO_ACTION,)
     warnings: list[str] = []

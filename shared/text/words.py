@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 EDGE_PUNCTUATION = ".,;:!?\"'()[]…"
-"""What is stripped from the ends of words and of nodes' texts."""
+"""Punctuation stripped from the ends of words and of nodes' texts."""
 IRREGULAR = {  # base: (past, participle)
     "be": ("was", "been"),
     "begin": ("began", "begun"),

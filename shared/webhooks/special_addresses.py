@@ -64,7 +64,7 @@ SPECIAL_6: dict[IPv6Network, str] = {
 
 
 def purpose_of(address: IPv4Address | IPv6Address) -> str | None:
-    """What an address is kept for; None = an address of the public internet."""
+    """Return the special purpose of an address; None for an address of the public internet."""
     if isinstance(address, IPv4Address):
         return next((purpose for block, purpose in SPECIAL_4.items() if address in block), None)
     for block, purpose in SPECIAL_6.items():

@@ -1,4 +1,4 @@
-"""What other programs see of the product, recorded: a change of it is a decision, never an accident.
+"""The surfaces that other programs see, recorded: a change of one is a decision, never an accident.
 
 `recorded/` holds one file a surface. A test compares each with what the code says today; after a wanted change
 `python -m tests.contracts` writes them again, and the difference belongs in the commit and in the change log.

@@ -18,7 +18,7 @@ PROMPT, SEED, SECONDS = "a person walks forward and waves with the right hand", 
 
 
 def processor() -> str:
-    """What decides the order in which a matrix product is added up: only equal machines give equal bits."""
+    """The features that decide the order in which a matrix product is summed: only equal machines give equal bits."""
     flags = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("flags")).split()
     known = [flag for flag in ("avx2", "avx512f", "avx512_bf16", "amx_bf16") if flag in flags]
     vendor = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("vendor_id"))

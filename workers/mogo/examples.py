@@ -37,7 +37,7 @@ LEAST = 0.9
 SEEDS = 4
 
 Act = tuple[str, str]
-"""What is done, and with which side."""
+"""An action and its side."""
 
 
 def candidates() -> list[EvaluationPrompt]:

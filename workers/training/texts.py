@@ -153,7 +153,7 @@ class CaptionTexts:
         return texts
 
     def _problem(self) -> str | None:
-        """What does not fit together; None = nothing."""
+        """Return the first inconsistency, or None."""
         captions = int(self.first[-1])
         for name, starts, size in (
             ("caption_start", self.first, captions),

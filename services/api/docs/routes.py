@@ -24,7 +24,7 @@ POLICY = "; ".join(
         "frame-ancestors 'none'",
     )
 )
-"""Nothing from elsewhere, and no code or style within the page."""
+"""Content security policy: files of this server alone, no inline code or style."""
 TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 FILES = ("swagger-ui.css", "swagger-ui-bundle.js", "docs.css", "docs.js")
 

@@ -1,4 +1,4 @@
-"""What `/readyz` says: checks that run in the background, each in a thread of its own.
+"""The checks of `/readyz`: they run in the background, each in a thread of its own.
 
 A check that hangs holds up nothing but itself: its last result grows old, and an old result counts as a failure.
 To add a check, add an entry to `CHECKS`.

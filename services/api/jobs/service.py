@@ -96,7 +96,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
     offers: dict[str | None, Offer] = {}
     failed: dict[str | None, MareyError] = {}
-    """What is not there is looked for once, however many lines name it."""
+    """Models of a body by name; a missing one is looked up once, however many lines name it."""
     default_model: set[Problem] = set()
     line = 0
 
@@ -108,7 +108,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             raise InvalidInput("there is no prompt in it", where="body", hint='Write {"prompt": "…"}, one a line.')
 
     def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
-        """What the model of an item cannot do."""
+        """List what the model of an item cannot do."""
         model = values.get("model")
         if model not in failed:
             if model not in offers and len(offers) + len(failed) == MAX_MODELS:
@@ -140,7 +140,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
 
 
 def _problem(error: MareyError, line: int | None, field: str) -> Problem:
-    """What is wrong with a field of a line; what is wrong with this server is raised."""
+    """Describe the problem with a field of a line; faults of this server are raised."""
     if error.status >= 500:
         raise error
     return Problem(line, field, f"{error.message}. {error.hint}" if error.hint else error.message)

@@ -1,4 +1,4 @@
-"""What motions need besides rows: names of their files, and for a re-roll the bundle, which must still be here."""
+"""Motions beyond their rows: names of their files, and for a re-roll the bundle, which must still be here."""
 
 from __future__ import annotations
 

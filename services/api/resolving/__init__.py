@@ -1,1 +1,1 @@
-"""What the short references of a person stand for."""
+"""Resolve short references, as a person types them, to ids."""

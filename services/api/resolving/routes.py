@@ -42,7 +42,7 @@ class MatchView(View):
 
 
 class ResolutionView(View):
-    """What a reference stands for."""
+    """The match of a reference."""
 
     matches: list[MatchView] = Field(description="Newest first. None: nothing; several: it is ambiguous. At most 10.")
 
@@ -64,6 +64,6 @@ def resolve(
     ],
     webhook: Annotated[UUID | None, Query(description="Whose delivery.")] = None,
 ) -> ResolutionView:
-    """What a reference that a person typed stands for, among what the key's tenant has."""
+    """Resolve a reference that a person typed, within the key's tenant."""
     found = jobs.resolve_reference(conn, key.tenant, ReferenceKind(kind), reference, webhook=webhook)
     return ResolutionView(matches=[MatchView.of(match) for match in found])

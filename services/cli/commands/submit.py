@@ -88,7 +88,7 @@ def submit(
 
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
-    """What is wrong with the rows, and what their models cannot do, which the server knows; nothing is submitted."""
+    """List the problems of the rows, with those that only the server can find; submit nothing."""
     from services.cli.client import Client
 
     try:

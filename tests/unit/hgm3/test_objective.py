@@ -1,4 +1,4 @@
-"""What HGM³ is trained on and how it decodes, term by term: each test fails when its term is left out."""
+"""The training objective and the decoding of HGM³, term by term: each test fails when its term is left out."""
 
 from __future__ import annotations
 

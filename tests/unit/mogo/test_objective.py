@@ -1,4 +1,4 @@
-"""What MOGO is trained on, term by term: each test fails when its term is left out."""
+"""The training objective of MOGO, term by term: each test fails when its term is left out."""
 
 from __future__ import annotations
 
