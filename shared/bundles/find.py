@@ -12,6 +12,7 @@ from typing import Literal
 
 from shared.bundles.bundle import Bundle
 from shared.bundles.manifest import MANIFEST_NAME
+from shared.characters import escape
 from shared.errors import InvalidBundle, MareyError, NotFound, Refused
 from shared.settings import Settings, settings
 
@@ -123,7 +124,8 @@ def log_broken(broken: BrokenBundle) -> None:
     key = (broken.name, str(broken.error))
     if key not in _logged and len(_logged) < MAX_LOGGED:
         _logged.add(key)
-        log.warning("the bundle %r is left out: %s: %s", broken.name, broken.error.where, broken.error.message)
+        where, message = escape(str(broken.error.where)), escape(broken.error.message)  # names of files are any bytes
+        log.warning("the bundle %r is left out: %s: %s", broken.name, where, message)
 
 
 def _bundle_folders(folder: Path) -> list[Path]:

@@ -148,13 +148,14 @@ def test_a_broken_bundle_is_told_and_hides_no_other(
     assert choose_bundle("hgm3", config=config).manifest.name == GOOD
 
 
-def test_a_folder_whose_name_is_no_unicode_can_be_told(config: Settings) -> None:
+def test_a_folder_whose_name_is_no_unicode_can_be_told(config: Settings, caplog: pytest.LogCaptureFixture) -> None:
     name = os.fsdecode(b"b-\xff")
     (config.models / BAD).rename(config.models / name)
     (config.models / name / "manifest.json").write_bytes(b"{}")
     (broken,) = offers(config).broken
     assert broken.name == "b-\\udcff"
     assert b"b-" in ModelsView.of(offers(config)).model_dump_json().encode()
+    assert "b-\\udcff" in caplog.text.encode().decode()
 
 
 def test_a_reason_is_logged_once(config: Settings, caplog: pytest.LogCaptureFixture) -> None:
