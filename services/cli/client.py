@@ -308,15 +308,15 @@ def _json(response: httpx2.Response) -> Any:
     """Return what a successful answer holds.
 
     Raises:
-        InvalidInput: it is no JSON object, so not the API's.
+        InvalidInput: it is no JSON object or array, so not the API's.
     """
     try:
         found = response.json()
     except NOT_OURS:
         found = None
-    if not isinstance(found, dict):
+    if not isinstance(found, dict | list):
         raise _foreign(response)
-    return cast("dict[str, Any]", found)
+    return cast("Any", found)
 
 
 def _expected(response: httpx2.Response) -> httpx2.Response:

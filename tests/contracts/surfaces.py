@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import enum
+import importlib
 import re
 import subprocess
 import typing
@@ -15,6 +16,11 @@ from typing import Any
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
+DEFINE_ERRORS = (
+    *("services.cli.text_files", "shared.items", "shared.jobs.errors", "shared.runtime.embedded.server"),
+    *("shared.runtime.faults", "shared.streams.redis", "shared.text.rewriters"),
+)
+"""Modules that add to the tree of errors."""
 WORDS = frozenset({"description", "summary", "title", "examples", "example"})
 
 
@@ -49,10 +55,11 @@ def _without_words(value: Any, *, names: bool = False) -> Any:
 
 
 def errors() -> Any:
-    """Every error type a client can meet: its problem type, HTTP status and exit code."""
-    import services.api.app  # noqa: F401  (errors of other modules are defined on import)
+    """Every error type of the product: its problem type, HTTP status and exit code."""
     from shared import errors as tree
 
+    for module in DEFINE_ERRORS:
+        importlib.import_module(module)
     found: dict[str, dict[str, int]] = {}
     open_classes: list[type[tree.MareyError]] = [tree.MareyError]
     while open_classes:
