@@ -10,6 +10,8 @@ from importlib import resources
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
+from services.api.pages import page_response
+
 router = APIRouter()
 
 POLICY = "; ".join(
@@ -44,17 +46,7 @@ def _file(name: str) -> _File:
 
 def _answer(request: Request, name: str) -> Response:
     file = _file(name)
-    headers = {
-        "Cache-Control": "no-cache",
-        "Content-Security-Policy": POLICY,
-        "ETag": file.etag,
-        "Referrer-Policy": "no-referrer",
-        "X-Content-Type-Options": "nosniff",
-        "X-Frame-Options": "DENY",
-    }
-    if request.headers.get("if-none-match") == file.etag:
-        return Response(status_code=304, headers=headers)
-    return Response(file.content, headers=headers, media_type=file.media_type)
+    return page_response(request, file.content, file.media_type, etag=file.etag, policy=POLICY)
 
 
 @router.get("/docs", include_in_schema=False)

@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from services.api.catalogue import Catalogue
+from services.api.pages import page_response
 from services.api.streams.schemas import MODEL
 from shared.errors import MareyError
 from shared.motion.live_page import live_page
@@ -40,14 +41,5 @@ def examples(catalogue: Catalogue) -> tuple[str, ...]:
 def live(request: Request) -> Response:
     """The page itself holds nothing that is anybody's: it asks for a key, and the API asks for that."""
     page = live_page(examples(request.app.state.catalogue))
-    headers = {
-        "Cache-Control": "no-cache",
-        "Content-Security-Policy": page.policy(request.headers.get("host", "")),
-        "ETag": page.etag,
-        "Referrer-Policy": "no-referrer",
-        "X-Content-Type-Options": "nosniff",
-        "X-Frame-Options": "DENY",
-    }
-    if request.headers.get("if-none-match") == page.etag:
-        return Response(status_code=304, headers=headers)
-    return Response(page.content, headers=headers, media_type="text/html")
+    policy = page.policy(request.headers.get("host", ""))
+    return page_response(request, page.content, "text/html", etag=page.etag, policy=policy)
