@@ -36,7 +36,7 @@ def wait_for(what: Callable[[], object], seconds: float = 60) -> None:
 
 
 def open_to_others(home: Path) -> list[str]:
-    """What of a home another user could read, if its folder let him in."""
+    """List the files of a home that another user could read if its folder were open."""
     paths = [home, *(path for path in home.rglob("*") if not path.is_socket())]
     return [str(path) for path in paths if path.lstat().st_mode & 0o077]
 

@@ -1,4 +1,4 @@
-"""What is not an answer of the text service is passed on to nobody, and never read to its end."""
+"""Answers that are not the text service's are never passed on, and never read to their end."""
 
 from __future__ import annotations
 

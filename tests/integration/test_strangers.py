@@ -1,4 +1,4 @@
-"""Who shows no key takes no connection to the database: it is told so even while the database is away."""
+"""A request without a key opens no database connection: it gets 401 even while the database is away."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a client does with a server that it reaches through a proxy."""
+"""The behaviour of a client that reaches its server through a proxy."""
 
 from __future__ import annotations
 

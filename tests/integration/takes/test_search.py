@@ -74,7 +74,7 @@ def pages(conn: sa.Connection, found: MotionFilter, job: UUID | None, limit: int
 
 
 def fits(conn: sa.Connection, row: MotionRow, found: MotionFilter) -> bool:
-    """What the filter means, said a second time."""
+    """The meaning of the filter, written a second time in plain Python."""
     if found.text is not None:
         query = "SELECT to_tsvector('english', :prompt) @@ websearch_to_tsquery('english', :text)"
         if not conn.execute(sa.text(query), {"prompt": row.prompt, "text": found.text}).scalar_one():

@@ -73,7 +73,7 @@ def test_another_tenants_job_is_not_there(api: LiveApi, job: str) -> None:
 
 
 def drawn(api: LiveApi, *arguments: str) -> str:
-    """What a command draws on a terminal of 80 columns."""
+    """Return the output of a command on a terminal of 80 columns."""
     master, slave = pty.openpty()
     environment = {**os.environ, "COLUMNS": "80", "TERM": "xterm", "MAREY_SERVER": api.url, "MAREY_KEY": api.key}
     command = [sys.executable, "-m", "services.cli", *arguments]
