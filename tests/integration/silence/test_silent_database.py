@@ -33,21 +33,6 @@ SLACK = 5.0
 
 
 @pytest.fixture
-def proxy(database_url: str) -> Iterator[StallingProxy]:
-    """A proxy in front of this test's database."""
-    query = sa.make_url(database_url).query
-    with StallingProxy(f"{query['host']}/.s.PGSQL.5432") as proxy:
-        yield proxy
-
-
-@pytest.fixture
-def proxied(database_url: str, proxy: StallingProxy) -> str:
-    """The address of this test's database through the proxy."""
-    url = sa.make_url(database_url).set(host="127.0.0.1", port=proxy.port, query={})
-    return url.render_as_string(hide_password=False)
-
-
-@pytest.fixture
 def behind(proxied: str) -> Iterator[sa.Engine]:
     """An engine behind the proxy, with a short deadline."""
     engine = create_engine(proxied, deadline=QUICK)

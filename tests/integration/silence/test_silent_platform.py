@@ -26,18 +26,6 @@ ITEMS = 32 * 12
 
 
 @pytest.fixture
-def proxy(database_url: str) -> Iterator[StallingProxy]:
-    with StallingProxy(f"{sa.make_url(database_url).query['host']}/.s.PGSQL.5432") as proxy:
-        yield proxy
-
-
-@pytest.fixture
-def proxied(database_url: str, proxy: StallingProxy) -> str:
-    url = sa.make_url(database_url).set(host="127.0.0.1", port=proxy.port, query={})
-    return url.render_as_string(hide_password=False)
-
-
-@pytest.fixture
 def silenced(proxied: str, database_url: str, valkey: EmbeddedServer, tmp_path: Path) -> Iterator[LiveApi]:
     """An API behind the proxy; its `engine` is a direct one."""
     with running_api(settings_of(tmp_path, proxied, valkey.url), database_url) as api:
