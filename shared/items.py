@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from shared.characters import check_text, is_printable
 from shared.errors import InvalidInput, TooLarge
-from shared.text.prompts import check_prompt
+from shared.prompts import check_prompt
 
 T = TypeVar("T")
 

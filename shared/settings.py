@@ -28,6 +28,7 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from shared.addresses import Allowed
 from shared.errors import InvalidInput
 from shared.origins import check_origins
 from shared.rates import check_rates
@@ -280,8 +281,6 @@ class Settings(BaseSettings):
     @field_validator("webhook_allow")
     @classmethod
     def _known_networks(cls, values: list[str]) -> list[str]:
-        from shared.webhooks.addresses import Allowed  # with an HTTP client, which few processes need
-
         try:
             Allowed.of(values)
         except InvalidInput as error:

@@ -8,20 +8,18 @@ from collections.abc import AsyncIterator, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import APIRoute
 
-from services.api import problems
-from services.api.bodies import BodyGuard, Patience
 from services.api.catalogue import Catalogue
-from services.api.connections import connection_options
 from services.api.context import CONNECTIONS, Context
 from services.api.docs.routes import router as docs_router
 from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
 from services.api.evaluations.routes import router as evaluations_router
-from services.api.guards import HostGuard, UpgradeGuard
+from services.api.health.checks import readiness_checks
 from services.api.health.metrics import Measure
 from services.api.health.routes import router as health_router
 from services.api.home.routes import router as home_router
@@ -31,27 +29,33 @@ from services.api.jobs.routes import router as jobs_router
 from services.api.live.routes import router as live_router
 from services.api.models.routes import router as models_router
 from services.api.motions.routes import router as motions_router
-from services.api.origins import OriginGuard
-from services.api.process import prepare_process
-from services.api.queries import known_query
 from services.api.rates import Rates
+from services.api.readiness import Readiness
 from services.api.reference import build_reference
 from services.api.resolving.routes import router as references_router
 from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from services.api.schedules.routes import router as schedules_router
-from services.api.streams.hub import Hub
+from services.api.stream_hub import Hub
+from services.api.streams.protocol import socket_options
 from services.api.streams.routes import router as streams_router
 from services.api.tailer import Tailer
+from services.api.text_client import TextService
 from services.api.texts.routes import router as texts_router
-from services.api.texts.service import TextService
-from services.api.traces import Trace
 from services.api.webhooks.routes import router as webhooks_router
+from services.http import problems
+from services.http.bodies import BodyGuard, Patience
+from services.http.connections import connection_options
+from services.http.guards import HostGuard, UpgradeGuard
+from services.http.origins import OriginGuard
+from services.http.process import prepare_process
+from services.http.queries import known_query
+from services.http.traces import Trace
+from shared.addresses import Allowed
 from shared.errors import InvalidInput
 from shared.jobs import check_listening, create_engine
 from shared.runtime.systemd import notified
 from shared.settings import Settings, settings
 from shared.storage import open_store
-from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
 ROUTERS = (
@@ -110,15 +114,17 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     if redis_url is not None:
         hub = Hub(redis_url.get_secret_value(), tenant=config.sockets_per_tenant, key=config.sockets_per_key)
     texts = TextService(config)
-    shared = Context(config, engine, open_store(config), app.state.catalogue, tailer, Rates(config), texts, hub)
+    store = open_store(config)
+    readiness = Readiness(readiness_checks(config, engine, store))
+    shared = Context(config, engine, store, app.state.catalogue, tailer, Rates(config), texts, readiness, hub)
     app.state.context = shared
     tailer.start()
-    shared.readiness.start()
+    readiness.start()
     try:
         async with notified():
             yield
     finally:
-        shared.readiness.stop()
+        readiness.stop()
         tailer.stop()
         await texts.close()
         app.state.context.rates.close()
@@ -137,6 +143,11 @@ def write_openapi(path: Path) -> None:
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+def protocol_options(config: Settings) -> dict[str, Any]:
+    """Return the arguments of uvicorn for HTTP connections and WebSockets."""
+    return connection_options(config) | socket_options()
+
+
 def serve() -> None:
     """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where.
 
@@ -147,4 +158,4 @@ def serve() -> None:
     options = prepare_process("api", config)
     if config.notifications_url is not None:
         check_listening(config.notifications_url)
-    uvicorn.run(create_app(config), host=config.host, port=config.port, **options, **connection_options(config))
+    uvicorn.run(create_app(config), host=config.host, port=config.port, **options, **protocol_options(config))

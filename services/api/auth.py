@@ -10,7 +10,7 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityS
 from starlette.requests import HTTPConnection
 
 from services.api.context import Context, Shared, no_key
-from services.api.queries import check_query
+from services.http.queries import check_query
 from shared.errors import Refused
 from shared.jobs import ApiKey, authenticate, transaction
 

@@ -11,21 +11,22 @@ from anyio import CapacityLimiter
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from services.api.body_room import BodyRoom
 from services.api.catalogue import Catalogue
-from services.api.health.readiness import Readiness
-from services.api.places import Places, Shares
 from services.api.rates import Rates
-from services.api.streams.hub import Hub
+from services.api.readiness import Readiness
+from services.api.stream_hub import Hub
 from services.api.tailer import Tailer
-from services.api.texts.service import TextService
+from services.api.text_client import TextService
+from services.http.body_room import BodyRoom
+from services.http.places import Places, Shares
 from shared.errors import Unauthenticated
 from shared.jobs import Deadline, transaction
 from shared.metrics import EVENT_STREAMS
 from shared.settings import Settings
 from shared.storage import AssetStore
 
-LARGE_THREADS = 2
+LARGE_THREADS = 1
+"""Two would take turns with each other instead of with the requests beside them: the interpreter is one."""
 
 
 @dataclass
@@ -39,22 +40,18 @@ class Context:
     tailer: Tailer
     rates: Rates
     texts: TextService
+    readiness: Readiness
+    """The cached checks of `/readyz`."""
     streams: Hub | None = None
     """None where no Redis is named."""
-    seen_ready: bool = False
-    """A worker has had its model loaded: from then on `/readyz` no longer asks for one."""
     body_room: BodyRoom = field(default_factory=BodyRoom)
     """For bodies too long for memory."""
     large_threads: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(LARGE_THREADS))
     """In which such bodies are read and written on; the threads of other requests stay free."""
-    readiness: Readiness = field(init=False)
-    """The cached checks of `/readyz`."""
-
     event_streams: Places = field(init=False)
     """Open streams of server-sent events."""
 
     def __post_init__(self) -> None:
-        self.readiness = Readiness(self)
         config = self.config
         shares = Shares(config.event_streams, config.event_streams_per_tenant, config.event_streams_per_key)
         self.event_streams = Places("event streams", shares, EVENT_STREAMS)

@@ -12,8 +12,8 @@ from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
 from services.api.context import Context
-from services.api.ranges import ByteRange, parse_range
-from services.api.schemas import View
+from services.http.ranges import ByteRange, parse_range
+from services.http.schemas import View
 from shared.disposition import attachment, download_name
 from shared.jobs import asset_key
 from shared.storage import CHUNK, PRESIGN_SECONDS, AssetStore, Opened

@@ -6,12 +6,11 @@ import contextlib
 import importlib.util
 import os
 import platform
-import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
+from services.cli.findings import Check, broken, free_space
 from shared.errors import MareyError
 from shared.private_home import FOLDER_MODE, is_open
 
@@ -20,22 +19,8 @@ if TYPE_CHECKING:
     from shared.bundles import Bundle
     from shared.settings import Settings
 
-SMALLEST_FREE, LITTLE_FREE = 2 * 2**30, 10 * 2**30
-"""Bytes: Postgres stops at a full disk, and 1,000 motions take 200 MB."""
 ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
 """Deadlines of a server's answers: a listing takes milliseconds, and a missed deadline of the database 5 s."""
-State = Literal["ok", "warn", "bad"]
-
-
-@dataclass(frozen=True)
-class Check:
-    """One finding. `warn` works, or is not needed for all that this machine could do; `bad` has to be mended."""
-
-    name: str
-    state: State
-    message: str
-    hint: str | None = None
-    """What to do; None where nothing is to be done."""
 
 
 def check_all() -> Iterator[Check]:
@@ -67,11 +52,6 @@ def check_all() -> Iterator[Check]:
             yield from device(settings())
 
 
-def broken(name: str, error: MareyError) -> Check:
-    """A check that ended with an expected error."""
-    return Check(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
-
-
 def _installed(package: str) -> bool:
     return importlib.util.find_spec(package) is not None
 
@@ -98,14 +78,6 @@ def _home() -> Check:
         hint = f"Run `chmod 700 {folder}`; `marey serve` closes it, with what is in it, when it starts."
         return Check("home", "warn", f"{folder} is open to other users", hint)
     return free_space("home", folder)
-
-
-def free_space(name: str, folder: os.PathLike[str]) -> Check:
-    """How full the disk of a folder is."""
-    free = shutil.disk_usage(folder).free
-    state = "bad" if free < SMALLEST_FREE else "warn" if free < LITTLE_FREE else "ok"
-    hint = None if state == "ok" else "Make room: `marey admin gc` removes what nothing refers to."
-    return Check(name, state, f"{os.fspath(folder)}, {free / 2**30:.1f} GiB free", hint)
 
 
 def _server() -> Check:

@@ -8,8 +8,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.cli.checkup import Check, broken, free_space
 from services.cli.database import engine_of, settings_here
+from services.cli.findings import Check, broken, free_space
 from services.cli.place import read_server
 from services.cli.ports import try_port
 from shared.errors import MareyError, Unreachable

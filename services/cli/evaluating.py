@@ -29,6 +29,7 @@ TEST = "test"
 SPLITS = (TEST, "compositional", "test+compositional")
 ANEW = 20
 """Repeats that a report's intervals are over: with as many motions of a prompt, each of them generates anew."""
+RUN_COLUMNS = ("id", "name", "state", "regressed", "bundle", "source", "created")
 COMPARISON = ("metric", "before", "after", "change", "95 % interval", "verdict")
 POLL = 1.0
 """Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
@@ -288,3 +289,18 @@ def _sleep(deadline: float | None, evaluation: str) -> None:
 
 def _wait_hint(evaluation: str) -> str:
     return f"`marey eval wait {evaluation}` waits again; `marey eval cancel {evaluation}` ends it."
+
+
+def show_runs(path: str, limit: int | None, as_json: bool, *, full_ids: bool = False, **params: Any) -> None:
+    """The runs of a listing, newest first."""
+    from services.cli.client import Client
+
+    with Client.here() as client:
+        found = client.pages(path, limit=console.page_size(limit), **params)
+        console.listing(found, RUN_COLUMNS, _run_cell, as_json=as_json, limit=limit, full_ids=full_ids)
+
+
+def _run_cell(run: dict[str, Any], column: str) -> object:
+    if column == "regressed":
+        return {True: "regressed", False: "no", None: None}[run[column]]
+    return run["request"][column] if column in ("bundle", "source") else run[column]

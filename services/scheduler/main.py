@@ -20,6 +20,7 @@ from services.scheduler.sending import Sender
 from services.scheduler.servers import CHECK_SECONDS, server_check
 from services.scheduler.webhooks import Deliverer
 from shared import metrics
+from shared.addresses import Allowed
 from shared.errors import InvalidInput, Unreachable
 from shared.jobs import (
     KEPT,
@@ -49,7 +50,6 @@ from shared.runtime.status import Teller
 from shared.settings import Settings
 from shared.storage import open_store
 from shared.tls import trusting_context
-from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault
 
 log = logger(__name__)

@@ -11,15 +11,15 @@ from anyio import CapacityLimiter, to_thread
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.fields import PROMPT
-from services.api.problems import RESPONSES
+from services.http.fields import PROMPT
+from services.http.problems import RESPONSES
 from services.text.limits import Ticket, WordLimit
 from shared.bundles import TextSpec, choose_bundle, named_by
 from shared.errors import InvalidInput, Unauthenticated, Unreachable
 from shared.items import MODEL
+from shared.prompts import check_prompt
 from shared.settings import Settings
 from shared.text.keys import as_served
-from shared.text.prompts import check_prompt
 
 if TYPE_CHECKING:
     from shared.text.pipeline import TextPipeline

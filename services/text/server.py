@@ -18,11 +18,11 @@ from fastapi import FastAPI
 from fastapi.responses import PlainTextResponse
 from starlette.responses import Response
 
-from services.api import problems
-from services.api.bodies import BodyGuard, Patience
-from services.api.connections import connection_options
-from services.api.process import prepare_process
-from services.api.traces import Trace
+from services.http import problems
+from services.http.bodies import BodyGuard, Patience
+from services.http.connections import connection_options
+from services.http.process import prepare_process
+from services.http.traces import Trace
 from services.text.routes import load_pipeline, text_router
 from shared.bundles import list_bundles
 from shared.errors import InvalidInput, MareyError
@@ -83,10 +83,10 @@ def serve_text(path: Path | None = None) -> None:
     torch.set_num_threads(1)
     options = prepare_process("text", config)
     if path is None:
-        uvicorn.run(app, host=config.host, port=config.port, **options, **connection_options(config))
+        uvicorn.run(app, host=config.host, port=config.port, ws="none", **options, **connection_options(config))
         return
     with _unix_socket(path) as listening:
-        uvicorn.Server(uvicorn.Config(app, **options, **connection_options(config))).run(sockets=[listening])
+        uvicorn.Server(uvicorn.Config(app, ws="none", **options, **connection_options(config))).run(sockets=[listening])
 
 
 @contextlib.contextmanager

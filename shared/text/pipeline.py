@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
+from shared.prompts import check_prompt
 from shared.text.acts import acts_of
-from shared.text.encoders import Encoding, TextEncoder, load_encoder
+from shared.text.encoders import Encoding, TextEncoder
 from shared.text.features import TextFeatures
 from shared.text.graph import Node, SemanticGraph, build_graph
 from shared.text.guard import changed_meaning
 from shared.text.keys import NO_LABELLER, feature_key
-from shared.text.labellers import OneAtATime, load_labeller
+from shared.text.labellers import OneAtATime
+from shared.text.loading import load_encoder, load_labeller, load_rewriter
 from shared.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from shared.text.prompts import check_prompt
-from shared.text.rewriters import NotRewritten, PromptRewriter, load_rewriter
+from shared.text.rewriters import NotRewritten, PromptRewriter
 from shared.text.roles import RoleLabeller
 from shared.text.telling import told_in_order
 from shared.text.words import EDGE_PUNCTUATION

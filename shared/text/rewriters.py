@@ -7,8 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from shared.errors import InvalidBundle, MareyError
-from shared.settings import settings
+from shared.errors import MareyError
 from shared.text.roles import Frame, RoleLabeller
 from shared.text.words import SINGULAR, UNITS, bare, inflected, is_past, lemma
 
@@ -149,23 +148,3 @@ def expand_units(words: Sequence[str]) -> list[str]:
 def _unit(number: str, short: str) -> str:
     unit = UNITS[short.lower()]
     return SINGULAR[unit] if number == "1" else unit
-
-
-def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
-    """The rewriter of that name.
-
-    Raises:
-        InvalidBundle: there is none.
-        InvalidInput: `openai` without its settings.
-    """
-    if name == "none":
-        return NoRewriter()
-    if name == "rules":
-        from shared.text.spelling import Speller
-
-        return RulesRewriter(labeller, Speller.load())
-    if name == "openai":
-        from shared.text.openai_rewriter import Endpoint, OpenAIRewriter
-
-        return OpenAIRewriter(Endpoint.of(settings()))
-    raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules, openai.")

@@ -12,9 +12,9 @@ import pytest
 from fastapi import FastAPI
 
 from services.api.app import create_app
-from services.api.body_room import BodyRoom
 from services.cli.client import Client
 from services.cli.place import Server
+from services.http.body_room import BodyRoom
 from shared.jobs import create_engine, create_key, transaction
 from shared.runtime.embedded import EmbeddedServer
 from shared.spool import IN_MEMORY

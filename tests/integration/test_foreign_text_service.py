@@ -11,8 +11,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from pydantic import SecretStr
 
-from services.api.problems import problem_response
-from services.api.texts.service import MAX_ANSWER, TextService
+from services.api.text_client import MAX_ANSWER, TextService
+from services.http.problems import problem_response
 from services.text.routes import ParseBody
 from shared.errors import Unreachable
 from shared.settings import Settings

@@ -12,15 +12,13 @@ from pydantic import SecretStr
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
-from services.api.health import readiness
-from services.api.health.readiness import Check, Readiness
+from services.api import readiness
+from services.api.readiness import Check, Readiness
 from shared.errors import Unreachable
 from shared.runtime.embedded import EmbeddedServer
 from shared.settings import Settings
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of, wait_until
-
-SHARED = None
 
 
 @pytest.fixture
@@ -32,11 +30,11 @@ def hanging() -> Iterator[threading.Event]:
 
 
 def of(**checks: Check) -> Readiness:
-    return Readiness(SHARED, checks, interval=0.02)  # pyright: ignore[reportArgumentType]
+    return Readiness(checks, interval=0.02)
 
 
 def test_nothing_is_ready_before_its_first_round(hanging: threading.Event) -> None:
-    found = of(slow=Check(lambda _: hanging.wait(30), "slow"), fast=Check(lambda _: None, "fast"))
+    found = of(slow=Check(lambda: hanging.wait(30), "slow"), fast=Check(lambda: None, "fast"))
     assert not any(result.ok for result in found.results().values())
     found.start()
     wait_until(lambda: found.results()["fast"].ok)
@@ -52,8 +50,8 @@ def test_a_check_that_hangs_becomes_a_failure_and_holds_up_no_other(
     monkeypatch.setattr(readiness, "STALE_SECONDS", 0.3)
     hangs = threading.Event()
     found = of(
-        odd=Check(lambda _: hanging.wait(30) if hangs.is_set() else None, "odd is down"),
-        even=Check(lambda _: None, "even is down"),
+        odd=Check(lambda: hanging.wait(30) if hangs.is_set() else None, "odd is down"),
+        even=Check(lambda: None, "even is down"),
     )
     found.start()
     wait_until(lambda: all(result.ok for result in found.results().values()))
@@ -69,7 +67,7 @@ def test_a_check_that_hangs_becomes_a_failure_and_holds_up_no_other(
 def test_a_check_with_a_bug_fails_and_goes_on() -> None:
     rounds: list[None] = []
 
-    def buggy(_: object) -> None:
+    def buggy() -> None:
         rounds.append(None)
         raise ZeroDivisionError
 

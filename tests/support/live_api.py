@@ -19,8 +19,7 @@ import uvicorn
 from fastapi import FastAPI
 from pydantic import SecretStr
 
-from services.api.app import create_app
-from services.api.connections import connection_options
+from services.api.app import create_app, protocol_options
 from services.cli.client import Client
 from services.cli.place import Server
 from services.text.server import create_text_app
@@ -161,7 +160,7 @@ class ApiThread:
                 port=config.port,
                 log_level="warning",
                 timeout_graceful_shutdown=1,
-                **connection_options(config),
+                **protocol_options(config),
             )
         )
         self._thread = threading.Thread(target=self._server.run, daemon=True)

@@ -13,8 +13,9 @@ from torch import Tensor
 
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
-from shared.text.encoders import TextEncoder, load_encoder
+from shared.text.encoders import TextEncoder
 from shared.text.keys import NO_LABELLER
+from shared.text.loading import load_encoder
 from shared.text.pipeline import refuse_mismatch
 
 

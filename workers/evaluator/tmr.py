@@ -11,8 +11,8 @@ from torch import Tensor
 from shared.bundles import Bundle
 from shared.errors import InvalidBundle
 from shared.nn.devices import choose_device
+from shared.prompts import check_prompt
 from shared.text.encoders import TextEncoder
-from shared.text.prompts import check_prompt
 from workers.evaluator.bundle import load_networks
 from workers.evaluator.config import EvaluatorConfig
 from workers.evaluator.metrics.retrieval import Distance

@@ -1,4 +1,4 @@
-"""Does a bundle of HGM³ do what the prompts say? See `workers.training.checks.obedience`."""
+"""Does a bundle of HGM³ do what the prompts say? See `workers.training.obedience`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from shared.errors import MareyError
 from workers.hgm3.generate import Generator
-from workers.training.checks.obedience import parser_of, publish, report_of
+from workers.training.obedience import parser_of, publish, report_of
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

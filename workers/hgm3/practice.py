@@ -25,11 +25,11 @@ from workers.generating.export import finish
 from workers.generating.port import Request
 from workers.hgm3.generate import Generator
 from workers.training.checks.judge import Expectation, judge
-from workers.training.checks.obedience import pipeline_of
 from workers.training.checks.rates import expectations
 from workers.training.data.manifest import Clip
 from workers.training.data.prepared import PreparedData
 from workers.training.drawn import Drawn
+from workers.training.obedience import pipeline_of
 
 ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
 """Shares of the captions by how many acts they ask for."""

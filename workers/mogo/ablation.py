@@ -34,8 +34,8 @@ from workers.mogo.model import RQHCTransformer
 from workers.mogo.train import train_stage, transformer_stage
 from workers.training.ablation import judge, table
 from workers.training.budget import Budget
-from workers.training.checks.obedience import pipeline_of
 from workers.training.checks.prompts import evaluation_prompts
+from workers.training.obedience import pipeline_of
 from workers.training.staging import TrainOptions, finish, use_threads
 
 

@@ -24,8 +24,8 @@ from shared.text.features import TextFeatures
 from workers.mogo.generate import Generator
 from workers.mogo.live import LiveRoom
 from workers.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
-from workers.training.checks.obedience import pipeline_of
 from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from workers.training.obedience import pipeline_of
 
 OUTPUT = Path(__file__).parents[2] / "services" / "api" / "live" / "examples.json"
 SETS = ("evaluation", "development")

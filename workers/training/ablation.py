@@ -8,9 +8,9 @@ from statistics import mean, stdev
 
 from shared.text.features import TextFeatures
 from workers.generating.port import Generator, S
-from workers.training.checks.obedience import measure
 from workers.training.checks.prompts import evaluation_prompts
 from workers.training.checks.rates import mean_quality
+from workers.training.obedience import measure
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from workers.training.labeller import Validation
+    from workers.training.labeller_recipe import Validation
 
 TEXT = """# srl-light: semantic roles of motion captions
 

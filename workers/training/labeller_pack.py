@@ -15,7 +15,7 @@ from workers.training.labeller_card import card
 from workers.training.labeller_fit import PROPBANK_FIT
 
 if TYPE_CHECKING:
-    from workers.training.labeller import Recipe, Validation
+    from workers.training.labeller_recipe import Recipe, Validation
     from workers.training.labeller_weights import Weights
 
 CAPTIONS = DataSource(

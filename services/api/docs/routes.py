@@ -10,7 +10,7 @@ from importlib import resources
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
-from services.api.pages import page_response
+from services.http.pages import page_response
 
 router = APIRouter()
 

@@ -8,7 +8,7 @@ from uuid import UUID
 from pydantic import Field
 
 from services.api.context import Context
-from services.api.schemas import View
+from services.http.schemas import View
 from shared import jobs
 from shared.errors import NotFound
 from shared.measures.comparing import MetricChange, compare

@@ -9,14 +9,14 @@ from fastapi import APIRouter, Query, Request, Response
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import kept_body
 from services.api.context import Connection, Shared, deadline
 from services.api.evaluations import service
 from services.api.evaluations.comparison import ComparisonView, compare_runs
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
 from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
+from services.http.bodies import kept_body
+from services.http.problems import RESPONSES
+from services.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs
 from shared.errors import NotFound
 

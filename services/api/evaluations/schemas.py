@@ -9,9 +9,9 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.fields import EXPECTED, PROMPT, SAMPLING
 from services.api.files import FileView
-from services.api.schemas import MAX_NAME, Comment, FreeText, Name, View
+from services.http.fields import EXPECTED, PROMPT, SAMPLING
+from services.http.schemas import MAX_NAME, Comment, FreeText, Name, View
 from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
 from shared.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
 from shared.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState

@@ -9,7 +9,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from services.api.auth import Watcher
 from services.api.context import Shared
 from services.api.health.metrics import render
-from services.api.schemas import View
+from services.http.schemas import View
 
 router = APIRouter(tags=["health"])
 

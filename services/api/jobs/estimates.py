@@ -6,7 +6,7 @@ from datetime import datetime
 
 from pydantic import Field
 
-from services.api.schemas import View
+from services.http.schemas import View
 from shared.jobs import Estimate, JobState, QueuePlace, Speed
 
 

@@ -11,9 +11,9 @@ from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from starlette.types import Receive, Scope, Send
 
 from services.api.jobs.schemas import EventView
-from services.api.places import Places
-from services.api.problems import problem_response
 from services.api.tailer import Tailer
+from services.http.places import Places
+from services.http.problems import problem_response
 from shared.errors import Busy, InvalidInput
 from shared.jobs import ApiKey, EventRow
 

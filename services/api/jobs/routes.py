@@ -8,10 +8,8 @@ from uuid import UUID
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from services.api import schemas
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import kept_body
 from services.api.context import Connection, Context, Shared, deadline
 from services.api.jobs import service
 from services.api.jobs.estimates import EstimateView, QueueView
@@ -30,8 +28,10 @@ from services.api.jobs.schemas import (
 )
 from services.api.motions.routes import Found
 from services.api.motions.schemas import MotionView
-from services.api.problems import RESPONSES, QuotaBody
-from services.api.schemas import Cursor, IdempotencyKey, Limit, PageView
+from services.http import schemas
+from services.http.bodies import kept_body
+from services.http.problems import RESPONSES, QuotaBody
+from services.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 from shared import jobs, metrics, tracing
 from shared.errors import InvalidInput
 from shared.jobs.states import ENDED

@@ -8,11 +8,11 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
 from services.api.jobs.estimates import EstimateView
 from services.api.motions.schemas import MotionView
-from services.api.problems import QuotaBody
-from services.api.schemas import Comment, Name, View
+from services.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
+from services.http.problems import QuotaBody
+from services.http.schemas import Comment, Name, View
 from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 

@@ -10,8 +10,8 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from services.api.catalogue import Catalogue
-from services.api.pages import page_response
 from services.api.streams.schemas import MODEL
+from services.http.pages import page_response
 from shared.errors import MareyError
 from shared.motion.live_page import live_page
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path
 from services.api.auth import Reader
 from services.api.context import Shared
 from services.api.models.schemas import ModelsView, ModelView
-from services.api.problems import RESPONSES
+from services.http.problems import RESPONSES
 from shared.bundles import named_by
 from shared.offers import offers
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.api.schemas import View
+from services.http.schemas import View
 from shared.bundles import BrokenBundle
 from shared.offers import Offer, Offers
 

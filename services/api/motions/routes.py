@@ -23,8 +23,8 @@ from services.api.motions.schemas import (
     ReviewFilter,
 )
 from services.api.motions.service import file_stem, made_again
-from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, FreeText, Limit, PageView
+from services.http.problems import RESPONSES
+from services.http.schemas import Cursor, FreeText, Limit, PageView
 from shared import jobs
 from shared.errors import NotFound
 from shared.items import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS

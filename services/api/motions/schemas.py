@@ -10,7 +10,7 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from services.api.files import FileView
-from services.api.schemas import Comment, View
+from services.http.schemas import Comment, View
 from shared.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
 
 

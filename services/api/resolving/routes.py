@@ -11,8 +11,8 @@ from pydantic import Field
 
 from services.api.auth import Reader
 from services.api.context import Connection
-from services.api.problems import RESPONSES
-from services.api.schemas import View
+from services.http.problems import RESPONSES
+from services.http.schemas import View
 from shared import jobs
 from shared.jobs.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
 

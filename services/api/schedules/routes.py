@@ -8,15 +8,15 @@ from fastapi import APIRouter, Request, Response
 
 from services.api.audit import note
 from services.api.auth import Operator, Reader, Submitter
-from services.api.bodies import kept_body
 from services.api.context import Connection, Shared
 from services.api.evaluations.routes import body_of
 from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView
 from services.api.evaluations.service import detail
-from services.api.problems import RESPONSES
 from services.api.schedules import service
 from services.api.schedules.schemas import NewScheduleBody, SchedulePatch, ScheduleView
-from services.api.schemas import Cursor, Limit, PageView
+from services.http.bodies import kept_body
+from services.http.problems import RESPONSES
+from services.http.schemas import Cursor, Limit, PageView
 from shared import jobs
 
 router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONSES)

@@ -13,10 +13,10 @@ from starlette.websockets import WebSocketDisconnect
 
 from services.api.auth import admit, authenticated, check_scope
 from services.api.context import Context
-from services.api.problems import public_error
 from services.api.streams import service
 from services.api.streams.session import Session, Visit
 from services.api.streams.wire import Wire
+from services.http.problems import public_error
 from shared.errors import InvalidInput, MareyError, NotFound
 from shared.jobs import get_stream, told_prompts, transaction
 

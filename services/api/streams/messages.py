@@ -8,13 +8,13 @@ from uuid import UUID
 
 from services.api.auth import check_scope
 from services.api.context import Context
+from services.api.stream_hub import Hub
 from services.api.streams import service
-from services.api.streams.hub import Hub
 from services.api.streams.wire import Wire
 from shared.errors import Busy, MareyError, TooLarge
 from shared.jobs import ApiKey
+from shared.prompts import check_prompt
 from shared.streams.control import Control
-from shared.text.prompts import check_prompt
 
 MAX_BYTES = 8 * 1024
 """Of a message; a prompt has at most 2,000 characters."""

@@ -9,11 +9,11 @@ from fastapi import APIRouter, Query, Response, WebSocket
 
 from services.api.auth import Reader, Submitter
 from services.api.context import Connection, Shared
-from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, Limit, PageView
 from services.api.streams import service
 from services.api.streams.door import let_in
 from services.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
+from services.http.problems import RESPONSES
+from services.http.schemas import Cursor, Limit, PageView
 from shared import jobs
 
 router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)

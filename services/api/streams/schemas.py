@@ -11,10 +11,10 @@ from uuid import UUID
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from services.api.jobs.schemas import ErrorView
-from services.api.problems import ProblemBody
-from services.api.schemas import View
+from services.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
+from services.http.problems import ProblemBody
+from services.http.schemas import View
 from shared.bundles import Bundle
 from shared.items import MAX_SEED
 from shared.jobs import StreamPrompt, StreamRow, StreamState

@@ -12,7 +12,7 @@ import structlog
 from services.api.audit import note
 from services.api.catalogue import Catalogue
 from services.api.context import Context
-from services.api.streams.hub import Hub
+from services.api.stream_hub import Hub
 from services.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
 from shared.bundles import named_by
 from shared.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable

@@ -16,7 +16,7 @@ from anyio.abc import TaskGroup
 from starlette.websockets import WebSocketDisconnect
 
 from services.api.context import Context
-from services.api.streams.hub import Hub
+from services.api.stream_hub import Hub
 from services.api.streams.messages import Messages
 from services.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
 from services.api.streams.service import is_over

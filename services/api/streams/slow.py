@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from services.api.streams.hub import Hub
+from services.api.stream_hub import Hub
 from shared.streams.control import Control, ControlQueue
 
 BEHIND_FRAMES = 40

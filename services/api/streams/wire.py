@@ -1,19 +1,13 @@
-"""One open socket: what is sent, in which order, and how it is closed. And the protocol class that keeps it honest."""
+"""One open socket: what is sent, in which order, and how it is closed."""
 
 from __future__ import annotations
-
-import asyncio
-import socket
-from contextlib import suppress
-from typing import Any
 
 import structlog
 from anyio import Lock
 from fastapi import WebSocket
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from services.api.problems import problem_body, public_error
 from services.api.streams.schemas import ErrorMessage, SocketMessage
+from services.http.problems import problem_body, public_error
 from shared.errors import MareyError
 
 log = structlog.get_logger(__name__)
@@ -23,12 +17,6 @@ AWAY = 1013
 TOLD = (401, 403, 404, 422)
 """HTTP statuses that are close codes too, with 4000 added; what has another may work later."""
 REASON_BYTES = 123  # RFC 6455
-BUFFER_BYTES = 4096
-"""Twenty frames of 22 joints, a second."""
-PING_SECONDS, PONG_SECONDS = 20.0, 20.0
-"""Between an answer and the next ping, and for the answer."""
-FLUSH_SECONDS = 5.0
-"""For what is still on its way when a socket is closed."""
 
 
 class Wire:
@@ -87,46 +75,3 @@ class Wire:
 def close_code(error: MareyError) -> int:
     """With which code a socket is closed for this error."""
     return 4000 + error.status if error.status in TOLD else AWAY
-
-
-class StreamProtocol(WebSocketsSansIOProtocol):
-    """uvicorn's WebSockets with buffers that hold no more than two seconds of frames.
-
-    Its own, and those of the kernel, hold minutes of them: sends would go on long after the client stopped to take
-    what is sent, and what it then gets first is as old.
-
-    A socket that is closed is gone soon, too. asyncio closes a connection when all is sent, which a client that takes
-    nothing puts off for ever: it would keep its place here, and the stream that it had us pause.
-    """
-
-    def __init__(self, *args: object, **options: object) -> None:
-        super().__init__(*args, **options)  # type: ignore[arg-type]
-        self.conn.debug = False  # it would write headers to the log, and with them the key
-
-    def keepalive_timeout(self) -> None:
-        """A ping was not answered."""
-        super().keepalive_timeout()
-        self._cut_after(FLUSH_SECONDS)
-
-    def shutdown(self) -> None:
-        """The server stops."""
-        super().shutdown()
-        self._cut_after(FLUSH_SECONDS)
-
-    async def send(self, message: Any) -> None:
-        """Send what the application says."""
-        await super().send(message)
-        if message["type"] == "websocket.close":
-            self._cut_after(self.close_timeout + FLUSH_SECONDS)
-
-    def _cut_after(self, seconds: float) -> None:
-        self.loop.call_later(seconds, self.transport.abort)  # nothing, where the connection is gone by then
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Open the connection."""
-        super().connection_made(transport)
-        self.transport.set_write_buffer_limits(high=BUFFER_BYTES)
-        unsent = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # Linux and macOS
-        if unsent is not None:
-            with suppress(OSError):  # not TCP
-                self.transport.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, unsent, BUFFER_BYTES)

@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from services.api.auth import Parser
 from services.api.context import Shared
-from services.api.problems import RESPONSES
+from services.http.problems import RESPONSES
 from services.text.routes import GraphsView, ParseBody
 
 router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)

@@ -10,8 +10,6 @@ from fastapi import APIRouter, Query, Response
 from services.api.audit import note
 from services.api.auth import Operator, Reader
 from services.api.context import Connection, Shared
-from services.api.problems import RESPONSES
-from services.api.schemas import Cursor, Limit, PageView
 from services.api.webhooks.schemas import (
     DeliveryDetailView,
     DeliveryView,
@@ -20,8 +18,11 @@ from services.api.webhooks.schemas import (
     WebhookPatch,
     WebhookView,
 )
+from services.http.problems import RESPONSES
+from services.http.schemas import Cursor, Limit, PageView
 from shared import jobs
-from shared.webhooks.addresses import Allowed, check_url
+from shared.addresses import Allowed
+from shared.webhooks.addresses import check_url
 from shared.webhooks.vault import Vault, new_signing_secret
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES)

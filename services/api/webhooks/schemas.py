@@ -8,7 +8,7 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.schemas import FreeText, Name, View
+from services.http.schemas import FreeText, Name, View
 from shared.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
 from shared.webhooks.addresses import MAX_URL
 

@@ -20,7 +20,6 @@ app.add_typer(schedules.app, name="schedule")
 Run = Annotated[str, typer.Argument(metavar="RUN", help=f"The evaluation: {FORMS}.")]
 Runs = Annotated[list[str], typer.Argument(metavar="RUN…", help=f"Evaluations: of each {FORMS}.")]
 FORMATS = ("html", "json", "md")
-COLUMNS = ("id", "name", "state", "regressed", "bundle", "source", "created")
 
 
 class State(StrEnum):
@@ -99,7 +98,7 @@ def list_runs(
     as_json: console.Json = False,
 ) -> None:
     """List runs, newest first: their states, and which regressed."""
-    show_runs("/v1/evaluations", limit, as_json, full_ids=full_ids, state=state.value if state else None)
+    evaluating.show_runs("/v1/evaluations", limit, as_json, full_ids=full_ids, state=state.value if state else None)
 
 
 @app.command()
@@ -202,21 +201,6 @@ def cancel(runs: Runs, as_json: console.Json = False) -> None:
                 console.result_json(found)
             else:
                 console.say(f"cancelled {of_view('evaluation', found)}: {found['state']}")
-
-
-def show_runs(path: str, limit: int | None, as_json: bool, *, full_ids: bool = False, **params: Any) -> None:
-    """The runs of a listing, newest first."""
-    from services.cli.client import Client
-
-    with Client.here() as client:
-        found = client.pages(path, limit=console.page_size(limit), **params)
-        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
-
-
-def _cell(run: dict[str, Any], column: str) -> object:
-    if column == "regressed":
-        return {True: "regressed", False: "no", None: None}[run[column]]
-    return run["request"][column] if column in ("bundle", "source") else run[column]
 
 
 def _line(field: str, value: object) -> None:

@@ -112,11 +112,10 @@ def history(
 ) -> None:
     """List the runs of a schedule, newest first."""
     from services.cli.client import Client
-    from services.cli.commands.evaluate import show_runs
 
     with Client.here() as client:
         wanted = find(client, "schedule", schedule).id
-    show_runs(f"/v1/schedules/{wanted}/evaluations", limit, as_json, full_ids=full_ids)
+    evaluating.show_runs(f"/v1/schedules/{wanted}/evaluations", limit, as_json, full_ids=full_ids)
 
 
 @app.command()

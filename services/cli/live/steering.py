@@ -10,7 +10,7 @@ import threading
 from typing import Any
 
 from shared.errors import InvalidInput
-from shared.text.prompts import check_prompt
+from shared.prompts import check_prompt
 
 WORDS = {"/pause": "pause", "/resume": "resume", "/stop": "stop"}
 HELP = "Type what the person does next and press Enter; /pause, /resume, /stop; Ctrl-C stops, too."

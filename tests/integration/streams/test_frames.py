@@ -8,8 +8,7 @@ import httpx2
 import pytest
 import redis
 
-from services.api import connections
-from services.api.streams import wire
+from services.api.streams import protocol
 from shared.jobs import StreamState
 from shared.motion.skeleton import HUMANML3D
 from shared.settings import Settings
@@ -119,9 +118,9 @@ def test_a_client_that_goes_away_leaves_no_stream_paused(api: LiveApi, stream: s
 def test_a_client_that_takes_nothing_any_more_is_let_go(
     config: Settings, stream: str, secret: str, hand: Hand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "PING_SECONDS", 1.0)
-    monkeypatch.setattr(connections, "PONG_SECONDS", 3.0)
-    monkeypatch.setattr(wire, "FLUSH_SECONDS", 0.1)
+    monkeypatch.setattr(protocol, "PING_SECONDS", 1.0)
+    monkeypatch.setattr(protocol, "PONG_SECONDS", 3.0)
+    monkeypatch.setattr(protocol, "FLUSH_SECONDS", 0.1)
     with ApiThread(beside(config)) as url, watching(url, f"{stream}?slow=pause", secret, narrow=True) as dead:
         hand.show(5)
         dead.until_frame(4)

@@ -11,7 +11,7 @@ import httpx2
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from services.api.streams import hub
+from services.api import stream_hub as hub
 from shared.settings import Settings
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import PATIENCE, watching

@@ -16,7 +16,8 @@ from pydantic import SecretStr
 from services.api.health.metrics import render
 from services.cli import checkup
 from services.cli import checkup_backing as backing
-from services.cli.checkup import Check, models
+from services.cli.checkup import models
+from services.cli.findings import Check
 from shared.jobs import WorkerBeat, beat, beat_scheduler, downgrade, transaction
 from shared.runtime.queue import redis_client
 from shared.settings import Settings

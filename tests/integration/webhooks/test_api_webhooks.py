@@ -16,9 +16,9 @@ from structlog.testing import capture_logs
 from services.cli.ports import try_port
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import Deliverer
+from shared.addresses import Allowed
 from shared.jobs import EventKind, transaction
 from shared.runtime.embedded import EmbeddedServer
-from shared.webhooks.addresses import Allowed
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR, wait

@@ -19,6 +19,7 @@ from standardwebhooks.webhooks import Webhook
 
 from services.scheduler.sending import Sender
 from services.scheduler.webhooks import EACH, Deliverer
+from shared.addresses import Allowed
 from shared.jobs import (
     DEFAULT_TENANT,
     Attempt,
@@ -30,7 +31,6 @@ from shared.jobs import (
     transaction,
 )
 from shared.settings import REPOSITORY
-from shared.webhooks.addresses import Allowed
 from shared.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from services.scheduler.sending import Sender
+from shared.addresses import Allowed
 from shared.jobs import Attempt
-from shared.webhooks.addresses import Allowed
 from tests.servers.receiver import LOOPBACK, Authority, Receiver, drip, endless, hang, stalling, status
 
 BODY = b'{"type":"job.ended"}'

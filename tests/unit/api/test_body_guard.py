@@ -7,8 +7,8 @@ from typing import Any
 
 from starlette.types import Message, Receive, Scope, Send
 
-from services.api.bodies import SMALL_BODY, BodyGuard, Patience
-from services.api.body_room import BodyRoom
+from services.http.bodies import SMALL_BODY, BodyGuard, Patience
+from services.http.body_room import BodyRoom
 
 SIZE = SMALL_BODY + 1
 

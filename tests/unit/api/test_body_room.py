@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.api import body_room
-from services.api.body_room import BodyRoom
+from services.http import body_room
+from services.http.body_room import BodyRoom
 from shared.errors import Overloaded
 
 TOTAL, TENANT = 100, 60

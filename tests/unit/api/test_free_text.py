@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from services.api.app import create_app
-from services.api.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
+from services.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
 from shared.characters import LINE_PATTERN, TEXT_PATTERN
 from shared.settings import Settings
 
@@ -17,7 +17,7 @@ READ_BY_HAND = {
     "NewItemBody": {"prompt", "tags", "name", "model"},  # shared.items
     "EvaluationPromptBody": {"prompt", "expected"},  # shared.evaluation_prompts
     "NewStreamBody": {"prompt", "name", "model"},  # shared.items
-    "ParseBody": {"prompts"},  # shared.text.prompts
+    "ParseBody": {"prompts"},  # shared.prompts
 }
 NOT_STORED = {"cursor", "reference", "Range", "If-Range", "If-None-Match", "Last-Event-ID"}
 """Parsed into something else, or only compared."""

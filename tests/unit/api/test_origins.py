@@ -7,7 +7,7 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 from starlette.types import Receive, Scope, Send
 
 from services.api.app import create_app
-from services.api.guards import HostGuard
+from services.http.guards import HostGuard
 from shared.origins import check_origins, origin_of
 from shared.settings import Settings
 

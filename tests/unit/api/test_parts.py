@@ -8,8 +8,8 @@ from uuid import uuid4
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.api.ranges import parse_range
 from services.api.tailer import last_progress_only
+from services.http.ranges import parse_range
 from shared.jobs import EventRow
 
 

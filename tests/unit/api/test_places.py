@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.api.jobs.events import EventStream
-from services.api.places import Places, Shares
+from services.http.places import Places, Shares
 from shared.errors import Busy
 from shared.jobs import ApiKey
 

@@ -18,13 +18,13 @@ from starlette.testclient import TestClient
 import services.api.docs
 from services.api.app import create_app
 from services.api.evaluations.schemas import NewEvaluationBody
-from services.api.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
 from services.api.jobs.schemas import JobPatch, NewJobBody
 from services.api.motions.schemas import NewRerollBody, NewReviewBody
 from services.api.reference import EXAMPLES
 from services.api.schedules.schemas import NewScheduleBody, SchedulePatch
 from services.api.streams.schemas import NewStreamBody
 from services.api.webhooks.schemas import NewWebhookBody, WebhookPatch
+from services.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
 from services.text.routes import ParseBody
 from shared.expected import read_expected
 from shared.items import MAX_TAG_LENGTH, SETTINGS, read_item

@@ -9,7 +9,8 @@ import sys
 
 import pytest
 
-from services.api import app, process
+from services.api import app
+from services.http import process
 from shared.runtime import malloc
 
 THREADS = """

@@ -12,7 +12,8 @@ import torch
 from shared.bundles import TextSpec
 from shared.errors import InvalidBundle, InvalidFile, NotFound
 from shared.settings import Settings
-from shared.text.encoders import Encoding, find_weights, load_encoder, weights_sha256
+from shared.text.encoders import Encoding, find_weights, weights_sha256
+from shared.text.loading import load_encoder
 from shared.text.minilm import MiniLM
 from shared.text.minilm_encoder import MiniLMEncoder
 from shared.text.pipeline import TextPipeline

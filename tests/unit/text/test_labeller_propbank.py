@@ -14,13 +14,13 @@ from shared.text.light import LightLabeller, WordStates
 from shared.text.light_network import LightConfig
 from shared.text.minilm import MiniLM
 from shared.text.roles import Argument, Frame
-from workers.training.labeller import Recipe
 from workers.training.labeller_adapter import AdaptedMiniLM, token_batch
 from workers.training.labeller_fit import FitConfig, encode, fit, roles_of, tag_set
 from workers.training.labeller_grammar import Example
 from workers.training.labeller_pack import pack
 from workers.training.labeller_pools import CaptionPool, frequent_roles, propbank_batches, with_roles
 from workers.training.labeller_propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
+from workers.training.labeller_recipe import Recipe
 from workers.training.labeller_weights import Weights
 
 WAVING = [

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from shared.bundles import Bundle, find_bundle
 from shared.errors import InvalidBundle
 from shared.text.encoders import find_weights
-from shared.text.labellers import load_labeller
 from shared.text.light import LightLabeller, WordStates, segments
 from shared.text.light_network import LightConfig, LightNetwork, sentence_dropout
+from shared.text.loading import load_labeller
 from shared.text.minilm import MiniLM
 from shared.text.roles import Frame
 

@@ -135,7 +135,7 @@ def test_a_key_needs_hashes() -> None:
 
 def test_keys_and_limits_need_no_torch() -> None:
     code = (
-        "import sys; from shared.bundles import TextSpec; import shared.text.pipeline, shared.text.prompts; "
+        "import sys; from shared.bundles import TextSpec; import shared.text.pipeline, shared.prompts; "
         "from shared.text.keys import resolve; resolve(TextSpec()); "
         "print([m for m in ('torch', 'transformers', 'tokenizers') if m in sys.modules])"
     )

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shared.errors import InvalidInput
-from shared.text.prompts import MAX_WORDS, check_prompt
+from shared.prompts import MAX_WORDS, check_prompt
 
 
 @pytest.mark.parametrize(

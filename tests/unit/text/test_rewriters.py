@@ -12,8 +12,9 @@ from shared.bundles import TextSpec
 from shared.errors import InvalidBundle
 from shared.text.graph import build_graph
 from shared.text.guard import changed_meaning
+from shared.text.loading import load_rewriter
 from shared.text.pipeline import TextPipeline
-from shared.text.rewriters import PromptRewriter, RulesRewriter, expand_units, load_rewriter
+from shared.text.rewriters import PromptRewriter, RulesRewriter, expand_units
 from shared.text.roles import Frame
 from shared.text.spelling import Speller
 from shared.text.words import lemma, one_slip, third_person

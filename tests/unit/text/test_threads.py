@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from shared.bundles import TextSpec
+from shared.nn.threads import one_thread
 from shared.text.pipeline import TextPipeline
-from shared.text.threads import one_thread
 
 
 @pytest.fixture(autouse=True)

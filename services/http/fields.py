@@ -9,7 +9,7 @@ from pydantic.config import JsonDict
 from shared.characters import LINE_PATTERN
 from shared.expected import ACTS, JOIN, MAX_ACTS, SIDED, STRAIGHT
 from shared.items import MAX_NAME, MAX_TAG_LENGTH, MODEL, SETTINGS
-from shared.text.prompts import MAX_CHARACTERS
+from shared.prompts import MAX_CHARACTERS
 
 MAX_MODEL = 165
 """Characters: a name of 100, `@` and 64 hexadecimal digits."""

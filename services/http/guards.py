@@ -9,7 +9,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
-from services.api.problems import problem_response
+from services.http.problems import problem_response
 from shared.errors import MareyError, Refused, UpgradeMissing
 from shared.origins import origin_of
 

@@ -8,21 +8,18 @@ from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, BinaryIO, TypeVar
+from typing import BinaryIO, Protocol, TypeVar
 
 from anyio import CapacityLimiter, to_thread
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from services.api.body_room import BodyRoom
-from services.api.problems import problem_response
+from services.http.body_room import BodyRoom
+from services.http.problems import problem_response
 from shared.errors import InvalidInput, MareyError, TooLarge, TooSlow
 from shared.items import MAX_BODY_BYTES
 from shared.spool import IN_MEMORY, Spool
-
-if TYPE_CHECKING:
-    from services.api.context import Context
 
 Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20
@@ -208,8 +205,16 @@ class KeptBody:
         return await to_thread.run_sync(partial(function, *arguments), limiter=self._threads)
 
 
+class BodyLimits(Protocol):
+    """Limits that the large bodies of one process share."""
+
+    body_room: BodyRoom
+    large_threads: CapacityLimiter
+    """Threads in which large bodies are read."""
+
+
 @asynccontextmanager
-async def kept_body(request: Request, shared: Context, tenant: str) -> AsyncGenerator[KeptBody]:
+async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncGenerator[KeptBody]:
     """The body of a request that holds many prompts, in a file once it is long; the file is gone after the block.
 
     A long body waits until there is room for it before it is read. One that does not say its length takes as much as
@@ -229,7 +234,7 @@ async def kept_body(request: Request, shared: Context, tenant: str) -> AsyncGene
             nonlocal large
             large = True
             async with incoming.paused():
-                await stack.enter_async_context(shared.body_room.take(tenant, size))
+                await stack.enter_async_context(limits.body_room.take(tenant, size))
 
         declared = _declared(request, MAX_BODY_BYTES)
         if declared > IN_MEMORY:
@@ -238,7 +243,7 @@ async def kept_body(request: Request, shared: Context, tenant: str) -> AsyncGene
             if not large and len(spool) + len(part) > IN_MEMORY:
                 await take(MAX_BODY_BYTES)
             spool.write(part)
-        yield KeptBody(spool.rewound(), shared.large_threads if large else None)
+        yield KeptBody(spool.rewound(), limits.large_threads if large else None)
 
 
 def _declared(request: Request, limit: int) -> int:

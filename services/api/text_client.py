@@ -11,7 +11,7 @@ from anyio import to_thread
 from pydantic import ValidationError
 from starlette.responses import Response
 
-from services.api.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
+from services.http.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
 from services.text.limits import WordLimit
 from services.text.routes import GraphsView, ParseBody, too_late
 from shared import tracing

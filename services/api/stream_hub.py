@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
-from services.api.places import Places, Shares
+from services.http.places import Places, Shares
 from shared.metrics import SOCKETS as SOCKETS_OPEN
 from shared.runtime.queue import redis_client
 

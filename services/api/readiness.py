@@ -1,7 +1,7 @@
 """The checks of `/readyz`: they run in the background, each in a thread of its own.
 
 A check that hangs holds up nothing but itself: its last result grows old, and an old result counts as a failure.
-To add a check, add an entry to `CHECKS`.
+The checks themselves are in `services.api.health.checks`.
 """
 
 from __future__ import annotations
@@ -10,16 +10,10 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import structlog
 
-from shared.errors import MareyError, Unreachable
-from shared.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
-from shared.runtime.queue import check_queue
-
-if TYPE_CHECKING:
-    from services.api.context import Context
+from shared.errors import MareyError
 
 INTERVAL_SECONDS = 2.0
 """Between the end of one round of a check and its next."""
@@ -54,57 +48,19 @@ class Check:
         required: requests cannot be answered without it; else it is told, and the API stays ready.
     """
 
-    run: Callable[[Context], object]
+    run: Callable[[], object]
     message: str
     required: bool = True
 
 
-def _ping(shared: Context) -> None:
-    url = shared.config.queue_url
-    if url is None:
-        raise Unreachable("no queue is named", hint="Set MAREY_QUEUE_URL.")
-    check_queue(url.get_secret_value())
-
-
-def _model(shared: Context) -> None:
-    """A generator's worker is ready. Once seen, its absence no longer counts: jobs wait in the queue meanwhile."""
-    if shared.seen_ready:
-        return
-    with transaction(shared.engine) as conn:
-        workers = list_workers(conn)
-    if not any(w.live and w.bundle is not None and w.queue != TEXT_QUEUE for w in workers):
-        raise Unreachable("no worker has its model loaded yet")
-    shared.seen_ready = True
-
-
-def _scheduler(shared: Context) -> None:
-    """One that was heard of has made progress lately. An API that never saw one says nothing: it may come later."""
-    with transaction(shared.engine) as conn:
-        known = list_schedulers(conn)
-    if known and not known[0].live:
-        raise Unreachable(f"no scheduler has made progress for {known[0].silence:.0f} s")
-
-
-CHECKS: Mapping[str, Check] = {
-    "database": Check(
-        lambda shared: check_revision(shared.engine), "the database does not answer, or it or its tables are too old"
-    ),
-    "queue": Check(_ping, "the queue does not answer, or is too old"),
-    "store": Check(lambda shared: shared.store.check(), "the asset store does not answer"),
-    "model": Check(_model, "no worker has its model loaded yet"),
-    # Submits and reads work without it, so a load balancer must not take this API away.
-    "scheduler": Check(_scheduler, "the scheduler stalls or was killed", required=False),
-}
 UNCHECKED = Result(False, "not checked yet")
 
 
 class Readiness:
     """Runs checks again and again, and remembers how each ended last."""
 
-    def __init__(
-        self, shared: Context, checks: Mapping[str, Check] = CHECKS, *, interval: float = INTERVAL_SECONDS
-    ) -> None:
-        self._shared, self._checks, self._interval = shared, checks, interval
+    def __init__(self, checks: Mapping[str, Check], *, interval: float = INTERVAL_SECONDS) -> None:
+        self._checks, self._interval = checks, interval
         self._results: dict[str, tuple[float, Result]] = {}
         self._stopping = threading.Event()
 
@@ -141,7 +97,7 @@ class Readiness:
 
     def _run(self, check: Check) -> tuple[Result, Exception | None]:
         try:
-            check.run(self._shared)
+            check.run()
         except Exception as error:
             return Result(False, check.message), error
         return Result(True), None

@@ -1,4 +1,4 @@
-"""What uvicorn is told of connections: how long one may say nothing, and whose buffers a socket has."""
+"""HTTP connections: how long a client may take to send the head of a request."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from services.api.problems import problem_response
-from services.api.streams.wire import PING_SECONDS, PONG_SECONDS, StreamProtocol
+from services.http.problems import problem_response
 from shared.errors import TooSlow
 from shared.settings import Settings
 
@@ -71,13 +70,5 @@ class PatientProtocol(H11Protocol):
 
 
 def connection_options(config: Settings) -> dict[str, Any]:
-    """Arguments of uvicorn."""
-    return {
-        "http": PatientProtocol,
-        "timeout_keep_alive": config.idle_seconds,
-        "ws": StreamProtocol,
-        "ws_max_size": 64 * 2**10,  # what is too long for us is answered; what is over this is not even read
-        "ws_ping_interval": PING_SECONDS,
-        "ws_ping_timeout": PONG_SECONDS,
-        "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
-    }
+    """Return the arguments of uvicorn for HTTP connections."""
+    return {"http": PatientProtocol, "timeout_keep_alive": config.idle_seconds}

@@ -1,0 +1,63 @@
+"""The checks of `/readyz`. To add one, add an entry to `readiness_checks`."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from services.api.readiness import Check
+from shared.errors import Unreachable
+from shared.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
+from shared.runtime.queue import check_queue
+from shared.settings import Settings
+from shared.storage import AssetStore
+
+
+def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> dict[str, Check]:
+    """Return the checks of an API process, by the name that `/readyz` shows."""
+    return {
+        "database": Check(
+            lambda: check_revision(engine), "the database does not answer, or it or its tables are too old"
+        ),
+        "queue": Check(lambda: _check_queue(config), "the queue does not answer, or is too old"),
+        "store": Check(store.check, "the asset store does not answer"),
+        "model": Check(ModelCheck(engine), "no worker has its model loaded yet"),
+        # Submits and reads work without it, so a load balancer must not take this API away.
+        "scheduler": Check(lambda: _check_scheduler(engine), "the scheduler stalls or was killed", required=False),
+    }
+
+
+class ModelCheck:
+    """Require a generator worker with its model loaded, once: later jobs wait in the queue for a worker to return."""
+
+    def __init__(self, engine: sa.Engine) -> None:
+        self._engine = engine
+        self._seen = False
+
+    def __call__(self) -> None:
+        """Check it.
+
+        Raises:
+            Unreachable: no such worker has been seen yet.
+        """
+        if self._seen:
+            return
+        with transaction(self._engine) as conn:
+            workers = list_workers(conn)
+        if not any(w.live and w.bundle is not None and w.queue != TEXT_QUEUE for w in workers):
+            raise Unreachable("no worker has its model loaded yet")
+        self._seen = True
+
+
+def _check_queue(config: Settings) -> None:
+    url = config.queue_url
+    if url is None:
+        raise Unreachable("no queue is named", hint="Set MAREY_QUEUE_URL.")
+    check_queue(url.get_secret_value())
+
+
+def _check_scheduler(engine: sa.Engine) -> None:
+    """Require recent progress of a known scheduler. An API that never saw one passes: it may come later."""
+    with transaction(engine) as conn:
+        known = list_schedulers(conn)
+    if known and not known[0].live:
+        raise Unreachable(f"no scheduler has made progress for {known[0].silence:.0f} s")

@@ -1,0 +1,38 @@
+"""Findings of `marey doctor`: the type that every check returns, and the checks that several share."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass
+from typing import Literal
+
+from shared.errors import MareyError
+
+SMALLEST_FREE, LITTLE_FREE = 2 * 2**30, 10 * 2**30
+"""Bytes: Postgres stops at a full disk, and 1,000 motions take 200 MB."""
+State = Literal["ok", "warn", "bad"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding. `warn` works, or is not needed for all that this machine could do; `bad` has to be mended."""
+
+    name: str
+    state: State
+    message: str
+    hint: str | None = None
+    """What to do; None where nothing is to be done."""
+
+
+def broken(name: str, error: MareyError) -> Check:
+    """A check that ended with an expected error."""
+    return Check(name, "bad", f"{error.where}: {error.message}" if error.where else error.message, error.hint)
+
+
+def free_space(name: str, folder: os.PathLike[str]) -> Check:
+    """How full the disk of a folder is."""
+    free = shutil.disk_usage(folder).free
+    state = "bad" if free < SMALLEST_FREE else "warn" if free < LITTLE_FREE else "ok"
+    hint = None if state == "ok" else "Make room: `marey admin gc` removes what nothing refers to."
+    return Check(name, state, f"{os.fspath(folder)}, {free / 2**30:.1f} GiB free", hint)

@@ -1,0 +1,1 @@
+"""HTTP infrastructure that the API and the text service share."""

