@@ -34,7 +34,7 @@ CLIENTS, PROMPTS, REPEATS = 45, 16, 40
 BARS = {"/livez, p99": 100, "/readyz, p99": 100, "GET /v1/jobs, p99": 2000, "one request of 16 prompts, p95": 1000}
 """Milliseconds."""
 READY_SECONDS = 300.0
-GENERATED = 600
+GENERATED = 4000
 """Items of the job that runs beside: more than are made meanwhile."""
 
 

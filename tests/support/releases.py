@@ -1,4 +1,5 @@
-"""The previous release's own code beside this one's: commands of either, on the same database, queue and store."""
+"""Earlier releases beside this one: their wheels, each in an environment of its own, on the same database, queue and
+store."""
 
 from __future__ import annotations
 
@@ -6,53 +7,40 @@ import contextlib
 import io
 import os
 import subprocess
-import sys
 import tarfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import httpx2
 import pytest
 
-from tests.support.marey import REPOSITORY
+from tests.support.marey import COMMAND, REPOSITORY
+from tests.support.wheels import build_wheel, make_environment
 
-PREVIOUS = "03315bd6"
-"""The commit of the previous release."""
-COMMAND = (sys.executable, "-m", "services.cli")
 SECONDS = 120.0
-
-
-def previous_release(folder: Path) -> Path:
-    """The tree of the previous release, from the history; skips the test where that is not here."""
-    done = subprocess.run(
-        ["git", "archive", PREVIOUS, "shared", "services", "workers", "migrations"],
-        cwd=REPOSITORY, capture_output=True, check=False,
-    )  # fmt: skip
-    if done.returncode:
-        pytest.skip(f"the history ends before {PREVIOUS}: {done.stderr.decode().strip()}")
-    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
-        archive.extractall(folder, filter="data")
-    return folder
+THREADS = {"MAREY_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True)
 class Release:
-    """Commands of one tree of the code."""
+    """The commands of one release.
 
-    tree: Path
-    environment: dict[str, str]
+    Attributes:
+        command: what `marey` is.
+        environment: variables of its processes.
+        folder: where they run.
+    """
 
-    def environ(self) -> dict[str, str]:
-        """Of a command: nothing of the caller's own settings."""
-        kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
-        return {**kept, "MAREY_THREADS": "1", "OMP_NUM_THREADS": "1", **self.environment}
+    command: tuple[str, ...]
+    environment: Mapping[str, str]
+    folder: Path
 
-    def python(self, code: str) -> str:
-        """Run a piece of code on its tree; what it printed."""
+    def run(self, *arguments: str) -> str:
+        """Run a command that ends by itself; what it printed."""
         done = subprocess.run(
-            [sys.executable, "-c", code], cwd=self.tree, env=self.environ(), capture_output=True, text=True,
+            [*self.command, *arguments], cwd=self.folder, env=self.environment, capture_output=True, text=True,
             timeout=SECONDS, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
@@ -63,7 +51,7 @@ class Release:
         """A command that runs until the end of the block."""
         with log.open("ab") as output:
             process = subprocess.Popen(
-                [*COMMAND, *arguments], cwd=self.tree, env=self.environ(), stdout=output, stderr=output
+                [*self.command, *arguments], cwd=self.folder, env=self.environment, stdout=output, stderr=output
             )
         try:
             yield process
@@ -80,6 +68,27 @@ class Release:
             client.headers["Authorization"] = f"Bearer {key}"
             wait_until(lambda: _answers(client), log)
             yield client
+
+
+def earlier_release(commit: str, folder: Path, values: Mapping[str, str]) -> Release:
+    """The release of a commit, from the history; skips the test where that is not here."""
+    done = subprocess.run(
+        ["git", "archive", commit, ":(exclude)models", ":(exclude)docs", ":(exclude)tests"],
+        cwd=REPOSITORY, capture_output=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        pytest.skip(f"the history ends before {commit}: {done.stderr.decode().strip()}")
+    tree = folder / "tree"
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
+        archive.extractall(tree, filter="data")
+    made = make_environment(folder / "environment", [build_wheel(tree, folder / "wheels")], borrow=True)
+    return Release((made.marey,), made.environ({**THREADS, **values}), folder)
+
+
+def this_release(values: Mapping[str, str]) -> Release:
+    """This tree."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
+    return Release(COMMAND, {**kept, **THREADS, **values}, REPOSITORY)
 
 
 def wait_until(ready: Callable[[], object], log: Path) -> None:

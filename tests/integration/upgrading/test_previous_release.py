@@ -1,10 +1,12 @@
-"""The previous release and this one on the same rows: each finishes what the other's API has queued."""
+"""The previous release and this one on the same rows, as server, worker and client of each other.
+
+The previous release is a wheel in an environment of its own, to which this checkout is closed.
+"""
 
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +17,19 @@ import sqlalchemy as sa
 
 from shared.bundles import Bundle
 from tests.servers.ports import free_ports
-from tests.support.marey import REPOSITORY, TINY, tiny_models
-from tests.support.releases import Release, previous_release, wait_until
+from tests.support.marey import TINY, tiny_models
+from tests.support.releases import Release, earlier_release, this_release, wait_until
 
+PREVIOUS = "26b0fe97"
+"""The last commit in which the code was three packages."""
+FORMAT_1 = "03315bd6"
+"""A release that reads bundles of format 1 alone."""
 COUNT = 3
-PREPARE = """
-from shared.jobs import create_engine, create_key, transaction, upgrade
-from shared.settings import settings
-engine = create_engine(settings().database_url.get_secret_value())
-upgrade(engine)
-with transaction(engine) as conn:
-    print(create_key(conn, "tester", ["read", "submit"]).secret)
-"""
-OPEN = """
-from pathlib import Path
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle
-try:
-    Bundle.open(Path({path!r}))
-except InvalidBundle as error:
-    print(error)
-"""
 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Bundles of format 1, as the previous release wrote them."""
+    """Bundles of format 1, as the oldest of these releases wrote them."""
     folder = tiny_models(tmp_path_factory.mktemp("models"))
     for file in folder.glob("*/manifest.json"):
         document = json.loads(file.read_text())
@@ -49,27 +38,30 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def releases(tmp_path: Path, database_url: str, queue_url: str, models: Path) -> Callable[[], tuple[Release, Release]]:
-    """The previous release and this one, with an empty database."""
+def values(tmp_path: Path, database_url: str, queue_url: str, models: Path) -> Mapping[str, str]:
+    """Settings of both releases, with an empty database."""
+    dsn = sa.make_url(database_url).set(drivername="postgresql").render_as_string(hide_password=False)
+    with psycopg.connect(dsn, autocommit=True) as conn:
+        conn.execute("DROP SCHEMA public CASCADE")
+        conn.execute("CREATE SCHEMA public")
+    port = free_ports(1)[0]
+    return {
+        "MAREY_HOME": str(tmp_path / "home"),
+        "MAREY_MODELS": str(models),
+        "MAREY_DATABASE_URL": database_url,
+        "MAREY_QUEUE_URL": queue_url,
+        "MAREY_STORE": str(tmp_path / "assets"),
+        "MAREY_PORT": str(port),
+        "MAREY_SERVER": f"http://127.0.0.1:{port}",
+        "MAREY_LIVE_SLOTS": "0",
+    }
 
-    def made() -> tuple[Release, Release]:
-        previous = previous_release(tmp_path / "previous")
-        dsn = sa.make_url(database_url).set(drivername="postgresql").render_as_string(hide_password=False)
-        with psycopg.connect(dsn, autocommit=True) as conn:
-            conn.execute("DROP SCHEMA public CASCADE")
-            conn.execute("CREATE SCHEMA public")
-        environment = {
-            "MAREY_HOME": str(tmp_path / "home"),
-            "MAREY_MODELS": str(models),
-            "MAREY_DATABASE_URL": database_url,
-            "MAREY_QUEUE_URL": queue_url,
-            "MAREY_STORE": str(tmp_path / "assets"),
-            "MAREY_PORT": str(free_ports(1)[0]),
-            "MAREY_LIVE_SLOTS": "0",
-        }
-        return Release(previous, environment), Release(REPOSITORY, environment)
 
-    return made
+def new_key(release: Release) -> str:
+    """Migrate the database to a release, and make a key."""
+    release.run("admin", "migrate")
+    made = release.run("admin", "keys", "create", "tester", "--scope", "read", "--scope", "submit", "--json")
+    return json.loads(made)["secret"]
 
 
 def submit(http: httpx2.Client, word: str) -> str:
@@ -85,41 +77,66 @@ def job(http: httpx2.Client, job_id: str) -> dict[str, Any]:
     return answer.json()
 
 
-def test_each_release_finishes_what_the_other_has_queued(
-    tmp_path: Path, models: Path, releases: Callable[[], tuple[Release, Release]]
-) -> None:
-    previous, current = releases()
-    log = tmp_path / "log"
-    reference = Bundle.open(models / TINY).reference
-    key = previous.python(PREPARE).strip()
-    with previous.api(log, key) as http:
-        queued = submit(http, "old")
-
-    current.python(PREPARE)
-    with current.api(log, key) as http, current.running(log, "scheduler"):
-        assert job(http, queued)["counters"].get("succeeded", 0) == 0
-        with current.running(log, "worker", "hgm3+text"):
-            wait_until(lambda: job(http, queued)["counters"].get("succeeded") == COUNT, log)
-        assert bundles_of(http, queued) == {reference}
-
-        newer = submit(http, "new")
-        with previous.running(log, "worker", "hgm3+text"):
-            wait_until(lambda: job(http, newer)["counters"].get("succeeded") == COUNT, log)
-        assert bundles_of(http, newer) == {reference}
-
-
 def bundles_of(http: httpx2.Client, job_id: str) -> set[str]:
     found = http.get(f"/v1/jobs/{job_id}/items", params={"limit": 100}).json()["items"]
     assert len(found) == COUNT
     return {item["bundle"] for item in found}
 
 
-def test_a_bundle_of_format_2_is_refused_by_the_previous_release_and_named(tmp_path: Path, models: Path) -> None:
-    newer = tmp_path / TINY
-    shutil.copytree(models / TINY, newer)
-    document = json.loads((newer / "manifest.json").read_text())
-    (newer / "manifest.json").write_text(json.dumps({**document, "format": 2}))
-    assert Bundle.open(newer).manifest.format == 2
-    previous = Release(previous_release(tmp_path / "previous"), {})
-    said = previous.python(OPEN.format(path=str(newer)))
-    assert "is not a manifest this version reads: format" in said
+def with_key(release: Release, key: str) -> Release:
+    return Release(release.command, {**release.environment, "MAREY_KEY": key}, release.folder)
+
+
+def fetched_by(client: Release, job_id: str, folder: Path) -> list[str]:
+    """Names of the motions of a job that a client fetches with their manifest."""
+    client.run("fetch", job_id, "-o", str(folder))
+    return sorted(path.name for path in folder.rglob("*.bvh"))
+
+
+@pytest.mark.parametrize("commit", [PREVIOUS, pytest.param(FORMAT_1, marks=pytest.mark.slow)])
+def test_each_release_finishes_what_the_other_has_queued(
+    tmp_path: Path, models: Path, values: Mapping[str, str], commit: str
+) -> None:
+    previous = earlier_release(commit, tmp_path / "previous", values)
+    current = this_release(values)
+    log = tmp_path / "log"
+    reference = Bundle.open(models / TINY).reference
+    key = new_key(previous)
+    previous, current = with_key(previous, key), with_key(current, key)
+    with previous.api(log, key) as http:
+        queued = submit(http, "old")
+        by_client = json.loads(current.run("submit", "a person waves", "--seed", "7", "--json"))["id"]
+        assert job(http, by_client)["state"] == "queued"
+
+    current.run("admin", "migrate")
+    with current.api(log, key) as http, current.running(log, "scheduler"):
+        assert job(http, queued)["counters"].get("succeeded", 0) == 0
+        with current.running(log, "worker", "hgm3+text"):
+            wait_until(lambda: job(http, queued)["counters"].get("succeeded") == COUNT, log)
+            wait_until(lambda: job(http, by_client)["state"] == "succeeded", log)
+        assert bundles_of(http, queued) == {reference}
+
+        newer = submit(http, "new")
+        with previous.running(log, "worker", "hgm3+text"):
+            wait_until(lambda: job(http, newer)["counters"].get("succeeded") == COUNT, log)
+        assert bundles_of(http, newer) == {reference}
+        theirs, ours = (fetched_by(client, newer, tmp_path / name) for name, client in
+                        (("theirs", previous), ("ours", current)))  # fmt: skip
+        assert theirs == ours
+        assert len(ours) == COUNT
+
+
+@pytest.mark.slow
+def test_a_bundle_of_format_2_is_refused_by_a_release_that_reads_format_1_and_named(
+    tmp_path: Path, models: Path, values: Mapping[str, str]
+) -> None:
+    file = models / TINY / "manifest.json"
+    document = json.loads(file.read_text())
+    file.write_text(json.dumps({**document, "format": 2}))
+    try:
+        assert Bundle.open(file.parent).manifest.format == 2
+        previous = earlier_release(FORMAT_1, tmp_path / "previous", values)
+        with pytest.raises(AssertionError, match="is not a manifest this version reads: format"):
+            previous.run("generate", "a person waves", "--model", TINY, "-o", str(tmp_path / "x.bvh"))
+    finally:
+        file.write_text(json.dumps(document))

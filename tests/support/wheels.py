@@ -1,0 +1,137 @@
+"""Wheels, and environments of their own to run them in: the checkout is closed to every Python process of these."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import distribution
+from pathlib import Path
+
+from packaging.requirements import Requirement
+
+from tests.support.marey import REPOSITORY
+
+SECONDS = 120.0
+DEVELOPMENT = Path(sysconfig.get_path("purelib"))
+"""Packages of the development environment, without the editable install: a `.pth` file does not read another."""
+CLOSE = """
+import os, sys
+
+CLOSED, OPEN = {closed!r}, {open!r}
+
+def refuse(event, arguments):
+    if event in ("open", "os.listdir", "os.scandir") and isinstance(arguments[0], str):
+        path = os.path.abspath(arguments[0])
+        if path.startswith(CLOSED) and not path.startswith(OPEN):
+            raise PermissionError("the checkout is closed to this environment: " + path)
+
+sys.addaudithook(refuse)
+"""
+
+
+def build_wheel(tree: Path, folder: Path) -> Path:
+    """Build the wheel of a tree."""
+    project = tree / "pyproject.toml"
+    assert project.is_file()
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert done.returncode == 0, done.stderr
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A virtual environment."""
+
+    folder: Path
+
+    @property
+    def packages(self) -> Path:
+        """The folder of its packages."""
+        return next(self.folder.glob("lib/python*/site-packages"))
+
+    @property
+    def python(self) -> str:
+        """Its interpreter."""
+        return str(self.folder / "bin" / "python")
+
+    @property
+    def marey(self) -> str:
+        """The command that the wheel brings."""
+        return str(self.folder / "bin" / "marey")
+
+    def environ(self, values: Mapping[str, str]) -> dict[str, str]:
+        """Variables of its processes: none of the caller's own settings, no path to the checkout."""
+        dropped = ("MAREY_", "PYTHON", "VIRTUAL_ENV")
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(dropped)}
+        return {**kept, **values}
+
+
+def make_environment(folder: Path, wheels: Iterable[Path], *, borrow: bool) -> Environment:
+    """Make an environment with these wheels.
+
+    Args:
+        borrow: the packages of the development environment too; else what the wheels' own requirements name, copied
+            from there, and nothing else.
+    """
+    _run([sys.executable, "-m", "venv", "--without-pip", str(folder)])
+    made = Environment(folder)
+    for wheel in wheels:
+        _run(
+            [
+                sys.executable,
+                "-m",
+                "pip",
+                "--python",
+                made.python,
+                "install",
+                "-q",
+                "--no-deps",
+                "--no-index",
+                str(wheel),
+            ]
+        )
+    if borrow:
+        (made.packages / "borrowed.pth").write_text(f"{DEVELOPMENT}\n")
+    else:
+        _copy_requirements(made)
+    development = str(DEVELOPMENT.parents[2]) if borrow else str(made.folder)
+    closing = CLOSE.format(closed=f"{REPOSITORY}/", open=f"{development}/")
+    (made.packages / "sitecustomize.py").write_text(closing)
+    return made
+
+
+def _copy_requirements(made: Environment) -> None:
+    """Copy the distributions that the installed wheels require, and what these require."""
+    copied: set[str] = set()
+    todo = [text for info in made.packages.glob("*.dist-info") for text in _required(info.parent, info.name)]
+    while todo:
+        requirement = Requirement(todo.pop())
+        if requirement.name in copied or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+            continue
+        copied.add(requirement.name)
+        found = distribution(requirement.name)
+        for file in found.files or ():
+            source = Path(str(found.locate_file(file)))
+            if source.is_file() and source.is_relative_to(DEVELOPMENT) and "__pycache__" not in file.parts:
+                target = made.packages / file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(source, target)
+        todo += found.requires or []
+
+
+def _required(packages: Path, name: str) -> list[str]:
+    from importlib.metadata import Distribution
+
+    return Distribution.at(packages / name).requires or []
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert done.returncode == 0, done.stderr
