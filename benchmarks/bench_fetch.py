@@ -16,8 +16,8 @@ import httpx2
 import psutil
 
 from benchmarks.platform import BUNDLE, Platform, marey, platform, processor_seconds
-from services.cli.fetching import PARALLEL, Download, plan
-from shared.jobs import (
+from marey.cli.fetching import PARALLEL, Download, plan
+from marey.jobs import (
     DEFAULT_TENANT,
     AssetDigest,
     ClaimedItem,
@@ -30,7 +30,7 @@ from shared.jobs import (
     commit_texts,
     transaction,
 )
-from shared.storage import AssetStore, open_store
+from marey.storage import AssetStore, open_store
 from tests.support.toy import QUEUE
 
 MOTIONS = 1000

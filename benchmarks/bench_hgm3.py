@@ -20,11 +20,11 @@ import numpy as np
 import torch
 
 from benchmarks.harness import measure, table
-from shared.text.features import TextFeatures
-from shared.text.graph import Edge, Node, SemanticGraph
-from workers.generating.port import Request
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.generate import Generator, Settings
+from marey.generating.port import Request
+from marey.hgm3.bundle import random_bundle
+from marey.hgm3.generate import Generator, Settings
+from marey.text.features import TextFeatures
+from marey.text.graph import Edge, Node, SemanticGraph
 
 THREADS = 2
 FRAMES = 196

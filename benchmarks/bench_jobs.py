@@ -14,7 +14,7 @@ from uuid import uuid4
 import sqlalchemy as sa
 
 from benchmarks.harness import measure, table
-from shared.jobs import (
+from marey.jobs import (
     NewItem,
     NewJob,
     claim,
@@ -26,9 +26,9 @@ from shared.jobs import (
     transaction,
     upgrade,
 )
-from shared.jobs.claim import LANES, LANES_TRIED, TAKE
-from shared.jobs.ids import new_id
-from shared.runtime.embedded import EmbeddedServer, start_postgres
+from marey.jobs.claim import LANES, LANES_TRIED, TAKE
+from marey.jobs.ids import new_id
+from marey.runtime.embedded import EmbeddedServer, start_postgres
 
 PROMPTS = 10_000
 CLAIMS = 400

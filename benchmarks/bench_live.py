@@ -24,12 +24,12 @@ from pathlib import Path
 import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
-from services.cli.client import Client
-from shared.jobs import create_engine, schema
-from shared.settings import REPOSITORY
-from shared.streams.frames import Frame, decode_frame
+from marey.cli.client import Client
+from marey.jobs import create_engine, schema
+from marey.mogo.bundle import random_bundle
+from marey.settings import REPOSITORY
+from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, Serving, serving, socket_of
-from workers.mogo.bundle import random_bundle
 
 STREAMS = 20
 KILLS = 5
@@ -86,7 +86,7 @@ def _gap_of_a_kill(marey: Marey, client: Client, server: Serving) -> float:
 
 @contextmanager
 def _second_worker(environment: dict[str, str]) -> Iterator[None]:
-    command = [sys.executable, "-m", "services.cli", "worker", "mogo", "--only", "live"]
+    command = [sys.executable, "-m", "marey.cli", "worker", "mogo", "--only", "live"]
     process = subprocess.Popen(
         command, cwd=REPOSITORY, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.linalg import sqrtm
 
 from benchmarks.harness import measure, table
-from shared.measures.bootstrap import paired_bootstrap
-from shared.measures.inputs import Array
-from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
-from workers.evaluator.metrics.intervals import redraw
-from workers.evaluator.metrics.retrieval import all_ranks, matching_score, r_precision
+from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
+from marey.evaluator.metrics.intervals import redraw
+from marey.evaluator.metrics.retrieval import all_ranks, matching_score, r_precision
+from marey.measures.bootstrap import paired_bootstrap
+from marey.measures.inputs import Array
 
 CLIPS = 4000
 DIMENSIONS = 256

@@ -19,12 +19,12 @@ import psutil
 import torch
 
 from benchmarks.harness import measure, table
-from shared.text.features import TextFeatures
-from shared.text.graph import Node, SemanticGraph
-from workers.mogo.bundle import random_bundle
-from workers.mogo.generate import Generator, Settings
-from workers.mogo.live import LiveRoom
-from workers.mogo.streaming import Streams
+from marey.mogo.bundle import random_bundle
+from marey.mogo.generate import Generator, Settings
+from marey.mogo.live import LiveRoom
+from marey.mogo.streaming import Streams
+from marey.text.features import TextFeatures
+from marey.text.graph import Node, SemanticGraph
 
 THREADS = 2
 FRAMES = 100

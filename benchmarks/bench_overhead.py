@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 from benchmarks import noop
-from shared.runtime.queue import redis_client
+from marey.runtime.queue import redis_client
 from tests.chaos.driver import REPOSITORY, Cluster
 from tests.support.toy_jobs import ended, job_row, submit_toys
 

@@ -25,9 +25,9 @@ import httpx2
 
 from benchmarks.bench_text import LONG
 from benchmarks.platform import marey
-from services.cli.client import Client
-from services.cli.place import Server, read_server
-from shared.errors import MareyError
+from marey.cli.client import Client
+from marey.cli.place import Server, read_server
+from marey.errors import MareyError
 from tests.support.marey import REPOSITORY, Marey
 
 CLIENTS, PROMPTS, REPEATS = 45, 16, 40

@@ -11,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.harness import measure, table
-from shared.motion.bvh import format_bvh, parse_bvh
-from shared.motion.features import HUMANML3D_263
-from shared.motion.feet import clean_feet, skate
-from shared.motion.finish import finish_motion
-from shared.motion.kinematics import forward_kinematics, global_rotations
-from shared.motion.pose import measure_offsets, solve_pose
-from shared.motion.rotations import (
+from marey.motion.bvh import format_bvh, parse_bvh
+from marey.motion.features import HUMANML3D_263
+from marey.motion.feet import clean_feet, skate
+from marey.motion.finish import finish_motion
+from marey.motion.kinematics import forward_kinematics, global_rotations
+from marey.motion.pose import measure_offsets, solve_pose
+from marey.motion.rotations import (
     IDENTITY,
     Array,
     angle_between,
@@ -27,7 +27,7 @@ from shared.motion.rotations import (
     normalize,
     unroll,
 )
-from shared.motion.skeleton import HUMANML3D, Skeleton
+from marey.motion.skeleton import HUMANML3D, Skeleton
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker
 

@@ -18,11 +18,11 @@ from pathlib import Path
 
 from benchmarks.bench_fetch import make_motions
 from benchmarks.platform import BUNDLE, Platform, marey, platform
-from services.cli.drawing import Drawing, draw
-from shared.jobs import DEFAULT_TENANT, AssetDigest, ClaimedItem, NewMotion, asset_key
-from shared.motion.clip import MotionClip, load_npz
-from shared.storage import AssetStore
-from workers.training.checks.prompts import evaluation_prompts
+from marey.cli.drawing import Drawing, draw
+from marey.jobs import DEFAULT_TENANT, AssetDigest, ClaimedItem, NewMotion, asset_key
+from marey.motion.clip import MotionClip, load_npz
+from marey.storage import AssetStore
+from marey.training.checks.prompts import evaluation_prompts
 
 PROMPTS, COPIES = 31, 10
 REPEATS, WARM_UP = 3, 1

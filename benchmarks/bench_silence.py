@@ -33,10 +33,10 @@ import httpx2
 import sqlalchemy as sa
 
 from benchmarks.platform import Platform
-from services.cli.watching import watch_job
-from shared.errors import Unreachable
-from shared.jobs import transaction
-from shared.runtime.embedded import postgres_url, socket_folder
+from marey.cli.watching import watch_job
+from marey.errors import Unreachable
+from marey.jobs import transaction
+from marey.runtime.embedded import postgres_url, socket_folder
 from tests.chaos.places import S3
 from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import Swift

@@ -14,7 +14,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from benchmarks.harness import measure, table
-from shared.jobs import (
+from marey.jobs import (
     NewItem,
     NewJob,
     Quotas,
@@ -29,8 +29,8 @@ from shared.jobs import (
     upgrade,
     usage,
 )
-from shared.jobs.types import NO_TEXT
-from shared.runtime.embedded import start_postgres
+from marey.jobs.types import NO_TEXT
+from marey.runtime.embedded import start_postgres
 
 MANY, FEW = 50_000, 5
 WORKERS, BATCH = 4, 32

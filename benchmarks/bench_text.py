@@ -7,10 +7,10 @@ import itertools
 import torch
 
 from benchmarks.harness import measure, table
-from shared.bundles import TextSpec
-from shared.text.encoders import find_weights
-from shared.text.minilm import MiniLM
-from shared.text.pipeline import TextPipeline
+from marey.bundles import TextSpec
+from marey.text.encoders import find_weights
+from marey.text.minilm import MiniLM
+from marey.text.pipeline import TextPipeline
 
 CAPTION = "a person walks forward in a circle and then waves his hand"
 LONG = (

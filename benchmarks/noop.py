@@ -9,8 +9,8 @@ import sys
 from celery import Celery
 from celery.platforms import set_pdeathsig
 
-from shared.runtime.app import create_app
-from shared.runtime.queue import redis_client
+from marey.runtime.app import create_app
+from marey.runtime.queue import redis_client
 
 QUEUE = "noop"
 COUNTER = "noop-done"

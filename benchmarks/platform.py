@@ -14,10 +14,10 @@ from pathlib import Path
 
 import psutil
 
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.jobs import create_key, transaction
-from shared.settings import Settings
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.jobs import create_key, transaction
+from marey.settings import Settings
 from tests.chaos.driver import Cluster
 from tests.servers.ports import free_ports
 from tests.support.live_api import write_bundle
@@ -103,7 +103,7 @@ def platform(**environment: str) -> Iterator[Platform]:
 
 def marey(*arguments: str) -> list[str]:
     """The command line of `marey`."""
-    return [sys.executable, "-m", "services.cli", *arguments]
+    return [sys.executable, "-m", "marey.cli", *arguments]
 
 
 def processor_seconds(process: psutil.Process) -> float:

@@ -25,11 +25,11 @@ from cryptography.fernet import Fernet
 
 from benchmarks.platform import BUNDLE, Platform, platform
 from benchmarks.trend import Trend, fit
-from services.cli.client import Client
-from services.cli.fetching import download_all, plan
-from shared.errors import Conflict, MareyError
-from shared.jobs import collect_garbage, transaction
-from shared.storage import open_store
+from marey.cli.client import Client
+from marey.cli.fetching import download_all, plan
+from marey.errors import Conflict, MareyError
+from marey.jobs import collect_garbage, transaction
+from marey.storage import open_store
 from tests.servers.receiver import Receiver
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "15"))

@@ -2,12 +2,13 @@
 
 `database_url` a migrated database of the test's own · `engine` its engine · `queue_url` an empty Valkey ·
 `folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start
-(and kill) servers of their own with `shared.runtime.embedded`.
+(and kill) servers of their own with `marey.runtime.embedded`.
 """
 
 from __future__ import annotations
 
 import itertools
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -18,13 +19,16 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import create_engine, upgrade
-from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
-from shared.runtime.queue import redis_client
-from shared.storage import FolderStore
-from shared.storage.s3 import S3Store
+from marey.jobs import create_engine, upgrade
+from marey.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from marey.runtime.queue import redis_client
+from marey.storage import FolderStore
+from marey.storage.s3 import S3Store
 from tests.servers.given import GivenServer, given_server
 from tests.servers.swift import Swift
+
+os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[1])
+"""Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
 
 TEMPLATE = "migrated"
 _numbers = itertools.count()

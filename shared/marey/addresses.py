@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address, ip_network
 
-from shared.errors import InvalidInput
-from shared.special_addresses import purpose_of
+from marey.errors import InvalidInput
+from marey.special_addresses import purpose_of
 
 Address = IPv4Address | IPv6Address
 

@@ -1,5 +1,5 @@
 """Reading arrays that this process did not write: npy, npz and safetensors. Pickles are never loaded; kinds, shapes,
-sizes and finite numbers are checked, and whatever is wrong is an error of `shared.errors`."""
+sizes and finite numbers are checked, and whatever is wrong is an error of `marey.errors`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.documents import read_bytes
-from shared.errors import InvalidFile, MareyError, NotFound, TooLarge
+from marey.documents import read_bytes
+from marey.errors import InvalidFile, MareyError, NotFound, TooLarge
 
 MAX_UNPACKED = 2**30
 """Bytes of the arrays of an npz file that is read whole."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Any, TextIO, cast
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 LINES = "\n\t"
 """Control characters of text of several lines, such as comments."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from typing import Any, Self, TypeVar, cast, get_type_hints
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 T = TypeVar("T")
 

@@ -1,5 +1,5 @@
 """Reading files and JSON that this process did not write: sizes, nesting and kinds are checked, and whatever is wrong
-is an error of `shared.errors`. Standard library only: the small client imports it."""
+is an error of `marey.errors`. Standard library only: the small client imports it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import stat
 from pathlib import Path
 from typing import Any, cast
 
-from shared.errors import InvalidFile, NotFound
+from marey.errors import InvalidFile, NotFound
 
 MAX_DEPTH = 64
 """Levels of nesting. Our own documents have ten; the recursive code behind a parser takes a thousand."""

@@ -7,13 +7,13 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from shared.bundles import Bundle, choose_bundle, choose_evaluator, named_by
-from shared.bundles.choose import unlike
-from shared.bundles.reference import reference_prompts
-from shared.errors import InvalidInput
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.items import MAX_ITEMS, MAX_PROBLEMS, MAX_SEED, InvalidItems, Item, Problem
-from shared.jobs import (
+from marey.bundles import Bundle, choose_bundle, choose_evaluator, named_by
+from marey.bundles.choose import unlike
+from marey.bundles.reference import reference_prompts
+from marey.errors import InvalidInput
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.items import MAX_ITEMS, MAX_PROBLEMS, MAX_SEED, InvalidItems, Item, Problem
+from marey.jobs import (
     EVALUATOR_QUEUE,
     NO_TEXT,
     PRIORITY_LIMIT,
@@ -23,8 +23,8 @@ from shared.jobs import (
     NewItem,
     NewJob,
 )
-from shared.offers import Offer, new_items, offer_of
-from shared.settings import Settings
+from marey.offers import Offer, new_items, offer_of
+from marey.settings import Settings
 
 BACKGROUND = -PRIORITY_LIMIT
 """Priority of the jobs of evaluations: whatever a person waits for goes first."""

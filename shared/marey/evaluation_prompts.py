@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from shared.characters import WHITESPACE, check_text
-from shared.errors import InvalidInput, TooLarge
-from shared.expected import read_expected
-from shared.items import CHECKS, Problem, checked, read_fields
+from marey.characters import WHITESPACE, check_text
+from marey.errors import InvalidInput, TooLarge
+from marey.expected import read_expected
+from marey.items import CHECKS, Problem, checked, read_fields
 
 COLUMNS = ("prompt", "seconds", "expected")
 PromptCheck = Callable[[Mapping[str, Any], int | None], Iterable[Problem]]
@@ -25,7 +25,7 @@ MAX_PROMPTS = 10_000
 
 @dataclass(frozen=True)
 class EvaluationPrompt:
-    """One prompt; `expected` is a text that `shared.expected` reads, None = nothing is checked."""
+    """One prompt; `expected` is a text that `marey.expected` reads, None = nothing is checked."""
 
     prompt: str
     seconds: float | None = None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 TURN = "turn"
 TRAVELS = ("walk", "run", "walk_back")

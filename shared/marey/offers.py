@@ -8,14 +8,14 @@ import secrets
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from shared.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
-from shared.bundles.find import log_broken
-from shared.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
-from shared.errors import InvalidBundle, MareyError
-from shared.items import MAX_SEED, Item
-from shared.jobs import NewItem
-from shared.settings import Settings
-from shared.text.keys import as_served, feature_key, resolve
+from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
+from marey.bundles.find import log_broken
+from marey.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
+from marey.errors import InvalidBundle, MareyError
+from marey.items import MAX_SEED, Item
+from marey.jobs import NewItem
+from marey.settings import Settings
+from marey.text.keys import as_served, feature_key, resolve
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 ORIGIN = re.compile(r"(https?)://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::([0-9]{1,5}))?")
 PORTS = {"http": 80, "https": 443}

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OPEN_TO_OTHERS = 0o077

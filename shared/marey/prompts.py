@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import unicodedata
 
-from shared.characters import STORED, WHITESPACE, check_text
-from shared.errors import InvalidInput
+from marey.characters import STORED, WHITESPACE, check_text
+from marey.errors import InvalidInput
 
 MAX_WORDS = 200
 """Whitespace words. A detailed caption has 30 to 60; the encoders see at most 128 to 512 sub-words."""

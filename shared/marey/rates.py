@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 CLASSES = ("read", "submit", "operate", "parse")
 """What a request does: look, make something, steer it; `parse` reads prompts, which costs a processor."""

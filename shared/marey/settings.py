@@ -28,12 +28,12 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from shared.addresses import Allowed
-from shared.errors import InvalidInput
-from shared.origins import check_origins
-from shared.rates import check_rates
+from marey.addresses import Allowed
+from marey.errors import InvalidInput
+from marey.origins import check_origins
+from marey.rates import check_rates
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+REPOSITORY = Path(__file__).resolve().parents[2]
 PREFIX = "MAREY_"
 BY_FILE = (
     *("database_url", "listen_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
@@ -169,7 +169,7 @@ class Settings(BaseSettings):
     body_pause_seconds: Seconds = 20.0
     """It may be slower than 4 KiB a second for this long in all."""
     rates: Annotated[dict[str, str], NoDecode, BeforeValidator(_of_json)] = {}
-    """Requests that a key may make, by class (`shared.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
+    """Requests that a key may make, by class (`marey.rates`): `{"read": "6000/minute", "submit": "600/minute"}`. What
     is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
 
     sockets_per_tenant: int = Field(default=100, ge=1, le=100_000)

@@ -9,7 +9,7 @@ from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from typing import BinaryIO, Self, cast
 
-from shared.errors import Unreachable
+from marey.errors import Unreachable
 
 IN_MEMORY = 2**20
 """Bytes that are kept in memory; more go into a file, which has no name and ends with the process at the latest."""

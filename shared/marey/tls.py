@@ -5,7 +5,7 @@ from __future__ import annotations
 import ssl
 from pathlib import Path
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 VARIABLE = "MAREY_CA_FILE"
 UNTRUSTED_HINT = f"If it belongs to a private certificate authority, set {VARIABLE} to that authority's PEM file."

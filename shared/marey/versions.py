@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shared.errors import Conflict
+from marey.errors import Conflict
 
 POSTGRES = 15
 REDIS = (7, 0)

@@ -19,11 +19,11 @@ PROMPTS = "prompt,seconds,expected\n" + "".join(f"a person walks {n} steps,1.5,w
 @pytest.fixture(scope="module")
 def judged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
     """A server with a small trained evaluator beside its models."""
-    from workers.evaluator.assembly import assemble
-    from workers.evaluator.config import TINY as SMALL
-    from workers.evaluator.train import train_stage
-    from workers.training.budget import Budget
-    from workers.training.staging import TrainOptions
+    from marey.evaluator.assembly import assemble
+    from marey.evaluator.config import TINY as SMALL
+    from marey.evaluator.train import train_stage
+    from marey.training.budget import Budget
+    from marey.training.staging import TrainOptions
 
     folder = tmp_path_factory.mktemp("judged")
     models = tiny_models(folder / "models")

@@ -12,9 +12,9 @@ from uuid import uuid4
 
 import pytest
 
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.errors import NotFound, Unauthenticated
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.errors import NotFound, Unauthenticated
 from tests.servers.ports import free_ports
 from tests.support.marey import Marey, Serving
 

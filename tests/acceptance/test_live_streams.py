@@ -13,10 +13,10 @@ import pytest
 import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
-from shared.jobs import create_engine, stream_acts
-from shared.motion.bvh import read_bvh
-from shared.streams.acts import Begun
-from shared.streams.frames import Frame, decode_frame
+from marey.jobs import create_engine, stream_acts
+from marey.motion.bvh import read_bvh
+from marey.streams.acts import Begun
+from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, serving, socket_of
 
 PATIENCE = 90.0

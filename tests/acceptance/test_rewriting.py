@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from shared.motion.clip import load_npz
+from marey.motion.clip import load_npz
 from tests.support.language_model import Answer, Asked, LanguageModel
 from tests.support.marey import Marey, serving
 

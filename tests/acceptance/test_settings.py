@@ -71,7 +71,7 @@ def test_doctor_says_what_to_do_with_a_home_that_cannot_be_written(offline: Mare
 
 def test_an_interrupted_demo_ends_like_any_command(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
-    command = [sys.executable, "-m", "services.cli.demo"]
+    command = [sys.executable, "-m", "marey.cli.demo"]
     demo = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
     log = tmp_path / "out" / "demo" / ".home" / "serve.log"
     while not log.exists():

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marey.training.data.pack import JointsPack, PackClip
 from tests.support.bodies import walker
 from tests.support.marey import Marey
-from workers.training.data.pack import JointsPack, PackClip
 
 
 @pytest.fixture

@@ -15,11 +15,11 @@ import psutil
 import redis
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import create_engine, transaction, upgrade
-from shared.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
-from shared.runtime.queue import SOCKET_SCHEME, redis_client
-from shared.runtime.status import read_status
+from marey.errors import Unreachable
+from marey.jobs import create_engine, transaction, upgrade
+from marey.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from marey.runtime.queue import SOCKET_SCHEME, redis_client
+from marey.runtime.status import read_status
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.toy import QUEUE, REFERENCE
 

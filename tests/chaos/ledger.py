@@ -10,8 +10,8 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from shared.jobs import schema
-from shared.jobs.states import RETRYABLE, TRANSITIONS, Cause, ItemState
+from marey.jobs import schema
+from marey.jobs.states import RETRYABLE, TRANSITIONS, Cause, ItemState
 
 OPEN = {ItemState.READY, ItemState.LEASED}
 

@@ -8,8 +8,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
-from shared.jobs import ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, Done, Export, Outcome
+from marey.jobs import ClaimedItem
+from marey.runtime.handler import Batch, BatchControl, Done, Export, Outcome
 from tests.support.toy import ToyHandler
 
 QUEUE = "text,hgm3"

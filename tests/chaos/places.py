@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from shared.storage import FolderStore
-from shared.storage.port import AssetStore
+from marey.storage import FolderStore
+from marey.storage.port import AssetStore
 from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 

@@ -10,17 +10,17 @@ import sys
 
 from celery.platforms import set_pdeathsig
 
-from services.scheduler.main import scheduler_main
-from shared.runtime.handler import Role
-from shared.runtime.worker import worker_main
-from shared.settings import settings
+from marey.runtime.handler import Role
+from marey.runtime.worker import worker_main
+from marey.scheduler.main import scheduler_main
+from marey.settings import settings
 
 
 def main(what: str, *arguments: str) -> int:
     """Run until told to stop."""
     set_pdeathsig("SIGKILL")
     if what == "api":
-        from services.api.app import serve  # a worker does without
+        from marey.api.app import serve  # a worker does without
 
         serve()
         return 0

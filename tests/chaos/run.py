@@ -19,12 +19,12 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import Quotas, cancel, collect_garbage, create_key, create_tenant, transaction
-from shared.jobs.schema import item, job, lease
-from shared.jobs.states import OPEN
-from shared.jobs.types import DEFAULT_TENANT
-from shared.runtime.faults import patiently
+from marey.errors import Unreachable
+from marey.jobs import Quotas, cancel, collect_garbage, create_key, create_tenant, transaction
+from marey.jobs.schema import item, job, lease
+from marey.jobs.states import OPEN
+from marey.jobs.types import DEFAULT_TENANT
+from marey.runtime.faults import patiently
 from tests.chaos import ledger
 from tests.chaos.driver import Cluster
 from tests.chaos.faults import LIMIT, PATIENCE, SINCE_FAULT, Breaker, meanwhile, recoveries

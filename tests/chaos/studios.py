@@ -14,7 +14,7 @@ from uuid import uuid4
 
 import httpx2
 
-from shared.jobs.states import ENDED
+from marey.jobs.states import ENDED
 from tests.chaos.model import FILE_BYTES
 
 BROKEN = ("refuse", "once", "bug", "bad-export", "refused-export")

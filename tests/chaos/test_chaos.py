@@ -11,9 +11,9 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import collect_garbage, transaction
-from shared.jobs.schema import item, lease
-from shared.storage.port import AssetStore
+from marey.jobs import collect_garbage, transaction
+from marey.jobs.schema import item, lease
+from marey.storage.port import AssetStore
 from tests.chaos.driver import Cluster
 from tests.chaos.places import S3, Folder
 from tests.servers.swift import Swift

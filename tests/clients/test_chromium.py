@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.motion.player import html_player
+from marey.motion.player import html_player
 from tests.support import chromium
 from tests.support.walker import walker
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.motion.skeleton import HUMANML3D
+from marey.motion.skeleton import HUMANML3D
 from tests.support import chromium
 from tests.support.tab import Tab, open_tab
 from tests.support.walker import walker

@@ -10,14 +10,14 @@ from typing import cast
 import numpy as np
 import pytest
 
-from shared.measures.comparing import OBEYED, RETRIEVED
+from marey.evaluator.port import Evaluator
+from marey.evaluator.report import Change, HeatCell, Report, Value, to_html
+from marey.evaluator.scoring import metrics_of
+from marey.measures.comparing import OBEYED, RETRIEVED
 from tests.support import chromium
 from tests.support.reports import sample_report
 from tests.support.tab import Tab, open_tab
 from tests.support.walker import walker
-from workers.evaluator.port import Evaluator
-from workers.evaluator.report import Change, HeatCell, Report, Value, to_html
-from workers.evaluator.scoring import metrics_of
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from shared.jobs import create_engine, upgrade
-from shared.runtime.embedded import start_postgres
-from shared.runtime.embedded.postgres import _postgres
+from marey.jobs import create_engine, upgrade
+from marey.runtime.embedded import start_postgres
+from marey.runtime.embedded.postgres import _postgres
 from tests.contracts.motions import BUNDLES, motion, processor
 from tests.contracts.story import events
 from tests.contracts.surfaces import SURFACES, database

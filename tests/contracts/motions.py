@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from shared.bundles import Bundle
-from shared.settings import Settings
+from marey.bundles import Bundle
+from marey.settings import Settings
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 BUNDLES = ("hgm3-starter", "mogo-starter")
@@ -27,8 +27,8 @@ def processor() -> str:
 
 def motion(name: str) -> dict[str, Any]:
     """Tokens of one motion, and the hash of its npz and BVH files."""
-    from services.cli.roles.oneshot import OneShot, Wanted
-    from shared.motion.bvh import format_bvh
+    from marey.cli.roles.oneshot import OneShot, Wanted
+    from marey.motion.bvh import format_bvh
 
     torch.set_num_threads(1)
     studio = OneShot(Bundle.open(MODELS / name), Settings(device="cpu", threads=1))

@@ -9,8 +9,8 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
-from services.api.jobs.events import message
-from shared.jobs import (
+from marey.api.jobs.events import message
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationState,
     EventKind,
@@ -37,8 +37,8 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.outbox import tell_of_evaluation, tell_of_stream
-from shared.webhooks.message import headers_of, message_of
+from marey.jobs.outbox import tell_of_evaluation, tell_of_stream
+from marey.webhooks.message import headers_of, message_of
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
 from tests.support.webhooks import SECRET, new_webhook
 

@@ -17,8 +17,8 @@ from typing import Any
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
 DEFINE_ERRORS = (
-    *("services.cli.text_files", "shared.items", "shared.jobs.errors", "shared.runtime.embedded.server"),
-    *("shared.runtime.faults", "shared.streams.redis", "shared.text.rewriters"),
+    *("marey.cli.text_files", "marey.items", "marey.jobs.errors", "marey.runtime.embedded.server"),
+    *("marey.runtime.faults", "marey.streams.redis", "marey.text.rewriters"),
 )
 """Modules that add to the tree of errors."""
 WORDS = frozenset({"description", "summary", "title", "examples", "example"})
@@ -36,8 +36,8 @@ def sources() -> Iterator[tuple[Path, ast.Module]]:
 
 def http_api() -> Any:
     """The OpenAPI document without its words."""
-    from services.api.app import create_app
-    from shared.settings import Settings
+    from marey.api.app import create_app
+    from marey.settings import Settings
 
     document = create_app(Settings()).openapi()
     return _without_words({name: document[name] for name in ("paths", "components")})
@@ -56,7 +56,7 @@ def _without_words(value: Any, *, names: bool = False) -> Any:
 
 def errors() -> Any:
     """Every error type of the product: its problem type, HTTP status and exit code."""
-    from shared import errors as tree
+    from marey import errors as tree
 
     for module in DEFINE_ERRORS:
         importlib.import_module(module)
@@ -77,7 +77,7 @@ def command_line() -> Any:
     """Every command with its arguments and options: names, kind, whether required or repeatable, default."""
     import typer
 
-    from services.cli.main import app
+    from marey.cli.main import app
 
     return _command(typer.main.get_command(app))
 
@@ -119,7 +119,7 @@ def _default(value: Any) -> Any:
 
 def settings() -> Any:
     """Every environment variable with its kind and default."""
-    from shared.settings import Settings
+    from marey.settings import Settings
 
     found = {f"MAREY_{name.upper()}": _setting(field) for name, field in Settings.model_fields.items()}
     read = re.compile(r"\"(MAREY_[A-Z0-9_]+)\"")
@@ -139,7 +139,7 @@ def _setting(field: Any) -> Any:
 
 def metrics() -> Any:
     """Every Prometheus metric: kind, labels, buckets, and which processes show it."""
-    from shared import metrics as declared
+    from marey import metrics as declared
 
     found: dict[str, Any] = {}
     for part, registry in sorted(declared.PARTS.items()):
@@ -190,12 +190,12 @@ def _pattern(node: ast.expr) -> str:
 
 def queue() -> Any:
     """Names on Redis and in Celery: other releases and other processes use the same."""
-    from services.api import rates
-    from shared.jobs import EVENT_CHANNEL, TEXT_QUEUE
-    from shared.jobs.database import QUEUE_CHANNEL
-    from shared.runtime.app import DRAIN, create_app
-    from shared.streams.bell import KEY
-    from shared.streams.redis import stream_key
+    from marey.api import rates
+    from marey.jobs import EVENT_CHANNEL, TEXT_QUEUE
+    from marey.jobs.database import QUEUE_CHANNEL
+    from marey.runtime.app import DRAIN, create_app
+    from marey.streams.bell import KEY
+    from marey.streams.redis import stream_key
 
     app = create_app("redis://127.0.0.1:6379/0")
     return {
@@ -214,15 +214,15 @@ def queue() -> Any:
 
 def files() -> Any:
     """Keys of the files that the product writes."""
-    from services.cli.manifest import COLUMNS
-    from shared.bundles.manifest import BundleManifest, TextSpec
-    from shared.items import FIELDS
-    from shared.motion.clip import KEYS
-    from shared.streams.frames import HEADER, MAGIC, VERSION
-    from workers.evaluator.report import Report
-    from workers.training.checkpoint import TrainingState
-    from workers.training.data import manifest as prepared
-    from workers.training.parts import Part
+    from marey.bundles.manifest import BundleManifest, TextSpec
+    from marey.cli.manifest import COLUMNS
+    from marey.evaluator.report import Report
+    from marey.items import FIELDS
+    from marey.motion.clip import KEYS
+    from marey.streams.frames import HEADER, MAGIC, VERSION
+    from marey.training.checkpoint import TrainingState
+    from marey.training.data import manifest as prepared
+    from marey.training.parts import Part
 
     def fields(cls: Any) -> list[str]:
         names = cls.model_fields if hasattr(cls, "model_fields") else [field.name for field in dataclasses.fields(cls)]
@@ -252,7 +252,7 @@ def bundle_tensors() -> Any:
 
     from safetensors import safe_open
 
-    from shared.bundles import Bundle
+    from marey.bundles import Bundle
 
     found: dict[str, Any] = {}
     for manifest in sorted((REPOSITORY / "models").glob("*/manifest.json")):

@@ -16,9 +16,9 @@ import httpx2
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import NotFound
-from shared.jobs import WorkerBeat, beat, beat_scheduler, retire, transaction
-from shared.spool import IN_MEMORY
+from marey.errors import NotFound
+from marey.jobs import WorkerBeat, beat, beat_scheduler, retire, transaction
+from marey.spool import IN_MEMORY
 from tests.support.live_api import BUNDLE, LiveApi, wait_until
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
@@ -451,4 +451,4 @@ def test_the_openapi_document_is_the_one_checked_in(http: httpx2.Client) -> None
     assert found["openapi"].startswith("3.1")
     checked_in = Path("docs/openapi.json").read_text(encoding="utf-8")
     made = json.dumps(found, indent=1, ensure_ascii=False) + "\n"
-    assert made == checked_in, "make it anew: python -m services.api docs/openapi.json"
+    assert made == checked_in, "make it anew: python -m marey.api docs/openapi.json"

@@ -10,10 +10,10 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from services.cli.client import Client
-from services.cli.watching import watch_job
-from shared.errors import Busy
-from shared.runtime.embedded import EmbeddedServer
+from marey.cli.client import Client
+from marey.cli.watching import watch_job
+from marey.errors import Busy
+from marey.runtime.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of, wait_until
 
 REQUESTS = 80

@@ -11,8 +11,8 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from shared.jobs import WorkerBeat, beat, retire, transaction
-from shared.runtime.embedded import EmbeddedServer
+from marey.jobs import WorkerBeat, beat, retire, transaction
+from marey.runtime.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR, JUDGE
 from tests.support.live_evaluations import Studio, studio
 

@@ -9,9 +9,9 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from services.api.app import create_app
-from shared.runtime.embedded import EmbeddedServer
-from shared.settings import Settings
+from marey.api.app import create_app
+from marey.runtime.embedded import EmbeddedServer
+from marey.settings import Settings
 from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_generator
 from tests.support.live_api import running_api, settings_of
 

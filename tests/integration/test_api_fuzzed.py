@@ -17,10 +17,10 @@ from hypothesis import HealthCheck, Phase, settings
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import response_schema_conformance
 
-from services.api.app import create_app
-from shared.jobs import create_key, create_tenant, transaction
-from shared.runtime.embedded import EmbeddedServer
-from shared.settings import Settings
+from marey.api.app import create_app
+from marey.jobs import create_key, create_tenant, transaction
+from marey.runtime.embedded import EmbeddedServer
+from marey.settings import Settings
 from tests.support.auth_states import Knock, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import add_mogo

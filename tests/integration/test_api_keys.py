@@ -10,9 +10,9 @@ import httpx2
 import pytest
 from fastapi.routing import APIRoute
 
-from services.api.app import ROUTERS, create_app
-from services.api.docs.routes import FILES
-from shared.settings import Settings
+from marey.api.app import ROUTERS, create_app
+from marey.api.docs.routes import FILES
+from marey.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi
 

@@ -11,13 +11,13 @@ import httpx2
 import pytest
 from fastapi import FastAPI
 
-from services.api.app import create_app
-from services.cli.client import Client
-from services.cli.place import Server
-from services.http.body_room import BodyRoom
-from shared.jobs import create_engine, create_key, transaction
-from shared.runtime.embedded import EmbeddedServer
-from shared.spool import IN_MEMORY
+from marey.api.app import create_app
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.http.body_room import BodyRoom
+from marey.jobs import create_engine, create_key, transaction
+from marey.runtime.embedded import EmbeddedServer
+from marey.spool import IN_MEMORY
 from tests.support.live_api import ApiThread, settings_of, wait_until
 from tests.support.raw_http import RawClient
 

@@ -12,12 +12,12 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from services.cli.fetching import ATTEMPTS, Download, download_all
-from shared.errors import Unreachable
-from shared.hashing import sha256_of
-from shared.jobs import DEFAULT_TENANT, asset_key, create_engine, create_key, transaction
-from shared.storage import open_store
-from shared.storage.s3 import S3Store
+from marey.cli.fetching import ATTEMPTS, Download, download_all
+from marey.errors import Unreachable
+from marey.hashing import sha256_of
+from marey.jobs import DEFAULT_TENANT, asset_key, create_engine, create_key, transaction
+from marey.storage import open_store
+from marey.storage.s3 import S3Store
 from tests.support.live_api import ApiThread, LiveApi, settings_of
 
 

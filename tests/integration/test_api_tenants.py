@@ -16,8 +16,8 @@ import pytest
 from fastapi.routing import APIRoute, APIWebSocketRoute
 from websockets.exceptions import ConnectionClosed
 
-from services.api.app import ROUTERS
-from shared.jobs import (
+from marey.api.app import ROUTERS
+from marey.jobs import (
     Quotas,
     authenticate,
     create_tenant,
@@ -27,7 +27,7 @@ from shared.jobs import (
     suspend_tenant,
     transaction,
 )
-from shared.runtime.embedded import EmbeddedServer
+from marey.runtime.embedded import EmbeddedServer
 from tests.support.auth_states import ENDINGS, end_key
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR

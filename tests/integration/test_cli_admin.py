@@ -11,9 +11,9 @@ import pytest
 import sqlalchemy as sa
 from typer.testing import _NamedTextIOWrapper
 
-from shared.errors import Unauthenticated
-from shared.jobs import authenticate, transaction
-from shared.settings import settings
+from marey.errors import Unauthenticated
+from marey.jobs import authenticate, transaction
+from marey.settings import settings
 from tests.servers.jobs import submit_items
 from tests.support.command import Command
 from tests.support.marey import Ran

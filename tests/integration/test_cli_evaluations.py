@@ -15,8 +15,8 @@ from uuid import uuid4
 import pytest
 from typer.testing import CliRunner
 
-from services.cli.main import app
-from shared.runtime.embedded import EmbeddedServer
+from marey.cli.main import app
+from marey.runtime.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
 from tests.support.marey import COMMAND, REPOSITORY, Ran

@@ -12,8 +12,8 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs import (
+from marey.errors import InvalidInput
+from marey.jobs import (
     DEFAULT_TENANT,
     Actor,
     EventKind,
@@ -34,7 +34,7 @@ from shared.jobs import (
     send_test,
     transaction,
 )
-from shared.jobs import ids as ids_module
+from marey.jobs import ids as ids_module
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation
 from tests.support.schedules import new_schedule
@@ -55,7 +55,7 @@ def older_id() -> UUID:
 def clock_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every module makes such ids."""
     for name in ("submit", "streams", "webhooks", "schedules", "deliveries", "audit", "keys", "results", "outbox"):
-        module = importlib.import_module(f"shared.jobs.{name}")
+        module = importlib.import_module(f"marey.jobs.{name}")
         assert module.new_id is ids_module.new_id
         monkeypatch.setattr(module, "new_id", older_id)
 

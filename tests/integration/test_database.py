@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import Listener, create_engine, get_job, sweep, transaction, upgrade
-from shared.jobs.database import EVENT_CHANNEL
-from shared.jobs.deadlines import ORDINARY
-from shared.runtime.embedded import start_postgres
+from marey.errors import Unreachable
+from marey.jobs import Listener, create_engine, get_job, sweep, transaction, upgrade
+from marey.jobs.database import EVENT_CHANNEL
+from marey.jobs.deadlines import ORDINARY
+from marey.runtime.embedded import start_postgres
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 

@@ -11,11 +11,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from pydantic import SecretStr
 
-from services.api.text_client import MAX_ANSWER, TextService
-from services.http.problems import problem_response
-from services.text.routes import ParseBody
-from shared.errors import Unreachable
-from shared.settings import Settings
+from marey.api.text_client import MAX_ANSWER, TextService
+from marey.errors import Unreachable
+from marey.http.problems import problem_response
+from marey.settings import Settings
+from marey.text_service.routes import ParseBody
 
 JSON, PROBLEM = "application/json", "application/problem+json"
 BODY = ParseBody(prompts=["a person walks"], model="hgm3")

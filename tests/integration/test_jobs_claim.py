@@ -11,7 +11,7 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     JobState,
     Policy,
     WorkerBeat,
@@ -34,7 +34,7 @@ from shared.jobs import (
     transaction,
     waiting_batches,
 )
-from shared.jobs.lease_types import Claim, ItemFailure
+from marey.jobs.lease_types import Claim, ItemFailure
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

@@ -8,8 +8,8 @@ import threading
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import (
+from marey.errors import Unreachable
+from marey.jobs import (
     GarbageReport,
     Policy,
     asset_key,
@@ -24,8 +24,8 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.lease_types import Claim, NewMotion
-from shared.storage import AssetStore, FolderStore
+from marey.jobs.lease_types import Claim, NewMotion
+from marey.storage import AssetStore, FolderStore
 from tests.servers.jobs import claim_some, let_expire, motion_of, parse_texts, submit_items
 
 HOUR_AGO = sa.text("UPDATE asset SET announced_at = now() - interval '61 minutes'")

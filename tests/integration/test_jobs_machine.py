@@ -19,8 +19,8 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from shared.errors import Conflict, NotFound, QuotaUsedUp
-from shared.jobs import (
+from marey.errors import Conflict, NotFound, QuotaUsedUp
+from marey.jobs import (
     Claim,
     Committed,
     ItemFailure,

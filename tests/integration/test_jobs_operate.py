@@ -8,8 +8,8 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import Conflict, InvalidInput, NotFound
+from marey.jobs import (
     ItemFailure,
     ItemState,
     JobControl,
@@ -32,7 +32,7 @@ from shared.jobs import (
     set_priority,
     transaction,
 )
-from shared.jobs.types import Page
+from marey.jobs.types import Page
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, parse_texts, submit_items
 

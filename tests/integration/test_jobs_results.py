@@ -10,7 +10,7 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     Claim,
     Committed,
     ItemFailure,
@@ -31,7 +31,7 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.database import EVENT_CHANNEL
+from marey.jobs.database import EVENT_CHANNEL
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

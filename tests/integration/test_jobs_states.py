@@ -9,10 +9,10 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from shared.jobs import JobControl, schema, transaction
-from shared.jobs.ids import new_id
-from shared.jobs.journal import LockedJob
-from shared.jobs.states import ItemState, allowed, job_state
+from marey.jobs import JobControl, schema, transaction
+from marey.jobs.ids import new_id
+from marey.jobs.journal import LockedJob
+from marey.jobs.states import ItemState, allowed, job_state
 from tests.servers.jobs import claim_some, parse_texts, submit_items
 
 # A way to each state, by allowed steps.

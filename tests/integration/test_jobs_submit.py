@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs import (
+from marey.errors import InvalidInput
+from marey.jobs import (
     IdempotencyMismatch,
     JobState,
     Listener,
@@ -26,7 +26,7 @@ from shared.jobs import (
     transaction,
     waiting_batches,
 )
-from shared.jobs.database import QUEUE_CHANNEL
+from marey.jobs.database import QUEUE_CHANNEL
 from tests.servers.audit import audit
 from tests.servers.jobs import new_item, parse_texts, submit_items
 

@@ -7,8 +7,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, NotFound
-from shared.jobs import (
+from marey.errors import Conflict, NotFound
+from marey.jobs import (
     ItemFailure,
     JobRow,
     JobState,

@@ -8,8 +8,8 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
-from shared.jobs import (
+from marey.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
+from marey.jobs import (
     SCOPES,
     authenticate,
     check_key,

@@ -15,7 +15,8 @@ import redis
 import sqlalchemy as sa
 import torch
 
-from shared.jobs import (
+from marey.generating.handler import GeneratorHandler
+from marey.jobs import (
     StreamPrompt,
     StreamState,
     get_job,
@@ -25,26 +26,25 @@ from shared.jobs import (
     told_prompts,
     transaction,
 )
-from shared.jobs.states import STREAM_TRANSITIONS, ItemState
-from shared.runtime.live import keeper
-from shared.runtime.live.held import Held
-from shared.runtime.live.port import LiveFrame
-from shared.runtime.queue import redis_client
-from shared.settings import Settings as Configuration
-from shared.storage import FolderStore
-from shared.streams.acts import Begun
-from shared.streams.bell import Bell
-from shared.streams.control import Control
-from shared.streams.frames import Frame
-from shared.streams.reads import ReadAs
-from shared.streams.redis import LEASE_MS
-from shared.text.features import TextFeatures
+from marey.jobs.states import STREAM_TRANSITIONS, ItemState
+from marey.mogo.bundle import random_bundle
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.runtime.live import keeper
+from marey.runtime.live.held import Held
+from marey.runtime.live.port import LiveFrame
+from marey.runtime.queue import redis_client
+from marey.settings import Settings as Configuration
+from marey.storage import FolderStore
+from marey.streams.acts import Begun
+from marey.streams.bell import Bell
+from marey.streams.control import Control
+from marey.streams.frames import Frame
+from marey.streams.reads import ReadAs
+from marey.streams.redis import LEASE_MS
+from marey.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
 from tests.support.runtime import Loop
-from workers.generating.handler import GeneratorHandler
-from workers.mogo.bundle import random_bundle
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
 
 Start = Callable[..., LiveWorker]
 

@@ -9,8 +9,8 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 
-from shared.errors import Conflict
-from shared.jobs import check_revision, create_engine, downgrade, schema, upgrade
+from marey.errors import Conflict
+from marey.jobs import check_revision, create_engine, downgrade, schema, upgrade
 from tests.servers.jobs import submit_items
 
 

@@ -9,8 +9,8 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Busy, Conflict, InvalidInput, NotFound, QuotaUsedUp
-from shared.jobs import (
+from marey.errors import Busy, Conflict, InvalidInput, NotFound, QuotaUsedUp
+from marey.jobs import (
     Claim,
     NewItem,
     NewJob,
@@ -42,7 +42,7 @@ from shared.jobs import (
     usage,
     waiting_batches,
 )
-from shared.jobs.quotas import EXPECTED_BYTES
+from marey.jobs.quotas import EXPECTED_BYTES
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     claim_some,

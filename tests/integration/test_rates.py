@@ -10,15 +10,15 @@ import httpx2
 import pytest
 import sqlalchemy as sa
 
-from services.api import rates
-from services.api.rates import Rates
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.errors import Busy
-from shared.jobs import ApiKey, create_key, transaction
-from shared.runtime.embedded import start_valkey
-from shared.runtime.queue import redis_client
-from shared.settings import Settings
+from marey.api import rates
+from marey.api.rates import Rates
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.errors import Busy
+from marey.jobs import ApiKey, create_key, transaction
+from marey.runtime.embedded import start_valkey
+from marey.runtime.queue import redis_client
+from marey.settings import Settings
 from tests.support.live_api import ApiThread, settings_of
 
 LIMITS = {"read": "3/day", "submit": "2/day"}

@@ -12,11 +12,11 @@ from pydantic import SecretStr
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
-from services.api import readiness
-from services.api.readiness import Check, Readiness
-from shared.errors import Unreachable
-from shared.runtime.embedded import EmbeddedServer
-from shared.settings import Settings
+from marey.api import readiness
+from marey.api.readiness import Check, Readiness
+from marey.errors import Unreachable
+from marey.runtime.embedded import EmbeddedServer
+from marey.settings import Settings
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of, wait_until
 

@@ -8,8 +8,8 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import InvalidInput, NotFound
+from marey.jobs import (
     DEFAULT_TENANT,
     EventKind,
     NewStream,
@@ -22,7 +22,7 @@ from shared.jobs import (
     send_test,
     transaction,
 )
-from shared.jobs import references as references_module
+from marey.jobs import references as references_module
 from tests.servers.jobs import claim_some, commit_all, new_item, new_tenant, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation
 from tests.support.schedules import new_schedule

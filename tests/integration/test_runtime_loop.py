@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import Policy, cancel, collect_garbage, sweep, transaction
-from shared.jobs.schema import item, motion
-from shared.jobs.types import DEFAULT_TENANT
-from shared.runtime import committer as committer_module
-from shared.runtime import loop as loop_module
-from shared.runtime.handler import Batch, BatchControl, Outcome
-from shared.storage import FolderStore, NewObject
+from marey.errors import Unreachable
+from marey.jobs import Policy, cancel, collect_garbage, sweep, transaction
+from marey.jobs.schema import item, motion
+from marey.jobs.types import DEFAULT_TENANT
+from marey.runtime import committer as committer_module
+from marey.runtime import loop as loop_module
+from marey.runtime.handler import Batch, BatchControl, Outcome
+from marey.storage import FolderStore, NewObject
 from tests.support.runtime import Loop
 from tests.support.toy import FITS, ToyHandler
 from tests.support.toy_jobs import TEXT_KEY, audit, ended, job_row, states, submit_toys

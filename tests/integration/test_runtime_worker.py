@@ -10,14 +10,14 @@ import pytest
 import sqlalchemy as sa
 from pydantic import SecretStr
 
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import list_workers, live_workers, transaction
-from shared.jobs.schema import item, lease
-from shared.runtime.child import import_handler
-from shared.runtime.handler import Role
-from shared.runtime.status import read_status
-from shared.runtime.worker import wait_for_database, worker_main
-from shared.settings import Settings
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import list_workers, live_workers, transaction
+from marey.jobs.schema import item, lease
+from marey.runtime.child import import_handler
+from marey.runtime.handler import Role
+from marey.runtime.status import read_status
+from marey.runtime.worker import wait_for_database, worker_main
+from marey.settings import Settings
 from tests.chaos.driver import Cluster
 from tests.support.toy import QUEUE, REFERENCE, ToyHandler
 from tests.support.toy_jobs import BUNDLE, ended, job_row, submit_toys

@@ -16,12 +16,8 @@ import redis
 import sqlalchemy as sa
 from pydantic import SecretStr
 
-from services.scheduler.main import scheduler_main
-from services.scheduler.parts import EXIT_STALLED, note_progress, watch
-from services.scheduler.periodic import Periodic
-from services.scheduler.relay import Relay, publisher
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import (
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import (
     QUEUE_CHANNEL,
     SchedulerRow,
     WorkerBeat,
@@ -35,10 +31,14 @@ from shared.jobs import (
     retire,
     transaction,
 )
-from shared.jobs.types import DEFAULT_TENANT
-from shared.runtime.app import DRAIN, create_app
-from shared.runtime.queue import redis_client
-from shared.settings import Settings
+from marey.jobs.types import DEFAULT_TENANT
+from marey.runtime.app import DRAIN, create_app
+from marey.runtime.queue import redis_client
+from marey.scheduler.main import scheduler_main
+from marey.scheduler.parts import EXIT_STALLED, note_progress, watch
+from marey.scheduler.periodic import Periodic
+from marey.scheduler.relay import Relay, publisher
+from marey.settings import Settings
 from tests.support.toy import QUEUE
 from tests.support.toy_jobs import job_row, submit_toys
 
@@ -346,7 +346,7 @@ def test_scheduler_returns_lost_leases_and_stops_when_told(
 def run_alone(chosen: Settings, seconds: float, before: str = "pass") -> subprocess.Popen[str]:
     """A scheduler process that exits when a part makes no progress for `seconds`; `before`: what is run in it first."""
     code = (
-        "import services.scheduler.main as main, services.scheduler.parts as parts, shared.settings as settings; "
+        "import marey.scheduler.main as main, marey.scheduler.parts as parts, marey.settings as settings; "
         f"parts.LOOK_SECONDS = {seconds / 4}; parts.STALL_SECONDS = {seconds}; main.BEAT_SECONDS = 0.2; "
         f"import sys, time; {before}; sys.exit(main.scheduler_main(settings.settings()))"
     )

@@ -15,12 +15,12 @@ from urllib.parse import urlsplit
 import pytest
 import urllib3
 
-from shared.disposition import attachment
-from shared.errors import InvalidInput, NotFound, Unreachable
-from shared.jobs import asset_key
-from shared.settings import Settings
-from shared.storage import AssetStore, FolderStore, NewObject, deadlines, open_store
-from shared.storage.s3 import S3Store
+from marey.disposition import attachment
+from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.jobs import asset_key
+from marey.settings import Settings
+from marey.storage import AssetStore, FolderStore, NewObject, deadlines, open_store
+from marey.storage.s3 import S3Store
 from tests.servers.swift import Swift
 
 

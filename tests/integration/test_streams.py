@@ -14,13 +14,13 @@ import redis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shared.errors import Conflict, InvalidInput, Unreachable
-from shared.runtime.embedded import start_valkey
-from shared.runtime.queue import redis_client
-from shared.streams.bell import Bell
-from shared.streams.control import START, Control, ControlQueue
-from shared.streams.frames import Frame, decode_frame
-from shared.streams.redis import LEASE_MS, FrameStream, Gap, Lease, LeaseLost, StoredFrame
+from marey.errors import Conflict, InvalidInput, Unreachable
+from marey.runtime.embedded import start_valkey
+from marey.runtime.queue import redis_client
+from marey.streams.bell import Bell
+from marey.streams.control import START, Control, ControlQueue
+from marey.streams.frames import Frame, decode_frame
+from marey.streams.redis import LEASE_MS, FrameStream, Gap, Lease, LeaseLost, StoredFrame
 
 ACTS = ["write", "renew", "lapse", "release", "take"]
 FOREIGN = [b"\xff\x00", b"[]", b'{"kind": "fly"}', b'{"kind": 3}', b'{"kind": "steer"}', b'{"kind": "stop", "x": 1}']

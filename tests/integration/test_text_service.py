@@ -10,12 +10,12 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from services.text import routes
-from services.text.routes import GraphsView, ParseBody
-from services.text.server import create_text_app
-from shared.jobs import create_engine, create_key, transaction
-from shared.runtime.embedded import EmbeddedServer
-from shared.settings import Settings
+from marey.jobs import create_engine, create_key, transaction
+from marey.runtime.embedded import EmbeddedServer
+from marey.settings import Settings
+from marey.text_service import routes
+from marey.text_service.routes import GraphsView, ParseBody
+from marey.text_service.server import create_text_app
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of, with_text_service
 

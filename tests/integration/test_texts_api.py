@@ -8,11 +8,11 @@ import httpx2
 import numpy as np
 import pytest
 
-from services.text.routes import pipeline_of
-from shared.bundles import BundleWriter, TextSpec
-from shared.jobs import create_engine, create_key, transaction
-from shared.runtime.embedded import EmbeddedServer
-from shared.settings import settings
+from marey.bundles import BundleWriter, TextSpec
+from marey.jobs import create_engine, create_key, transaction
+from marey.runtime.embedded import EmbeddedServer
+from marey.settings import settings
+from marey.text_service.routes import pipeline_of
 from tests.support.live_api import ApiThread, settings_of, with_text_service
 
 PATH = "/v1/texts/parse"

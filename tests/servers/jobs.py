@@ -8,7 +8,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     AssetDigest,
     Claim,
     NewItem,

@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from shared.storage.s3 import S3Options, S3Store
+from marey.storage.s3 import S3Options, S3Store
 from tests.servers.ports import free_ports
 
 ACCOUNT = "AUTH_test"

@@ -9,8 +9,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import authenticate, create_key, create_tenant, revoke_key, schema, suspend_tenant, transaction
-from shared.jobs.keys import SCOPES
+from marey.jobs import authenticate, create_key, create_tenant, revoke_key, schema, suspend_tenant, transaction
+from marey.jobs.keys import SCOPES
 
 ENDINGS = ("revoked", "expired", "suspended")
 HOLDERS = {scope: {scope} if scope == "metrics" else {scope, "admin"} for scope in SCOPES}

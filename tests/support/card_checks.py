@@ -15,25 +15,25 @@ import numpy as np
 import pytest
 import torch
 
+from marey.evaluator.config import TINY as TINY_EVALUATOR
+from marey.evaluator.train import train_stage as train_evaluator
+from marey.generating.port import NoControl, Request
+from marey.hgm3.bundle import random_bundle as random_hgm3
+from marey.hgm3.config import TINY as TINY_HGM3
+from marey.hgm3.generate import Generator as HGM3Generator
+from marey.hgm3.train import train_stage as train_hgm3
+from marey.mogo.bundle import random_bundle as random_mogo
+from marey.mogo.config import TINY, DepthConfig, MOGOConfig
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.streaming import Streams
+from marey.mogo.train import train_stage as train_mogo
+from marey.training.budget import Budget
+from marey.training.staging import TrainOptions
 from tests.support.card import CARD, card, waits
 from tests.support.prepared import text_features, write_prepared
-from workers.evaluator.config import TINY as TINY_EVALUATOR
-from workers.evaluator.train import train_stage as train_evaluator
-from workers.generating.port import NoControl, Request
-from workers.hgm3.bundle import random_bundle as random_hgm3
-from workers.hgm3.config import TINY as TINY_HGM3
-from workers.hgm3.generate import Generator as HGM3Generator
-from workers.hgm3.train import train_stage as train_hgm3
-from workers.mogo.bundle import random_bundle as random_mogo
-from workers.mogo.config import TINY, DepthConfig, MOGOConfig
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.streaming import Streams
-from workers.mogo.train import train_stage as train_mogo
-from workers.training.budget import Budget
-from workers.training.staging import TrainOptions
 
 REQUESTS = [*(Request(text_features(seed), seed, frames=24) for seed in range(3)), Request(text_features(9), 9)]
 

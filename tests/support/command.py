@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from typer.testing import CliRunner
 
-from services.cli.main import app
+from marey.cli.main import app
 from tests.support.marey import Ran
 
 

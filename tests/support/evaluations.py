@@ -14,10 +14,9 @@ from uuid import UUID
 import numpy as np
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.bundles import BundleWriter, TextSpec
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.jobs import (
+from marey.bundles import BundleWriter, TextSpec
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.jobs import (
     DEFAULT_TENANT,
     EVALUATOR_QUEUE,
     TEXT_QUEUE,
@@ -34,10 +33,11 @@ from shared.jobs import (
     store_prompts,
     transaction,
 )
-from shared.measures.scores import SCHEMA, VERSION, MotionScore
-from shared.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
-from shared.runtime.scoring import ScoreInput
-from shared.settings import Settings
+from marey.measures.scores import SCHEMA, VERSION, MotionScore
+from marey.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
+from marey.runtime.scoring import ScoreInput
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
 from tests.support import toy
 from tests.support.runtime import Loop
 

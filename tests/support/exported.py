@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.motion.clip import MotionClip
-from shared.motion.features import HUMANML3D_263
-from shared.motion.finish import finish_motion
-from shared.motion.rotations import from_rotvec
-from shared.motion.skeleton import KIT, SNAPMOGEN, Skeleton
+from marey.motion.clip import MotionClip
+from marey.motion.features import HUMANML3D_263
+from marey.motion.finish import finish_motion
+from marey.motion.rotations import from_rotvec
+from marey.motion.skeleton import KIT, SNAPMOGEN, Skeleton
 from tests.support.walker import walker
 
 

@@ -19,12 +19,11 @@ import uvicorn
 from fastapi import FastAPI
 from pydantic import SecretStr
 
-from services.api.app import create_app, protocol_options
-from services.cli.client import Client
-from services.cli.place import Server
-from services.text.server import create_text_app
-from shared.bundles import BundleWriter, TextSpec
-from shared.jobs import (
+from marey.api.app import create_app, protocol_options
+from marey.bundles import BundleWriter, TextSpec
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.jobs import (
     DEFAULT_TENANT,
     AssetDigest,
     ItemFailure,
@@ -41,8 +40,9 @@ from shared.jobs import (
     fail_items,
     transaction,
 )
-from shared.settings import Settings
-from shared.storage import AssetStore, open_store
+from marey.settings import Settings
+from marey.storage import AssetStore, open_store
+from marey.text_service.server import create_text_app
 from tests.servers.ports import free_ports
 from tests.servers.receiver import LOOPBACK
 from tests.support.webhooks import KEY

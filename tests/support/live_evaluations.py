@@ -11,9 +11,9 @@ from uuid import UUID
 import httpx2
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.jobs import create_key, schema, transaction
-from shared.settings import Settings
+from marey.jobs import create_key, schema, transaction
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
 from tests.support.evaluations import ToyEvaluator, ToyTexts, write_evaluator, write_generator
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.runtime import Loop

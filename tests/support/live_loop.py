@@ -14,8 +14,8 @@ import numpy as np
 import redis
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs import (
+from marey.errors import InvalidInput
+from marey.jobs import (
     NewStream,
     StreamRow,
     WorkerBeat,
@@ -24,14 +24,14 @@ from shared.jobs import (
     get_stream,
     transaction,
 )
-from shared.runtime.live.keeper import QUEUE, Keeper
-from shared.runtime.live.loop import LiveLoop
-from shared.runtime.live.port import Parse, Room
-from shared.streams.control import Control, ControlQueue
-from shared.streams.frames import Frame, decode_frame
-from shared.streams.redis import FrameStream, Gap
-from shared.streams.watch import Watch
-from shared.text.features import TextFeatures
+from marey.runtime.live.keeper import QUEUE, Keeper
+from marey.runtime.live.loop import LiveLoop
+from marey.runtime.live.port import Parse, Room
+from marey.streams.control import Control, ControlQueue
+from marey.streams.frames import Frame, decode_frame
+from marey.streams.redis import FrameStream, Gap
+from marey.streams.watch import Watch
+from marey.text.features import TextFeatures
 from tests.support.prepared import text_features
 
 PATIENCE = 60.0

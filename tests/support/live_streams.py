@@ -17,14 +17,14 @@ import sqlalchemy as sa
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from shared.errors import InvalidInput
-from shared.jobs import StreamChunk, StreamState, add_chunk, end_stream, take_stream, transaction
-from shared.settings import REPOSITORY, Settings
-from shared.streams.control import START, Control, ControlQueue
-from shared.streams.frames import Frame, encode_frame
-from shared.streams.reads import ReadAs
-from shared.streams.redis import FrameStream
-from workers.mogo.bundle import random_bundle
+from marey.errors import InvalidInput
+from marey.jobs import StreamChunk, StreamState, add_chunk, end_stream, take_stream, transaction
+from marey.mogo.bundle import random_bundle
+from marey.settings import REPOSITORY, Settings
+from marey.streams.control import START, Control, ControlQueue
+from marey.streams.frames import Frame, encode_frame
+from marey.streams.reads import ReadAs
+from marey.streams.redis import FrameStream
 
 JOINTS = 22
 BUNDLE = "mogo-paperclip"

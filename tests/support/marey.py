@@ -18,11 +18,12 @@ from typing import Any
 import psutil
 from websockets.sync.client import ClientConnection, connect
 
-from services.cli.client import Client
-from services.cli.place import read_server
+from marey.cli.client import Client
+from marey.cli.place import read_server
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-COMMAND = (sys.executable, "-m", "services.cli")
+MIGRATIONS = REPOSITORY / "migrations" / "marey" / "migrations"
+COMMAND = (sys.executable, "-m", "marey.cli")
 START_SECONDS = 90.0
 TINY = "hgm3-tiny"
 TINY_MOGO = "mogo-tiny"
@@ -157,8 +158,8 @@ def serving(marey: Marey) -> Iterator[Serving]:
 
 def tiny_models(folder: Path) -> Path:
     """A folder of models: HGM³ and MOGO with random weights, and the labeller that comes with the product."""
-    from workers.hgm3 import bundle as hgm3
-    from workers.mogo import bundle as mogo
+    from marey.hgm3 import bundle as hgm3
+    from marey.mogo import bundle as mogo
 
     hgm3.random_bundle(folder / TINY)
     mogo.random_bundle(folder / TINY_MOGO)
@@ -168,8 +169,8 @@ def tiny_models(folder: Path) -> Path:
 
 def _role(process: psutil.Process) -> str:
     command = process.cmdline()
-    if "services.cli" in command:
-        return "live" if command[-2:] == ["--only", "live"] else command[command.index("services.cli") + 1]
+    if "marey.cli" in command:
+        return "live" if command[-2:] == ["--only", "live"] else command[command.index("marey.cli") + 1]
     return process.name()
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.filters import smooth
-from shared.motion.rotations import from_rotvec
-from shared.motion.skeleton import HUMANML3D, Skeleton
+from marey.motion.filters import smooth
+from marey.motion.rotations import from_rotvec
+from marey.motion.skeleton import HUMANML3D, Skeleton
 
 # Standard deviation in radians of the joints that turn any way; the others' twist cannot be seen in positions.
 BALL = {"pelvis": 0.8, "L_hip": 0.6, "R_hip": 0.6, "spine3": 0.3, "L_shoulder": 0.7, "R_shoulder": 0.7, "neck": 0.2}

@@ -10,7 +10,7 @@ import requests
 from schemathesis import Case, Response
 from schemathesis.checks import CheckContext
 
-from services.http.queries import LONGEST_NAME
+from marey.http.queries import LONGEST_NAME
 
 REFUSALS = (400, 409, 413, 415, 422)
 OF_ANY = {"body", "query", "content-type", "content-encoding", "content-length"}

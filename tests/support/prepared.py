@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from shared.bundles import TextSpec
-from shared.hashing import sha256_of
-from shared.motion.features import HUMANML3D_263
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.skeleton import HUMANML3D
-from shared.text.features import TextFeatures
-from shared.text.graph import Edge, Node, SemanticGraph
-from workers.training.data import manifest as names
-from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured
-from workers.training.data.pack import split_root
-from workers.training.texts import CaptionTexts
+from marey.bundles import TextSpec
+from marey.hashing import sha256_of
+from marey.motion.features import HUMANML3D_263
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.skeleton import HUMANML3D
+from marey.text.features import TextFeatures
+from marey.text.graph import Edge, Node, SemanticGraph
+from marey.training.data import manifest as names
+from marey.training.data.manifest import Clip, FileEntry, Manifest, Measured
+from marey.training.data.pack import split_root
+from marey.training.texts import CaptionTexts
 
 WIDTH = 384
 

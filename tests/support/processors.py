@@ -9,7 +9,7 @@ packs_bfloat16 = pytest.mark.skipif(
     not torch.ops.mkldnn._is_mkldnn_bf16_supported(),
     reason="this processor multiplies no packed bfloat16 matrices (AVX-512); the product uses float32 here",
 )
-"""Machines without it never pack in bfloat16: `shared.nn.devices.fast_bf16`."""
+"""Machines without it never pack in bfloat16: `marey.nn.devices.fast_bf16`."""
 
 PACKED_TYPES = [torch.float32, pytest.param(torch.bfloat16, marks=packs_bfloat16)]
 """Types of packed matrices."""

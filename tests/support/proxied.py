@@ -6,11 +6,11 @@ import threading
 import time
 from pathlib import Path
 
-from services.cli.client import Client
-from services.cli.fetching import Download, download_all
-from services.cli.live.link import Link
-from services.cli.place import Server
-from shared.hashing import sha256_of
+from marey.cli.client import Client
+from marey.cli.fetching import Download, download_all
+from marey.cli.live.link import Link
+from marey.cli.place import Server
+from marey.hashing import sha256_of
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import Hand
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shared.motion.clip import MotionClip
-from workers.evaluator.report import (
+from marey.evaluator.report import (
     Baseline,
     Change,
     Exhibit,
@@ -26,6 +25,7 @@ from workers.evaluator.report import (
     Value,
     sentence_of,
 )
+from marey.motion.clip import MotionClip
 
 MONDAY = datetime(2026, 11, 23, 5, 40, tzinfo=UTC)
 NETWORK = "evaluator-starter@5f0c2b7d91ae"

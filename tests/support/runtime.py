@@ -8,13 +8,13 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import Heartbeat as Answer
-from shared.jobs import Policy, heartbeat, transaction
-from shared.runtime.committer import Committer
-from shared.runtime.handler import Handler
-from shared.runtime.lease import Heartbeat
-from shared.runtime.loop import Drain
-from shared.storage import AssetStore
+from marey.jobs import Heartbeat as Answer
+from marey.jobs import Policy, heartbeat, transaction
+from marey.runtime.committer import Committer
+from marey.runtime.handler import Handler
+from marey.runtime.lease import Heartbeat
+from marey.runtime.loop import Drain
+from marey.storage import AssetStore
 
 
 class Loop:

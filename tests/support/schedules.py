@@ -8,7 +8,7 @@ from zoneinfo import ZoneInfo
 
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationRequest,
     EvaluationRow,
@@ -24,7 +24,7 @@ from shared.jobs import (
     store_prompts,
     transaction,
 )
-from shared.jobs.cron import next_time
+from marey.jobs.cron import next_time
 from tests.support.evaluations import GENERATOR, PROMPTS
 
 BERLIN = "Europe/Berlin"

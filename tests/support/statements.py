@@ -16,7 +16,7 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import event
 
-from shared.jobs import (
+from marey.jobs import (
     DEFAULT_TENANT,
     ItemFailure,
     NewStream,
@@ -39,7 +39,7 @@ from shared.jobs import (
     transaction,
     upgrade,
 )
-from shared.runtime.embedded import start_postgres
+from marey.runtime.embedded import start_postgres
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, parse_texts, submit_items
 from tests.support.marey import REPOSITORY
 

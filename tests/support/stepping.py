@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.legs import two_bone_knee
-from shared.motion.pose import solve_pose
-from shared.motion.skeleton import HUMANML3D
+from marey.motion.legs import two_bone_knee
+from marey.motion.pose import solve_pose
+from marey.motion.skeleton import HUMANML3D
 from tests.support.motions import drift
 
 HIPS, KNEES, ANKLES, TOES = [1, 2], [4, 5], [7, 8], [10, 11]

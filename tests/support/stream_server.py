@@ -24,8 +24,8 @@ from websockets.server import ServerProtocol
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
-from shared.motion.skeleton import HUMANML3D
-from shared.streams.frames import Frame, encode_frame
+from marey.motion.skeleton import HUMANML3D
+from marey.streams.frames import Frame, encode_frame
 from tests.support.motions import dancer
 
 KEY = "marey_00000000_key"

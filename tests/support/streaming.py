@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from typer.testing import CliRunner
 
-from services.cli.main import app
-from shared.motion.bvh import read_bvh
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.skeleton import HUMANML3D
+from marey.cli.main import app
+from marey.motion.bvh import read_bvh
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.skeleton import HUMANML3D
 from tests.support.marey import COMMAND, REPOSITORY, Ran
 from tests.support.stream_server import KEY, StreamServer
 

@@ -9,8 +9,8 @@ from typing import Any
 import httpx2
 import sqlalchemy as sa
 
-from shared.jobs import create_key, transaction
-from shared.settings import Settings
+from marey.jobs import create_key, transaction
+from marey.settings import Settings
 from tests.support.live_api import LiveApi, settings_of
 from tests.support.live_streams import PATIENCE, watching
 

@@ -11,9 +11,9 @@ import time
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 
-from shared.errors import InvalidInput, NotFound, Unreachable
-from shared.jobs import ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome, TextDone
+from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.jobs import ClaimedItem
+from marey.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome, TextDone
 
 QUEUE = "toy"
 REFERENCE = "tests.support.toy:ToyHandler"

@@ -9,11 +9,11 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import EVALUATOR_QUEUE, NewItem, NewJob, asset_key, get_job, submit, transaction
-from shared.jobs.schema import asset, evaluation_report, item, job_event, lease, motion, motion_file, text_features
-from shared.jobs.states import ENDED
-from shared.jobs.types import DEFAULT_TENANT, JobRow
-from shared.storage import AssetStore
+from marey.jobs import EVALUATOR_QUEUE, NewItem, NewJob, asset_key, get_job, submit, transaction
+from marey.jobs.schema import asset, evaluation_report, item, job_event, lease, motion, motion_file, text_features
+from marey.jobs.states import ENDED
+from marey.jobs.types import DEFAULT_TENANT, JobRow
+from marey.storage import AssetStore
 from tests.support.toy import QUEUE
 
 TEXT_KEY = hashlib.sha256(b"toy").hexdigest()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.motion import rotations
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.skeleton import HUMANML3D, Skeleton
+from marey.motion import rotations
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.skeleton import HUMANML3D, Skeleton
 
 
 def walker(

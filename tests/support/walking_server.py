@@ -20,13 +20,13 @@ from fastapi import FastAPI, Request, WebSocket
 from fastapi.responses import JSONResponse, Response
 from starlette.websockets import WebSocketDisconnect
 
-from services.api.catalogue import Catalogue
-from services.api.live.routes import router
-from shared.disposition import attachment
-from shared.motion.clip import MotionClip
-from shared.motion.skeleton import HUMANML3D, Skeleton
-from shared.settings import Settings
-from shared.streams.frames import Frame, encode_frame
+from marey.api.catalogue import Catalogue
+from marey.api.live.routes import router
+from marey.disposition import attachment
+from marey.motion.clip import MotionClip
+from marey.motion.skeleton import HUMANML3D, Skeleton
+from marey.settings import Settings
+from marey.streams.frames import Frame, encode_frame
 from tests.support.walker import walker
 
 KEY = "marey_01234567_" + 43 * "k"

@@ -10,7 +10,7 @@ import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from pydantic import SecretStr
 
-from shared.jobs import (
+from marey.jobs import (
     DEFAULT_TENANT,
     DeliveryRow,
     EventKind,
@@ -20,7 +20,7 @@ from shared.jobs import (
     list_deliveries,
     transaction,
 )
-from shared.webhooks.vault import Vault, new_signing_secret
+from marey.webhooks.vault import Vault, new_signing_secret
 
 KEY = Fernet.generate_key().decode()
 VAULT = Vault(KEY)

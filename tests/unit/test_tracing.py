@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from shared import tracing
-from shared.errors import InvalidInput
-from shared.tracing import ENDPOINTS
+from marey import tracing
+from marey.errors import InvalidInput
+from marey.tracing import ENDPOINTS
 
 TRACE, SPAN = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"
 CONTEXT = f"00-{TRACE}-{SPAN}-01"

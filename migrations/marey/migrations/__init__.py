@@ -1,1 +1,1 @@
-"""Database migrations (Alembic). `shared.jobs.upgrade` runs them; `marey admin migrate` calls that."""
+"""Database migrations (Alembic). `marey.jobs.upgrade` runs them; `marey admin migrate` calls that."""

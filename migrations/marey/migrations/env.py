@@ -1,8 +1,8 @@
-"""Alembic's environment: runs on the connection that `shared.jobs.migrate` hands over."""
+"""Alembic's environment: runs on the connection that `marey.jobs.migrate` hands over."""
 
 from alembic import context
 
-from shared.jobs.schema import metadata
+from marey.jobs.schema import metadata
 
 context.configure(
     connection=context.config.attributes["connection"],

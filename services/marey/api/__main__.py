@@ -1,8 +1,8 @@
-"""`python -m services.api docs/openapi.json` writes the document that is checked in."""
+"""`python -m marey.api docs/openapi.json` writes the document that is checked in."""
 
 import sys
 from pathlib import Path
 
-from services.api.app import write_openapi
+from marey.api.app import write_openapi
 
 write_openapi(Path(sys.argv[1]))

@@ -14,49 +14,49 @@ import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import APIRoute
 
-from services.api.catalogue import Catalogue
-from services.api.context import CONNECTIONS, Context
-from services.api.docs.routes import router as docs_router
-from services.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
-from services.api.evaluations.routes import router as evaluations_router
-from services.api.health.checks import readiness_checks
-from services.api.health.metrics import Measure
-from services.api.health.routes import router as health_router
-from services.api.home.routes import router as home_router
-from services.api.jobs.events import message
-from services.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
-from services.api.jobs.routes import router as jobs_router
-from services.api.live.routes import router as live_router
-from services.api.models.routes import router as models_router
-from services.api.motions.routes import router as motions_router
-from services.api.rates import Rates
-from services.api.readiness import Readiness
-from services.api.reference import build_reference
-from services.api.resolving.routes import router as references_router
-from services.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
-from services.api.schedules.routes import router as schedules_router
-from services.api.stream_hub import Hub
-from services.api.streams.protocol import socket_options
-from services.api.streams.routes import router as streams_router
-from services.api.tailer import Tailer
-from services.api.text_client import TextService
-from services.api.texts.routes import router as texts_router
-from services.api.webhooks.routes import router as webhooks_router
-from services.http import problems
-from services.http.bodies import BodyGuard, Patience
-from services.http.connections import connection_options
-from services.http.guards import HostGuard, UpgradeGuard
-from services.http.origins import OriginGuard
-from services.http.process import prepare_process
-from services.http.queries import known_query
-from services.http.traces import Trace
-from shared.addresses import Allowed
-from shared.errors import InvalidInput
-from shared.jobs import check_listening, create_engine
-from shared.runtime.systemd import notified
-from shared.settings import Settings, settings
-from shared.storage import open_store
-from shared.webhooks.vault import Vault
+from marey.addresses import Allowed
+from marey.api.catalogue import Catalogue
+from marey.api.context import CONNECTIONS, Context
+from marey.api.docs.routes import router as docs_router
+from marey.api.evaluations.routes import SCHEMAS as EVALUATION_SCHEMAS
+from marey.api.evaluations.routes import router as evaluations_router
+from marey.api.health.checks import readiness_checks
+from marey.api.health.metrics import Measure
+from marey.api.health.routes import router as health_router
+from marey.api.home.routes import router as home_router
+from marey.api.jobs.events import message
+from marey.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
+from marey.api.jobs.routes import router as jobs_router
+from marey.api.live.routes import router as live_router
+from marey.api.models.routes import router as models_router
+from marey.api.motions.routes import router as motions_router
+from marey.api.rates import Rates
+from marey.api.readiness import Readiness
+from marey.api.reference import build_reference
+from marey.api.resolving.routes import router as references_router
+from marey.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
+from marey.api.schedules.routes import router as schedules_router
+from marey.api.stream_hub import Hub
+from marey.api.streams.protocol import socket_options
+from marey.api.streams.routes import router as streams_router
+from marey.api.tailer import Tailer
+from marey.api.text_client import TextService
+from marey.api.texts.routes import router as texts_router
+from marey.api.webhooks.routes import router as webhooks_router
+from marey.errors import InvalidInput
+from marey.http import problems
+from marey.http.bodies import BodyGuard, Patience
+from marey.http.connections import connection_options
+from marey.http.guards import HostGuard, UpgradeGuard
+from marey.http.origins import OriginGuard
+from marey.http.process import prepare_process
+from marey.http.queries import known_query
+from marey.http.traces import Trace
+from marey.jobs import check_listening, create_engine
+from marey.runtime.systemd import notified
+from marey.settings import Settings, settings
+from marey.storage import open_store
+from marey.webhooks.vault import Vault
 
 ROUTERS = (
     *(health_router, home_router, jobs_router, motions_router, streams_router, live_router, docs_router, models_router),

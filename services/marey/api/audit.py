@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from shared import jobs
+from marey import jobs
 
 
 def note(conn: sa.Connection, key: jobs.ApiKey, verb: str, target: object, **data: object) -> None:
-    """Note that this key did something; see `shared.jobs.audit`."""
+    """Note that this key did something; see `marey.jobs.audit`."""
     jobs.audit(conn, key.tenant, jobs.Actor(key.name, key.id), verb, target, **data)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 import time
 
-from shared.bundles import choose_bundle
-from shared.offers import Offer, offer_of
-from shared.settings import Settings
+from marey.bundles import choose_bundle
+from marey.offers import Offer, offer_of
+from marey.settings import Settings
 
 FRESH_SECONDS = 5.0
 """A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""

@@ -11,19 +11,19 @@ from anyio import CapacityLimiter
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from services.api.catalogue import Catalogue
-from services.api.rates import Rates
-from services.api.readiness import Readiness
-from services.api.stream_hub import Hub
-from services.api.tailer import Tailer
-from services.api.text_client import TextService
-from services.http.body_room import BodyRoom
-from services.http.places import Places, Shares
-from shared.errors import Unauthenticated
-from shared.jobs import Deadline, transaction
-from shared.metrics import EVENT_STREAMS
-from shared.settings import Settings
-from shared.storage import AssetStore
+from marey.api.catalogue import Catalogue
+from marey.api.rates import Rates
+from marey.api.readiness import Readiness
+from marey.api.stream_hub import Hub
+from marey.api.tailer import Tailer
+from marey.api.text_client import TextService
+from marey.errors import Unauthenticated
+from marey.http.body_room import BodyRoom
+from marey.http.places import Places, Shares
+from marey.jobs import Deadline, transaction
+from marey.metrics import EVENT_STREAMS
+from marey.settings import Settings
+from marey.storage import AssetStore
 
 LARGE_THREADS = 1
 """Two would take turns with each other instead of with the requests beside them: the interpreter is one."""
@@ -78,7 +78,7 @@ Route = TypeVar("Route", bound=Callable[..., object])
 
 
 def deadline(kind: Deadline) -> Callable[[Route], Route]:
-    """Decorate a route whose `Connection` makes calls of this kind (`shared.jobs.deadlines`)."""
+    """Decorate a route whose `Connection` makes calls of this kind (`marey.jobs.deadlines`)."""
 
     def mark(route: Route) -> Route:
         setattr(route, DEADLINE, kind)

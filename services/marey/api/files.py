@@ -11,12 +11,12 @@ from typing import Annotated, Any
 from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
-from services.api.context import Context
-from services.http.ranges import ByteRange, parse_range
-from services.http.schemas import View
-from shared.disposition import attachment, download_name
-from shared.jobs import asset_key
-from shared.storage import CHUNK, PRESIGN_SECONDS, AssetStore, Opened
+from marey.api.context import Context
+from marey.disposition import attachment, download_name
+from marey.http.ranges import ByteRange, parse_range
+from marey.http.schemas import View
+from marey.jobs import asset_key
+from marey.storage import CHUNK, PRESIGN_SECONDS, AssetStore, Opened
 
 MARGIN_SECONDS = 60
 

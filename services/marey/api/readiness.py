@@ -1,7 +1,7 @@
 """The checks of `/readyz`: they run in the background, each in a thread of its own.
 
 A check that hangs holds up nothing but itself: its last result grows old, and an old result counts as a failure.
-The checks themselves are in `services.api.health.checks`.
+The checks themselves are in `marey.api.health.checks`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import structlog
 
-from shared.errors import MareyError
+from marey.errors import MareyError
 
 INTERVAL_SECONDS = 2.0
 """Between the end of one round of a check and its next."""

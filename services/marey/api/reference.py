@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import BaseModel
 
-from services.http import problems
+from marey.http import problems
 
 LOCAL_SERVER = "/"
 """The server that the document comes from."""

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
-from services.http.places import Places, Shares
-from shared.metrics import SOCKETS as SOCKETS_OPEN
-from shared.runtime.queue import redis_client
+from marey.http.places import Places, Shares
+from marey.metrics import SOCKETS as SOCKETS_OPEN
+from marey.runtime.queue import redis_client
 
 Answer = TypeVar("Answer")
 

@@ -14,9 +14,9 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
-from shared.errors import InvalidInput, NotFound, Unreachable
-from shared.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
-from shared.jobs.states import ENDED
+from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
+from marey.jobs.states import ENDED
 
 log = structlog.get_logger(__name__)
 

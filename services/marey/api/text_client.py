@@ -11,12 +11,12 @@ from anyio import to_thread
 from pydantic import ValidationError
 from starlette.responses import Response
 
-from services.http.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
-from services.text.limits import WordLimit
-from services.text.routes import GraphsView, ParseBody, too_late
-from shared import tracing
-from shared.errors import InvalidInput, Unreachable
-from shared.settings import Settings
+from marey import tracing
+from marey.errors import InvalidInput, Unreachable
+from marey.http.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
+from marey.settings import Settings
+from marey.text_service.limits import WordLimit
+from marey.text_service.routes import GraphsView, ParseBody, too_late
 
 CONNECT_SECONDS = 2.0
 SOCKET = "unix://"

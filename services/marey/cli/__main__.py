@@ -1,6 +1,6 @@
-"""`python -m services.cli` is `marey`."""
+"""`python -m marey.cli` is `marey`."""
 
-from services.cli.main import run
+from marey.cli.main import run
 
 if __name__ == "__main__":
     run()

@@ -18,12 +18,12 @@ from uuid import UUID
 import sqlalchemy as sa
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
-from shared.errors import Conflict, InvalidFile, InvalidInput, NotFound
-from shared.hashing import sha256_of
-from shared.jobs import BACKUP, asset_key, get_tenant, transaction
-from shared.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
-from shared.motion.files import write_atomically
-from shared.storage import AssetStore
+from marey.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from marey.hashing import sha256_of
+from marey.jobs import BACKUP, asset_key, get_tenant, transaction
+from marey.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
+from marey.motion.files import write_atomically
+from marey.storage import AssetStore
 
 MANIFEST = "manifest.json"
 MOST_BYTES = 2**31

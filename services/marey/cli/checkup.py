@@ -10,14 +10,14 @@ import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from services.cli.findings import Check, broken, free_space
-from shared.errors import MareyError
-from shared.private_home import FOLDER_MODE, is_open
+from marey.cli.findings import Check, broken, free_space
+from marey.errors import MareyError
+from marey.private_home import FOLDER_MODE, is_open
 
 if TYPE_CHECKING:
-    from services.cli.place import Server
-    from shared.bundles import Bundle
-    from shared.settings import Settings
+    from marey.bundles import Bundle
+    from marey.cli.place import Server
+    from marey.settings import Settings
 
 ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
 """Deadlines of a server's answers: a listing takes milliseconds, and a missed deadline of the database 5 s."""
@@ -33,7 +33,7 @@ def check_all() -> Iterator[Check]:
     yield _home()
     yield _server()
     if _installed("pydantic_settings"):
-        from shared.settings import settings
+        from marey.settings import settings
 
         try:
             settings()
@@ -41,11 +41,11 @@ def check_all() -> Iterator[Check]:
             yield broken("settings", error)
             return  # all that follows needs them
     if _installed("fastapi"):
-        from services.cli.checkup_backing import check_backing
+        from marey.cli.checkup_backing import check_backing
 
         yield from check_backing()
     if _installed("pydantic_settings") and _installed("safetensors"):
-        from shared.settings import settings
+        from marey.settings import settings
 
         yield from models(settings())
         if _installed("torch"):
@@ -64,8 +64,8 @@ def _extra(name: str, package: str, commands: str) -> Check:
 
 
 def _home() -> Check:
-    from services.cli.fetching import check_folder
-    from services.cli.place import home
+    from marey.cli.fetching import check_folder
+    from marey.cli.place import home
 
     folder = home()
     with contextlib.suppress(OSError):  # what hinders is told by the check
@@ -81,9 +81,9 @@ def _home() -> Check:
 
 
 def _server() -> Check:
-    from services.cli.client import Client
-    from services.cli.place import find_server
-    from shared.errors import Unreachable
+    from marey.cli.client import Client
+    from marey.cli.place import find_server
+    from marey.errors import Unreachable
 
     try:
         server = find_server()
@@ -121,8 +121,8 @@ def _stalled(server: Server, error: MareyError) -> Check | None:
 
 def models(config: Settings) -> Iterator[Check]:
     """Every bundle that is here: whole, and with what reads its prompts."""
-    from shared.bundles import find_bundle, scan_bundles
-    from shared.bundles.limits import seconds_of
+    from marey.bundles import find_bundle, scan_bundles
+    from marey.bundles.limits import seconds_of
 
     bundles = scan_bundles(config=config)
     for left_out in bundles.broken:
@@ -144,9 +144,9 @@ def models(config: Settings) -> Iterator[Check]:
 
 def _reads(bundle: Bundle, config: Settings) -> Check:
     """Whether what reads prompts for a bundle is here, and what it was trained with."""
-    from shared.bundles import find_bundle
-    from shared.text.encoders import find_weights, weights_sha256
-    from shared.text.keys import NO_LABELLER, labeller_bundle
+    from marey.bundles import find_bundle
+    from marey.text.encoders import find_weights, weights_sha256
+    from marey.text.keys import NO_LABELLER, labeller_bundle
 
     spec, name = bundle.manifest.text, "text"
     assert spec is not None  # the caller looked

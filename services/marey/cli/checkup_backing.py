@@ -8,18 +8,18 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.cli.database import engine_of, settings_here
-from services.cli.findings import Check, broken, free_space
-from services.cli.place import read_server
-from services.cli.ports import try_port
-from shared.errors import MareyError, Unreachable
+from marey.cli.database import engine_of, settings_here
+from marey.cli.findings import Check, broken, free_space
+from marey.cli.place import read_server
+from marey.cli.ports import try_port
+from marey.errors import MareyError, Unreachable
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from shared.jobs import SchedulerRow
-    from shared.settings import Settings
-    from shared.storage import AssetStore
+    from marey.jobs import SchedulerRow
+    from marey.settings import Settings
+    from marey.storage import AssetStore
 
 SKEW_WARN, SKEW_BAD = 2.0, 60.0
 """Seconds. Leases and retries go by the database's clock alone; signed URLs and webhooks' signatures by the machine's:
@@ -30,7 +30,7 @@ UNSWEPT = 30.0
 
 def check_backing() -> Iterator[Check]:
     """Each thing by itself; nothing but the port where no server is named and none runs here."""
-    from shared.settings import settings
+    from marey.settings import settings
 
     config = settings_here()
     home = config.home.expanduser().absolute()
@@ -70,7 +70,7 @@ def _port(config: Settings) -> Check:
 
 def database(engine: sa.Engine) -> Check:
     """It answers, and its tables are those this version needs."""
-    from shared.jobs import check_revision, server_version, transaction
+    from marey.jobs import check_revision, server_version, transaction
 
     try:
         with transaction(engine) as conn:
@@ -82,7 +82,7 @@ def database(engine: sa.Engine) -> Check:
 
 
 def _clock(engine: sa.Engine) -> Check:
-    from shared.jobs import database_now, transaction
+    from marey.jobs import database_now, transaction
 
     with transaction(engine) as conn:
         before = datetime.now(UTC)
@@ -105,7 +105,7 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
     Args:
         logs: of the `marey serve` that runs here and starts workers itself; None = there is none.
     """
-    from shared.jobs import list_workers, queue_depths, transaction
+    from marey.jobs import list_workers, queue_depths, transaction
 
     with transaction(engine) as conn:
         known, depths = list_workers(conn), queue_depths(conn)
@@ -128,7 +128,7 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
 
 def scheduler(engine: sa.Engine) -> Check:
     """One works: it said so a moment ago, and leases that ran out are taken back."""
-    from shared.jobs import list_schedulers, overdue_leases, transaction
+    from marey.jobs import list_schedulers, overdue_leases, transaction
 
     with transaction(engine) as conn:
         unswept, known = overdue_leases(conn, UNSWEPT), list_schedulers(conn)
@@ -158,7 +158,7 @@ def _silence_of(row: SchedulerRow) -> str:
 
 
 def _queues(config: Settings) -> Iterator[Check]:
-    from shared.runtime.embedded import valkey_url
+    from marey.runtime.embedded import valkey_url
 
     named = config.queue_url
     url = valkey_url(config.home.expanduser().absolute()) if named is None else named.get_secret_value()
@@ -171,7 +171,7 @@ def queue(name: str, url: str) -> Check:
     """A Redis that answers and throws nothing away."""
     import redis
 
-    from shared.runtime.queue import check_queue, redis_client
+    from marey.runtime.queue import check_queue, redis_client
 
     try:
         version = check_queue(url)
@@ -203,7 +203,7 @@ def _memory_policy(client: object) -> str | None:
 
 def store(config: Settings) -> Iterator[Check]:
     """It takes, gives and deletes."""
-    from shared.storage import FolderStore, open_store
+    from marey.storage import FolderStore, open_store
 
     try:
         assets = open_store(config)

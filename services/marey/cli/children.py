@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.cli import console
-from shared.private_home import open_private
+from marey.cli import console
+from marey.private_home import open_private
 
 if TYPE_CHECKING:
-    from shared.settings import Settings
+    from marey.settings import Settings
 
 TICK = 0.2
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0
@@ -115,7 +115,7 @@ class Child:
 
 def marey(*arguments: str) -> list[str]:
     """The command line of one of our own commands."""
-    return [sys.executable, "-m", "services.cli", *arguments]
+    return [sys.executable, "-m", "marey.cli", *arguments]
 
 
 def metrics_port(config: Settings, place: int) -> dict[str, str]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from shared.jobs import Actor
-    from shared.settings import Settings
+    from marey.jobs import Actor
+    from marey.settings import Settings
 
 
 def settings_here() -> Settings:
@@ -20,11 +20,11 @@ def settings_here() -> Settings:
     Raises:
         InvalidInput: the extra `server` is not installed.
     """
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from shared.runtime.embedded import postgres_url
-        from shared.settings import settings
+        from marey.runtime.embedded import postgres_url
+        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     from pydantic import SecretStr
@@ -37,7 +37,7 @@ def settings_here() -> Settings:
 
 def engine_of(config: Settings) -> sa.Engine:
     """An engine for the database of `settings_here`."""
-    from shared.jobs import create_engine
+    from marey.jobs import create_engine
 
     if config.database_url is None:
         raise AssertionError("settings_here fills it")
@@ -52,7 +52,7 @@ def connection() -> Iterator[sa.Connection]:
         Unreachable: it does not answer.
     """
     config = settings_here()
-    from shared.jobs import transaction
+    from marey.jobs import transaction
 
     engine = engine_of(config)
     try:
@@ -64,7 +64,7 @@ def connection() -> Iterator[sa.Connection]:
 
 def operator() -> Actor:
     """Who runs this command, for the audit log."""
-    from shared.jobs import Actor
+    from marey.jobs import Actor
 
     try:
         name = getpass.getuser()

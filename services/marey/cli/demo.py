@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from services.cli import console
-from services.cli.client import Client
-from services.cli.place import Server, find_server
-from services.cli.watching import watch_job
-from shared.errors import MareyError, NotFound, TimedOut, Unreachable
+from marey.cli import console
+from marey.cli.client import Client
+from marey.cli.place import Server, find_server
+from marey.cli.watching import watch_job
+from marey.errors import MareyError, NotFound, TimedOut, Unreachable
 
 OUT = Path("out/demo")
 INTERRUPTED = 130
@@ -69,8 +69,8 @@ def main() -> int:
 def _ensure_bundle(home: Path) -> bool:
     """Whether the model that will be used has random weights; makes such a bundle where there is no model at all."""
     os.environ["MAREY_HOME"] = str(home)
-    from services.cli.roles.oneshot import make_random_bundle
-    from shared.bundles import choose_bundle
+    from marey.bundles import choose_bundle
+    from marey.cli.roles.oneshot import make_random_bundle
 
     try:
         return choose_bundle(MODEL, verify=False).manifest.random
@@ -90,7 +90,7 @@ def _server(home: Path) -> Iterator[None]:
     log = home / "serve.log"
     with log.open("wb") as output:
         process = subprocess.Popen(
-            [sys.executable, "-m", "services.cli", "serve", "--port", "0"], stdout=output, stderr=output
+            [sys.executable, "-m", "marey.cli", "serve", "--port", "0"], stdout=output, stderr=output
         )
     try:
         _wait_until_ready(process, log)
@@ -125,7 +125,7 @@ def _is_ready() -> bool:
 
 
 def _run() -> list[dict[str, Any]]:
-    from services.cli.commands.fetch import fetch_job
+    from marey.cli.commands.fetch import fetch_job
 
     with Client.here() as client:
         job = client.submit([dict(item) for item in PROMPTS], name="demo")
@@ -135,8 +135,8 @@ def _run() -> list[dict[str, Any]]:
 
 def _draw(lines: list[dict[str, Any]]) -> None:
     """A contact sheet beside each npz."""
-    from shared.motion.clip import load_npz
-    from shared.motion.render import contact_sheet
+    from marey.motion.clip import load_npz
+    from marey.motion.render import contact_sheet
 
     with console.bar() as bar:
         for line in bar.track(lines, description="drawing"):

@@ -16,7 +16,7 @@ from multiprocessing import connection, resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shared.errors import MareyError
+from marey.errors import MareyError
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -104,11 +104,11 @@ class Drawers:
 
 def draw(drawing: Drawing) -> Pixels:
     """Draw one motion."""
-    from shared.motion.clip import load_npz
-    from shared.motion.overview import draw_tile
-    from shared.motion.paper import theme_named
-    from shared.motion.render import draw_row
-    from shared.motion.strip import chosen_frames
+    from marey.motion.clip import load_npz
+    from marey.motion.overview import draw_tile
+    from marey.motion.paper import theme_named
+    from marey.motion.render import draw_row
+    from marey.motion.strip import chosen_frames
 
     clip, theme = load_npz(drawing.path), theme_named(THEME)
     if drawing.columns is None:

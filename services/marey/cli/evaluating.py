@@ -13,16 +13,16 @@ from urllib.parse import quote
 
 import typer
 
-from services.cli import console
-from services.cli.options import ExtraColumns
-from services.cli.references import FORMS
-from shared.characters import escape
-from shared.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
-from shared.evaluation_prompts import PromptCheck
-from shared.items import InvalidItems, Problem, outside_range
+from marey.characters import escape
+from marey.cli import console
+from marey.cli.options import ExtraColumns
+from marey.cli.references import FORMS
+from marey.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
+from marey.evaluation_prompts import PromptCheck
+from marey.items import InvalidItems, Problem, outside_range
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
 OPEN = frozenset({"planned", "generating", "scoring"})
 TEST = "test"
@@ -108,7 +108,7 @@ class Asked:
     def _prompts(self) -> dict[str, Any]:
         if self.split in SPLITS:
             return {"split": self.split}
-        from services.cli.rows import read_evaluation_prompts
+        from marey.cli.rows import read_evaluation_prompts
 
         if self.extra_columns is ExtraColumns.TAG:
             raise InvalidInput("prompts of an evaluation have no tags", where="--extra-columns", hint="Choose ignore.")
@@ -129,8 +129,8 @@ class Asked:
     @contextmanager
     def in_source(self) -> Generator[None]:
         """In here a server's `InvalidItems` about the prompts names the file and its lines."""
-        from services.cli.rows import located
-        from services.cli.text_files import where_of
+        from marey.cli.rows import located
+        from marey.cli.text_files import where_of
 
         try:
             yield
@@ -148,7 +148,7 @@ def _range_check(bundle: str) -> PromptCheck:
     found: list[dict[str, Any] | None] = []
 
     def model() -> dict[str, Any] | None:
-        from services.cli.client import Client
+        from marey.cli.client import Client
 
         if not found:
             try:
@@ -293,7 +293,7 @@ def _wait_hint(evaluation: str) -> str:
 
 def show_runs(path: str, limit: int | None, as_json: bool, *, full_ids: bool = False, **params: Any) -> None:
     """The runs of a listing, newest first."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.pages(path, limit=console.page_size(limit), **params)

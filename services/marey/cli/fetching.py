@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from services.cli.client import Client
-from services.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
-from shared.errors import Conflict, InvalidFile, InvalidInput, Unreachable
-from shared.hashing import sha256_of
+from marey.cli.client import Client
+from marey.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
+from marey.errors import Conflict, InvalidFile, InvalidInput, Unreachable
+from marey.hashing import sha256_of
 
 PARALLEL = 8
 ATTEMPTS = 4

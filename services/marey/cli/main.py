@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from services.cli import console
-from services.cli.commands import (
+from marey import tracing
+from marey.cli import console
+from marey.cli.commands import (
     admin,
     convert,
     data,
@@ -27,8 +28,7 @@ from services.cli.commands import (
     train,
     webhooks,
 )
-from shared import tracing
-from shared.errors import MareyError
+from marey.errors import MareyError
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "text", "train", "data"})
 PATIENCE = 2.0

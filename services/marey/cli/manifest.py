@@ -12,8 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from services.cli.csv_cells import join_tags, restore, write_csv
-from shared.errors import Conflict, InvalidInput
+from marey.cli.csv_cells import join_tags, restore, write_csv
+from marey.errors import Conflict, InvalidInput
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"

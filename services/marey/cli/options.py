@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from services.cli.names import DEFAULT_TEMPLATE
+from marey.cli.names import DEFAULT_TEMPLATE
 
 
 class FileFormat(StrEnum):

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
 
-from services.cli import console
-from shared.errors import InvalidInput, NotFound
+from marey.cli import console
+from marey.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
 FORMS = "its id, the last 8 digits of it, a name, or last"
 MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX, JOB:INDEX.VARIANT, or last"

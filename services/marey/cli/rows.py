@@ -10,12 +10,12 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
-from services.cli.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
-from services.cli.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
-from shared.errors import InvalidInput
-from shared.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
-from shared.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
-from shared.items import (
+from marey.cli.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
+from marey.cli.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
+from marey.errors import InvalidInput
+from marey.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
+from marey.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
+from marey.items import (
     CHECKS,
     COLUMNS,
     MAX_BODY_BYTES,

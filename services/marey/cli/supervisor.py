@@ -15,19 +15,19 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import IO
 
-from services.cli import console
-from services.cli.children import Child, marey, metrics_port, stop_all
-from services.cli.place import Server, read_server, write_server
-from services.cli.ports import try_port
-from services.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
-from shared.errors import Conflict, InvalidInput, MareyError
-from shared.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
-from shared.jobs.types import DEFAULT_TENANT
-from shared.private_home import make_private, open_private
-from shared.runtime.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
-from shared.settings import Settings
-from shared.storage import open_store
-from shared.webhooks.vault import Vault, key_file
+from marey.cli import console
+from marey.cli.children import Child, marey, metrics_port, stop_all
+from marey.cli.place import Server, read_server, write_server
+from marey.cli.ports import try_port
+from marey.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
+from marey.errors import Conflict, InvalidInput, MareyError
+from marey.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
+from marey.jobs.types import DEFAULT_TENANT
+from marey.private_home import make_private, open_private
+from marey.runtime.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
+from marey.settings import Settings
+from marey.storage import open_store
+from marey.webhooks.vault import Vault, key_file
 
 KEY_NAME = "serve"
 KEY_SCOPES = ("admin", "metrics", "operate", "read", "submit")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from services.cli import console
-from services.cli.client import Client
-from shared.errors import Busy, ItemsFailed, TimedOut, Unreachable
+from marey.cli import console
+from marey.cli.client import Client
+from marey.errors import Busy, ItemsFailed, TimedOut, Unreachable
 
 ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
 PATIENCE = 180.0

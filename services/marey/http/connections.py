@@ -8,9 +8,9 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from services.http.problems import problem_response
-from shared.errors import TooSlow
-from shared.settings import Settings
+from marey.errors import TooSlow
+from marey.http.problems import problem_response
+from marey.settings import Settings
 
 
 class PatientProtocol(H11Protocol):

@@ -11,8 +11,8 @@ from uuid import UUID
 
 from prometheus_client import Gauge
 
-from shared.errors import Busy
-from shared.jobs import ApiKey
+from marey.errors import Busy
+from marey.jobs import ApiKey
 
 Name = TypeVar("Name", str, UUID)
 

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from shared.errors import (
+from marey.errors import (
     Busy,
     InvalidInput,
     MareyError,
@@ -24,8 +24,8 @@ from shared.errors import (
     Unauthenticated,
     Unreachable,
 )
-from shared.items import InvalidItems
-from shared.jobs import Room
+from marey.items import InvalidItems
+from marey.jobs import Room
 
 TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"

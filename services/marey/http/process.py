@@ -6,10 +6,10 @@ import signal
 import sys
 from typing import Any
 
-from shared.runtime.logs import configure_logging
-from shared.runtime.malloc import one_heap
-from shared.settings import Settings
-from shared.tracing import configure_tracing
+from marey.runtime.logs import configure_logging
+from marey.runtime.malloc import one_heap
+from marey.settings import Settings
+from marey.tracing import configure_tracing
 
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams and sockets end at once."""

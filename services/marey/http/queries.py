@@ -8,7 +8,7 @@ from fastapi.params import ParamTypes
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 LONGEST_NAME = 60
 

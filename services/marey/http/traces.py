@@ -5,7 +5,7 @@ from __future__ import annotations
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shared import tracing
+from marey import tracing
 
 UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
 """Asked every few seconds by machines."""

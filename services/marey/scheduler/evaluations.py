@@ -8,10 +8,10 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import MareyError, QuotaUsedUp, Unreachable
-from shared.evaluating import plan_evaluation, scoring_job
-from shared.items import InvalidItems
-from shared.jobs import (
+from marey.errors import MareyError, QuotaUsedUp, Unreachable
+from marey.evaluating import plan_evaluation, scoring_job
+from marey.items import InvalidItems
+from marey.jobs import (
     BULK,
     MAX_MISSING,
     EvaluationJob,
@@ -31,9 +31,9 @@ from shared.jobs import (
     submit,
     transaction,
 )
-from shared.jobs.states import ENDED
-from shared.runtime.logs import logger
-from shared.settings import Settings
+from marey.jobs.states import ENDED
+from marey.runtime.logs import logger
+from marey.settings import Settings
 
 log = logger(__name__)
 

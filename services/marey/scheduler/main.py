@@ -11,18 +11,10 @@ from functools import partial
 
 import sqlalchemy as sa
 
-from services.scheduler import parts as scheduler_parts
-from services.scheduler.evaluations import Evaluations
-from services.scheduler.parts import EXIT_STALLED, Part, end_stalled, note_progress, watch
-from services.scheduler.periodic import Periodic
-from services.scheduler.relay import Relay, publisher
-from services.scheduler.sending import Sender
-from services.scheduler.servers import CHECK_SECONDS, server_check
-from services.scheduler.webhooks import Deliverer
-from shared import metrics
-from shared.addresses import Allowed
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import (
+from marey import metrics
+from marey.addresses import Allowed
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import (
     KEPT,
     Problem,
     abandoned_streams,
@@ -40,17 +32,25 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.motion.clip import without_prompt
-from shared.runtime.app import create_app
-from shared.runtime.exposition import expose
-from shared.runtime.logs import configure_logging, logger
-from shared.runtime.queue import redis_client
-from shared.runtime.signals import stop_on_signals
-from shared.runtime.status import Teller
-from shared.settings import Settings
-from shared.storage import open_store
-from shared.tls import trusting_context
-from shared.webhooks.vault import Vault
+from marey.motion.clip import without_prompt
+from marey.runtime.app import create_app
+from marey.runtime.exposition import expose
+from marey.runtime.logs import configure_logging, logger
+from marey.runtime.queue import redis_client
+from marey.runtime.signals import stop_on_signals
+from marey.runtime.status import Teller
+from marey.scheduler import parts as scheduler_parts
+from marey.scheduler.evaluations import Evaluations
+from marey.scheduler.parts import EXIT_STALLED, Part, end_stalled, note_progress, watch
+from marey.scheduler.periodic import Periodic
+from marey.scheduler.relay import Relay, publisher
+from marey.scheduler.sending import Sender
+from marey.scheduler.servers import CHECK_SECONDS, server_check
+from marey.scheduler.webhooks import Deliverer
+from marey.settings import Settings
+from marey.storage import open_store
+from marey.tls import trusting_context
+from marey.webhooks.vault import Vault
 
 log = logger(__name__)
 

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import sqlalchemy as sa
 from sqlalchemy import event
 
-from shared.runtime.logs import logger
+from marey.runtime.logs import logger
 
 log = logger(__name__)
 

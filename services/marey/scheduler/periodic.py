@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from services.scheduler.parts import Part
-from shared import metrics
-from shared.errors import Unreachable
-from shared.runtime.logs import logger
+from marey import metrics
+from marey.errors import Unreachable
+from marey.runtime.logs import logger
+from marey.scheduler.parts import Part
 
 log = logger(__name__)
 

@@ -17,12 +17,12 @@ import redis
 import sqlalchemy as sa
 from celery import Celery
 
-from services.scheduler.parts import Part
-from shared import metrics
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
-from shared.runtime.app import DRAIN, PUBLISH_RETRY
-from shared.runtime.logs import logger
+from marey import metrics
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
+from marey.runtime.app import DRAIN, PUBLISH_RETRY
+from marey.runtime.logs import logger
+from marey.scheduler.parts import Part
 
 log = logger(__name__)
 

@@ -14,10 +14,10 @@ from email.utils import parsedate_to_datetime
 
 import httpx2
 
-from shared.addresses import Allowed
-from shared.errors import MareyError, Refused
-from shared.jobs import Attempt
-from shared.webhooks.addresses import choose_address
+from marey.addresses import Allowed
+from marey.errors import MareyError, Refused
+from marey.jobs import Attempt
+from marey.webhooks.addresses import choose_address
 
 CONNECT_SECONDS = 5.0
 ATTEMPT_SECONDS = 15.0

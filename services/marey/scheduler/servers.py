@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict
-from shared.jobs import check_revision
-from shared.runtime.logs import logger
-from shared.runtime.queue import check_queue
+from marey.errors import Conflict
+from marey.jobs import check_revision
+from marey.runtime.logs import logger
+from marey.runtime.queue import check_queue
 
 log = logger(__name__)
 

@@ -13,11 +13,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from services.scheduler.parts import Part
-from services.scheduler.sending import Sender
-from shared import metrics
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import (
+from marey import metrics
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import (
     Attempt,
     DeliveryState,
     DueDelivery,
@@ -26,9 +24,11 @@ from shared.jobs import (
     record_attempt,
     transaction,
 )
-from shared.runtime.logs import logger
-from shared.webhooks.message import headers_of, message_of
-from shared.webhooks.vault import Vault
+from marey.runtime.logs import logger
+from marey.scheduler.parts import Part
+from marey.scheduler.sending import Sender
+from marey.webhooks.message import headers_of, message_of
+from marey.webhooks.vault import Vault
 
 log = logger(__name__)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from shared.bundles import TextSpec, find_bundle
-from shared.errors import InvalidBundle, MareyError
-from shared.jobs import TEXT_QUEUE, ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
-from shared.text.keys import as_served
-from shared.text.pipeline import TextPipeline
+from marey.bundles import TextSpec, find_bundle
+from marey.errors import InvalidBundle, MareyError
+from marey.jobs import TEXT_QUEUE, ClaimedItem
+from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
+from marey.text.keys import as_served
+from marey.text.pipeline import TextPipeline
 
 BATCH = 64
 """Prompts of one claim: half a second on one core, so a cancelled job does not wait long."""

@@ -11,18 +11,18 @@ from anyio import CapacityLimiter, to_thread
 from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.http.fields import PROMPT
-from services.http.problems import RESPONSES
-from services.text.limits import Ticket, WordLimit
-from shared.bundles import TextSpec, choose_bundle, named_by
-from shared.errors import InvalidInput, Unauthenticated, Unreachable
-from shared.items import MODEL
-from shared.prompts import check_prompt
-from shared.settings import Settings
-from shared.text.keys import as_served
+from marey.bundles import TextSpec, choose_bundle, named_by
+from marey.errors import InvalidInput, Unauthenticated, Unreachable
+from marey.http.fields import PROMPT
+from marey.http.problems import RESPONSES
+from marey.items import MODEL
+from marey.prompts import check_prompt
+from marey.settings import Settings
+from marey.text.keys import as_served
+from marey.text_service.limits import Ticket, WordLimit
 
 if TYPE_CHECKING:
-    from shared.text.pipeline import TextPipeline
+    from marey.text.pipeline import TextPipeline
 
 MAX_PROMPTS = 64
 """Of one request: a second of work; more belong into a job."""
@@ -173,7 +173,7 @@ def pipeline_of(model: str) -> TextPipeline:
 
 def load_pipeline(spec: TextSpec) -> TextPipeline:
     """The pipeline of a bundle's text specification, loaded once a process."""
-    from shared.text.pipeline import TextPipeline
+    from marey.text.pipeline import TextPipeline
 
     served = as_served(spec)
     name = served.model_dump_json()

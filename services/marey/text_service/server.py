@@ -18,16 +18,16 @@ from fastapi import FastAPI
 from fastapi.responses import PlainTextResponse
 from starlette.responses import Response
 
-from services.http import problems
-from services.http.bodies import BodyGuard, Patience
-from services.http.connections import connection_options
-from services.http.process import prepare_process
-from services.http.traces import Trace
-from services.text.routes import load_pipeline, text_router
-from shared.bundles import list_bundles
-from shared.errors import InvalidInput, MareyError
-from shared.runtime.systemd import notified
-from shared.settings import Settings, settings
+from marey.bundles import list_bundles
+from marey.errors import InvalidInput, MareyError
+from marey.http import problems
+from marey.http.bodies import BodyGuard, Patience
+from marey.http.connections import connection_options
+from marey.http.process import prepare_process
+from marey.http.traces import Trace
+from marey.runtime.systemd import notified
+from marey.settings import Settings, settings
+from marey.text_service.routes import load_pipeline, text_router
 
 log = structlog.get_logger(__name__)
 

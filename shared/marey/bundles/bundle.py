@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.arrays import parse_safetensors
-from shared.bundles.manifest import DESCRIPTIVE, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
-from shared.documents import parse_json, read_bytes
-from shared.errors import InvalidBundle, NotFound
-from shared.hashing import sha256_of
+from marey.arrays import parse_safetensors
+from marey.bundles.manifest import DESCRIPTIVE, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
+from marey.documents import parse_json, read_bytes
+from marey.errors import InvalidBundle, NotFound
+from marey.hashing import sha256_of
 
 MAX_MANIFEST_BYTES = 4 * 2**20
 STATISTICS = "statistics"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import contextmanager
 
-from shared.bundles.bundle import Bundle
-from shared.bundles.find import find_bundle, has_bundle, list_bundles
-from shared.bundles.manifest import BundleManifest
-from shared.errors import InvalidBundle, NotFound, Refused
-from shared.settings import Settings, settings
+from marey.bundles.bundle import Bundle
+from marey.bundles.find import find_bundle, has_bundle, list_bundles
+from marey.bundles.manifest import BundleManifest
+from marey.errors import InvalidBundle, NotFound, Refused
+from marey.settings import Settings, settings
 
 
 def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:

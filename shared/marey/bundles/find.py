@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from shared.bundles.bundle import Bundle
-from shared.bundles.manifest import MANIFEST_NAME
-from shared.characters import escape
-from shared.errors import InvalidBundle, MareyError, NotFound, Refused
-from shared.settings import Settings, settings
+from marey.bundles.bundle import Bundle
+from marey.bundles.manifest import MANIFEST_NAME
+from marey.characters import escape
+from marey.errors import InvalidBundle, MareyError, NotFound, Refused
+from marey.settings import Settings, settings
 
 log = logging.getLogger(__name__)
 

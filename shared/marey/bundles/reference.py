@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from shared.bundles.bundle import Bundle
-from shared.errors import InvalidBundle, InvalidInput, MareyError
-from shared.evaluation_prompts import EvaluationPrompt, read_prompts
-from shared.expected import read_expected
+from marey.bundles.bundle import Bundle
+from marey.errors import InvalidBundle, InvalidInput, MareyError
+from marey.evaluation_prompts import EvaluationPrompt, read_prompts
+from marey.expected import read_expected
 
 FILE, PART = "reference.json", "reference"
 

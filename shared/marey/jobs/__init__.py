@@ -8,17 +8,17 @@ turns outages into `Unreachable`. Everything is synchronous: an event loop runs 
         job = submit(conn, NewJob(items))
 """
 
-from shared.jobs.audit import audit, list_audit
-from shared.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches, waiting_items
-from shared.jobs.database import (
+from marey.jobs.audit import audit, list_audit
+from marey.jobs.claim import claim, heartbeat, leased_items, load_texts, waiting_batches, waiting_items
+from marey.jobs.database import (
     EVENT_CHANNEL,
     QUEUE_CHANNEL,
     create_engine,
     outages,
     transaction,
 )
-from shared.jobs.deadlines import BACKUP, BULK, HEARTBEAT, MAINTENANCE, SEARCH, Deadline
-from shared.jobs.deliveries import (
+from marey.jobs.deadlines import BACKUP, BULK, HEARTBEAT, MAINTENANCE, SEARCH, Deadline
+from marey.jobs.deliveries import (
     claim_deliveries,
     delivery_attempts,
     get_delivery,
@@ -28,10 +28,10 @@ from shared.jobs.deliveries import (
     replay_delivery,
     send_test,
 )
-from shared.jobs.errors import IdempotencyMismatch
-from shared.jobs.estimate_types import Estimate, QueuePlace, Speed
-from shared.jobs.estimates import estimate, place_of
-from shared.jobs.evaluation_types import (
+from marey.jobs.errors import IdempotencyMismatch
+from marey.jobs.estimate_types import Estimate, QueuePlace, Speed
+from marey.jobs.estimates import estimate, place_of
+from marey.jobs.evaluation_types import (
     BUNDLE_SOURCES,
     COMPOSITIONAL,
     EVALUATOR_QUEUE,
@@ -52,7 +52,7 @@ from shared.jobs.evaluation_types import (
     ScheduleRow,
     ScoreRows,
 )
-from shared.jobs.evaluations import (
+from marey.jobs.evaluations import (
     cancel_evaluation,
     check_baseline,
     check_comparable,
@@ -68,8 +68,8 @@ from shared.jobs.evaluations import (
     remove_unused_prompts,
     store_prompts,
 )
-from shared.jobs.gc import asset_key, collect_garbage, remove_stale_assets, remove_unused_assets
-from shared.jobs.keys import (
+from marey.jobs.gc import asset_key, collect_garbage, remove_stale_assets, remove_unused_assets
+from marey.jobs.keys import (
     SCOPES,
     authenticate,
     check_key,
@@ -80,7 +80,7 @@ from shared.jobs.keys import (
     revoke_key,
     rotate_key,
 )
-from shared.jobs.lease_types import (
+from marey.jobs.lease_types import (
     AssetDigest,
     Claim,
     ClaimedItem,
@@ -94,17 +94,17 @@ from shared.jobs.lease_types import (
     WorkerBeat,
     WorkerRow,
 )
-from shared.jobs.listener import Listener, Notification, check_listening
-from shared.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
-from shared.jobs.migrate import check_revision, downgrade, upgrade
-from shared.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
-from shared.jobs.policy import Policy, policy
-from shared.jobs.quotas import check_room, usage
-from shared.jobs.references import ReferenceKind, ReferenceMatch, resolve_reference
-from shared.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
-from shared.jobs.retention import KEPT, delete_expired, erase, rewrite_files
-from shared.jobs.reviews import MAX_REVIEWED, reroll, review
-from shared.jobs.schedules import (
+from marey.jobs.listener import Listener, Notification, check_listening
+from marey.jobs.listings import events_after, get_job, get_motion, list_items, list_jobs, list_motions, motions_of
+from marey.jobs.migrate import check_revision, downgrade, upgrade
+from marey.jobs.operate import cancel, delete, pause, resume, retry, set_comment, set_fail_early, set_priority
+from marey.jobs.policy import Policy, policy
+from marey.jobs.quotas import check_room, usage
+from marey.jobs.references import ReferenceKind, ReferenceMatch, resolve_reference
+from marey.jobs.results import begin_assets, commit_motions, commit_texts, fail_items, release
+from marey.jobs.retention import KEPT, delete_expired, erase, rewrite_files
+from marey.jobs.reviews import MAX_REVIEWED, reroll, review
+from marey.jobs.schedules import (
     change_schedule,
     create_schedule,
     delete_schedule,
@@ -114,10 +114,10 @@ from shared.jobs.schedules import (
     list_schedules,
     run_schedule,
 )
-from shared.jobs.scoring import commit_score, load_score
-from shared.jobs.states import EvaluationState, ItemState, JobControl, JobState, Review, Stage, StreamState
-from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
-from shared.jobs.streams import (
+from marey.jobs.scoring import commit_score, load_score
+from marey.jobs.states import EvaluationState, ItemState, JobControl, JobState, Review, Stage, StreamState
+from marey.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
+from marey.jobs.streams import (
     abandoned_streams,
     add_chunk,
     create_stream,
@@ -130,10 +130,10 @@ from shared.jobs.streams import (
     take_stream,
     told_prompts,
 )
-from shared.jobs.submit import submit
-from shared.jobs.sweep import make_due, sweep
-from shared.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, Room, TenantRow, Usage
-from shared.jobs.tenants import (
+from marey.jobs.submit import submit
+from marey.jobs.sweep import make_due, sweep
+from marey.jobs.tenant_types import Actor, ApiKey, AuditRow, NewApiKey, Quotas, Room, TenantRow, Usage
+from marey.jobs.tenants import (
     create_tenant,
     get_tenant,
     list_tenants,
@@ -141,7 +141,7 @@ from shared.jobs.tenants import (
     set_quotas,
     suspend_tenant,
 )
-from shared.jobs.types import (
+from marey.jobs.types import (
     DEFAULT_TENANT,
     MAX_KEEP_DAYS,
     NO_TEXT,
@@ -163,7 +163,7 @@ from shared.jobs.types import (
     Reroll,
     SubmittedJob,
 )
-from shared.jobs.watch import (
+from marey.jobs.watch import (
     Outbox,
     QueueDepth,
     database_now,
@@ -173,7 +173,7 @@ from shared.jobs.watch import (
     queue_depths,
     server_version,
 )
-from shared.jobs.webhook_types import (
+from marey.jobs.webhook_types import (
     Attempt,
     AttemptRow,
     DeliveryRow,
@@ -184,7 +184,7 @@ from shared.jobs.webhook_types import (
     WebhookChange,
     WebhookRow,
 )
-from shared.jobs.webhooks import (
+from marey.jobs.webhooks import (
     change_webhook,
     create_webhook,
     delete_webhook,
@@ -192,7 +192,7 @@ from shared.jobs.webhooks import (
     list_webhooks,
     rotate_secret,
 )
-from shared.jobs.workers import beat, beat_scheduler, list_schedulers, list_workers, live_workers, retire
+from marey.jobs.workers import beat, beat_scheduler, list_schedulers, list_workers, live_workers, retire
 
 __all__ = [
     "BACKUP",

@@ -8,12 +8,12 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.tenant_types import Actor, AuditRow
-from shared.jobs.types import Page
+from marey.jobs import schema
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.tenant_types import Actor, AuditRow
+from marey.jobs.types import Page
 
 
 def audit(conn: sa.Connection, tenant: str, actor: Actor, verb: str, target: object, **data: object) -> None:

@@ -12,14 +12,14 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validato
 from sqlalchemy import exc
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import Conflict, InvalidFile
-from shared.jobs import schema
-from shared.jobs.evaluation_types import EVALUATOR_QUEUE
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, among
-from shared.jobs.lease_types import AssetDigest
-from shared.jobs.states import ENDED, JobControl, Review, Stage
-from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
+from marey.errors import Conflict, InvalidFile
+from marey.jobs import schema
+from marey.jobs.evaluation_types import EVALUATOR_QUEUE
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, among
+from marey.jobs.lease_types import AssetDigest
+from marey.jobs.states import ENDED, JobControl, Review, Stage
+from marey.jobs.types import NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
 
 CHUNK = 1000  # rows of one statement
 Row = TypeVar("Row")

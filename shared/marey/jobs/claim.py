@@ -9,12 +9,12 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
-from shared.jobs.lease_types import Claim, ClaimedItem, Heartbeat
-from shared.jobs.policy import Policy, policy
-from shared.jobs.quotas import room_to_run
-from shared.jobs.states import ItemState, JobControl, Stage
+from marey.jobs import schema
+from marey.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
+from marey.jobs.lease_types import Claim, ClaimedItem, Heartbeat
+from marey.jobs.policy import Policy, policy
+from marey.jobs.quotas import room_to_run
+from marey.jobs.states import ItemState, JobControl, Stage
 
 LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 

@@ -24,7 +24,7 @@ import sqlalchemy as sa
 import structlog
 from psycopg.waiting import Ready
 
-from shared.jobs.deadlines import CONNECT_SECONDS, ORDINARY, PING_SECONDS, ROLLBACK_SECONDS, Deadline, in_all
+from marey.jobs.deadlines import CONNECT_SECONDS, ORDINARY, PING_SECONDS, ROLLBACK_SECONDS, Deadline, in_all
 
 log = structlog.get_logger(__name__)
 

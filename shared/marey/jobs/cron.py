@@ -13,7 +13,7 @@ from zoneinfo import ZoneInfo, available_timezones
 
 from cronsim import CronSim, CronSimError
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 FIELDS = 5
 MAX_LENGTH = 200

@@ -10,9 +10,9 @@ import psycopg
 import sqlalchemy as sa
 from sqlalchemy import event, exc
 
-from shared.errors import Unreachable
-from shared.jobs.connections import ConnectionGroup, DeadlineConnection, group_of, milliseconds, open_connection
-from shared.jobs.deadlines import ORDINARY, PING_SECONDS, Deadline
+from marey.errors import Unreachable
+from marey.jobs.connections import ConnectionGroup, DeadlineConnection, group_of, milliseconds, open_connection
+from marey.jobs.deadlines import ORDINARY, PING_SECONDS, Deadline
 
 QUEUE_CHANNEL = "marey_queue"
 """NOTIFY channel: items of the queue in the payload became ready."""
@@ -32,7 +32,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
     """An engine for `postgresql+psycopg://…` (plain `postgresql://` is taken as the same).
 
     Connections are checked before use, so a restarted server costs no failed transaction. Every round trip has a
-    deadline (`shared.jobs.deadlines`); `deadline` is that of transactions that name no other.
+    deadline (`marey.jobs.deadlines`); `deadline` is that of transactions that name no other.
     """
     parsed = sa.make_url(url).set(drivername="postgresql+psycopg")
     group = group_of(parsed)
@@ -71,7 +71,7 @@ def transaction(
     """One transaction: commits at the end, rolls back on an exception.
 
     Args:
-        deadline: the kind of its calls (`shared.jobs.deadlines`); None = the engine's.
+        deadline: the kind of its calls (`marey.jobs.deadlines`); None = the engine's.
         snapshot: every statement sees the database as it was at the first one, and none may write.
 
     Raises:

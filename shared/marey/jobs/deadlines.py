@@ -3,7 +3,7 @@
 Each kind has two limits. The server ends a statement that runs for longer than `statement`; such a statement fails with
 a clean error and its connection stays usable. The client waits a little longer, `answer` seconds without a byte from
 the server, and then treats the connection as silent: it closes it, and every other connection of the process that is
-silent too (`shared.jobs.connections`). Waiting for a lock counts as running.
+silent too (`marey.jobs.connections`). Waiting for a lock counts as running.
 
 `transaction(engine, KIND)` chooses the kind. A process that makes long calls makes short ones beside them (the
 heartbeat of a worker, the LISTEN connections of API and scheduler), and finds a silent server within seconds by those.
@@ -59,7 +59,7 @@ MAINTENANCE = Deadline("maintenance", statement=60.0, idle=60.0)
 BACKUP = Deadline("backup", statement=300.0, idle=120.0)
 """Export and import of a tenant: whole jobs are read in one snapshot and checked in between."""
 MIGRATION = Deadline("migration", statement=3600.0, idle=600.0)
-"""Indexes over all items. Waits for tables have a limit of their own (`shared.jobs.migrate`)."""
+"""Indexes over all items. Waits for tables have a limit of their own (`marey.jobs.migrate`)."""
 
 
 def in_all(limit: float) -> float:

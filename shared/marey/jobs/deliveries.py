@@ -13,15 +13,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, NotFound
-from shared.jobs.audit import audit
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.schema import webhook, webhook_attempt, webhook_delivery, webhook_event
-from shared.jobs.tenant_types import Actor
-from shared.jobs.types import Page
-from shared.jobs.webhook_types import (
+from marey.errors import Conflict, NotFound
+from marey.jobs.audit import audit
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.schema import webhook, webhook_attempt, webhook_delivery, webhook_event
+from marey.jobs.tenant_types import Actor
+from marey.jobs.types import Page
+from marey.jobs.webhook_types import (
     TEST_KIND,
     Attempt,
     AttemptRow,
@@ -30,7 +30,7 @@ from shared.jobs.webhook_types import (
     DueDelivery,
     WebhookRow,
 )
-from shared.jobs.webhooks import get_webhook
+from marey.jobs.webhooks import get_webhook
 
 DELAYS = (5, 60, 600, 3600, 12_600, 25_200, 43_200)
 """Seconds between the eight tries: 23.7 hours in all."""

@@ -1,6 +1,6 @@
 """Errors of this room."""
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 
 class IdempotencyMismatch(InvalidInput):

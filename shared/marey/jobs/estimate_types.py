@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 
-from shared.jobs.states import JobState
+from marey.jobs.states import JobState
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.estimate_types import Estimate, QueuePlace, Speed
-from shared.jobs.listings import get_job
-from shared.jobs.states import ENDED, OPEN, JobControl
-from shared.jobs.types import TEXT_QUEUE
-from shared.jobs.workers import live_workers
+from marey.jobs import schema
+from marey.jobs.estimate_types import Estimate, QueuePlace, Speed
+from marey.jobs.listings import get_job
+from marey.jobs.states import ENDED, OPEN, JobControl
+from marey.jobs.types import TEXT_QUEUE
+from marey.jobs.workers import live_workers
 
 MEASURED = 2000
 """The last motions that were made, whoever's: a bundle that is not among them has no measure."""

@@ -8,10 +8,10 @@ from datetime import datetime
 from typing import Any
 from uuid import UUID
 
-from shared.jobs.ids import new_id
-from shared.jobs.lease_types import AssetDigest
-from shared.jobs.states import EvaluationState, ItemState, JobState
-from shared.jobs.types import Problem
+from marey.jobs.ids import new_id
+from marey.jobs.lease_types import AssetDigest
+from marey.jobs.states import EvaluationState, ItemState, JobState
+from marey.jobs.types import Problem
 
 EVALUATOR_QUEUE = "evaluator"
 """The queue of score items."""

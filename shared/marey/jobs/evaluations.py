@@ -13,10 +13,10 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import InvalidInput, NotFound
-from shared.evaluation_prompts import EvaluationPrompt, prompts_of, prompts_sha256
-from shared.jobs import schema
-from shared.jobs.evaluation_types import (
+from marey.errors import InvalidInput, NotFound
+from marey.evaluation_prompts import EvaluationPrompt, prompts_of, prompts_sha256
+from marey.jobs import schema
+from marey.jobs.evaluation_types import (
     EvaluationEvent,
     EvaluationJob,
     EvaluationRequest,
@@ -24,16 +24,16 @@ from shared.jobs.evaluation_types import (
     NewEvaluation,
     ReportFile,
 )
-from shared.jobs.files import files_of
-from shared.jobs.idempotency import take_key
-from shared.jobs.journal import CLOCK
-from shared.jobs.operate import cancel
-from shared.jobs.outbox import tell_of_evaluation
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
-from shared.jobs.submit import check_text
-from shared.jobs.types import Page
-from shared.jobs.workers import live_workers
+from marey.jobs.files import files_of
+from marey.jobs.idempotency import take_key
+from marey.jobs.journal import CLOCK
+from marey.jobs.operate import cancel
+from marey.jobs.outbox import tell_of_evaluation
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.states import ENDED, EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState, JobState
+from marey.jobs.submit import check_text
+from marey.jobs.types import Page
+from marey.jobs.workers import live_workers
 
 
 def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[EvaluationPrompt]) -> str:

@@ -9,8 +9,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.journal import among
+from marey.jobs import schema
+from marey.jobs.journal import among
 
 F = TypeVar("F")
 

@@ -11,20 +11,20 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.jobs import schema
-from shared.jobs.database import transaction
-from shared.jobs.deadlines import MAINTENANCE
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, among, interval
-from shared.jobs.policy import Policy, policy
-from shared.jobs.types import GarbageReport
+from marey.jobs import schema
+from marey.jobs.database import transaction
+from marey.jobs.deadlines import MAINTENANCE
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, among, interval
+from marey.jobs.policy import Policy, policy
+from marey.jobs.types import GarbageReport
 
 KEY = re.compile(r"t/([^/]+)/[0-9a-f]{2}/([0-9a-f]{64})")
 PAGE = 500
 
 
 class ObjectStore(Protocol):
-    """What garbage collection needs of an asset store (`shared.storage.AssetStore` fits)."""
+    """What garbage collection needs of an asset store (`marey.storage.AssetStore` fits)."""
 
     def delete(self, key: str) -> None: ...
     def keys(self, prefix: str = "") -> Iterator[str]: ...

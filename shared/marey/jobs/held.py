@@ -8,11 +8,11 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.journal import CLOCK, LockedJob, NewEvent, among, change_lanes, lock_job, returned
-from shared.jobs.lease_types import Committed
-from shared.jobs.states import Cause, ItemState
-from shared.jobs.types import Problem
+from marey.jobs import schema
+from marey.jobs.journal import CLOCK, LockedJob, NewEvent, among, change_lanes, lock_job, returned
+from marey.jobs.lease_types import Committed
+from marey.jobs.states import Cause, ItemState
+from marey.jobs.types import Problem
 
 LEASED_JOB = sa.text("SELECT job_id FROM lease WHERE token = :token")
 

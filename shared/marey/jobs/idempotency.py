@@ -8,11 +8,11 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import InvalidInput
-from shared.jobs import schema
-from shared.jobs.errors import IdempotencyMismatch
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.policy import policy
+from marey.errors import InvalidInput
+from marey.jobs import schema
+from marey.jobs.errors import IdempotencyMismatch
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.policy import policy
 
 Owner = Literal["job_id", "evaluation_id"]
 

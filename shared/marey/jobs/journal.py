@@ -11,11 +11,11 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, insert
 
-from shared.errors import NotFound
-from shared.jobs import schema
-from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
-from shared.jobs.outbox import tell_of_job
-from shared.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
+from marey.errors import NotFound
+from marey.jobs import schema
+from marey.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from marey.jobs.outbox import tell_of_job
+from marey.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
 
 CLOCK = sa.func.clock_timestamp()
 """Database time at this statement; `now()` is that of the transaction's begin, before it waited for locks."""

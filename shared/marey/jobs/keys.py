@@ -13,15 +13,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.characters import check_text
-from shared.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
-from shared.jobs import schema
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.tenant_types import ApiKey, NewApiKey
-from shared.jobs.tenants import get_tenant
-from shared.jobs.types import DEFAULT_TENANT
-from shared.rates import check_rates
+from marey.characters import check_text
+from marey.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
+from marey.jobs import schema
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.tenant_types import ApiKey, NewApiKey
+from marey.jobs.tenants import get_tenant
+from marey.jobs.types import DEFAULT_TENANT
+from marey.rates import check_rates
 
 SCOPES = frozenset({"read", "submit", "operate", "admin", "metrics"})
 """`admin` holds the first three; none of them holds `metrics`, which tells of all tenants."""
@@ -49,7 +49,7 @@ def create_key(
 
     Args:
         lifetime: seconds until it expires; None = never.
-        rates: its own rate limits, by class of request (`shared.rates`), before those of the server.
+        rates: its own rate limits, by class of request (`marey.rates`), before those of the server.
 
     Raises:
         InvalidInput: control characters in the name; an unknown scope, or none; a lifetime or rate that cannot be.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from uuid import UUID
 
-from shared.jobs.states import ItemState, Stage
-from shared.jobs.types import JsonObject, Problem
+from marey.jobs.states import ItemState, Stage
+from marey.jobs.types import JsonObject, Problem
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import psycopg
 import sqlalchemy as sa
 from psycopg import sql
 
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs.connections import DeadlineConnection, group_of, open_connection
-from shared.jobs.database import unreachable
-from shared.jobs.deadlines import ORDINARY, PING_SECONDS, PROBE_EVERY
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs.connections import DeadlineConnection, group_of, open_connection
+from marey.jobs.database import unreachable
+from marey.jobs.deadlines import ORDINARY, PING_SECONDS, PROBE_EVERY
 
 
 @dataclass(frozen=True)

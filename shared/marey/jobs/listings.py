@@ -8,14 +8,14 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import NotFound
-from shared.jobs import schema
-from shared.jobs.files import files_of
-from shared.jobs.journal import among, no_such_job
-from shared.jobs.pages import Order, cursor_at, cut_page, mark_of, page_limit, read_cursor
-from shared.jobs.searching import fetching_by_id, find_motions
-from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
-from shared.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionFilter, MotionRow, Page, Problem
+from marey.errors import NotFound
+from marey.jobs import schema
+from marey.jobs.files import files_of
+from marey.jobs.journal import among, no_such_job
+from marey.jobs.pages import Order, cursor_at, cut_page, mark_of, page_limit, read_cursor
+from marey.jobs.searching import fetching_by_id, find_motions
+from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from marey.jobs.types import EventRow, ItemRow, JobRow, MotionFile, MotionFilter, MotionRow, Page, Problem
 
 EVERYTHING = MotionFilter()
 

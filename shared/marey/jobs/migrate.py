@@ -14,10 +14,10 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 
-from shared.errors import Conflict, Unreachable
-from shared.jobs.database import transaction
-from shared.jobs.deadlines import MIGRATION
-from shared.versions import check_postgres
+from marey.errors import Conflict, Unreachable
+from marey.jobs.database import transaction
+from marey.jobs.deadlines import MIGRATION
+from marey.versions import check_postgres
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
 LOCK_SECONDS = 3.0
@@ -99,9 +99,9 @@ def check_revision(engine: sa.Engine) -> None:
 
 
 def _folder() -> Path:
-    found = importlib.util.find_spec("migrations")
+    found = importlib.util.find_spec("marey.migrations")
     if found is None or found.origin is None:
-        raise RuntimeError("the package `migrations` is part of the distribution")
+        raise RuntimeError("the package `marey.migrations` is part of the distribution")
     return Path(found.origin).parent
 
 

@@ -7,16 +7,16 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput
-from shared.jobs import schema
-from shared.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
-from shared.jobs.evaluation_types import EVALUATOR_QUEUE
-from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
-from shared.jobs.listings import get_job
-from shared.jobs.quotas import take_room
-from shared.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
-from shared.jobs.submit import check_share
-from shared.jobs.types import NO_TEXT, PRIORITY_LIMIT, JobRow
+from marey.errors import Conflict, InvalidInput
+from marey.jobs import schema
+from marey.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from marey.jobs.evaluation_types import EVALUATOR_QUEUE
+from marey.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
+from marey.jobs.listings import get_job
+from marey.jobs.quotas import take_room
+from marey.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
+from marey.jobs.submit import check_share
+from marey.jobs.types import NO_TEXT, PRIORITY_LIMIT, JobRow
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:

@@ -11,9 +11,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs.ids import new_id
-from shared.jobs.states import ENDED, EvaluationState, JobState, StreamState
-from shared.jobs.webhook_types import EventKind
+from marey.jobs.ids import new_id
+from marey.jobs.states import ENDED, EvaluationState, JobState, StreamState
+from marey.jobs.webhook_types import EventKind
 
 # A webhook that is just being deleted is waited for, and then not there: its deliveries could not refer to it.
 WRITE = sa.text("""

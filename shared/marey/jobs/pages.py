@@ -19,9 +19,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs.schema.base import Id, Time
-from shared.jobs.types import Page
+from marey.errors import InvalidInput
+from marey.jobs.schema.base import Id, Time
+from marey.jobs.types import Page
 
 LARGEST_PAGE = 1000
 SEPARATOR = "|"

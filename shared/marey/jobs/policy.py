@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from shared.settings import settings
+from marey.settings import settings
 
 
 @dataclass(frozen=True)

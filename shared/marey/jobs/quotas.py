@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from shared.errors import QuotaUsedUp
-from shared.jobs import schema
-from shared.jobs.tenant_types import Room, Usage
-from shared.jobs.tenants import get_tenant
+from marey.errors import QuotaUsedUp
+from marey.jobs import schema
+from marey.jobs.tenant_types import Room, Usage
+from marey.jobs.tenants import get_tenant
 
 EXPECTED_BYTES = 512 * 2**10
 """Of a motion's files where the tenant has none yet: five seconds as npz and BVH."""

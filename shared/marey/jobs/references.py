@@ -17,13 +17,13 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs import schema
-from shared.jobs.journal import among
-from shared.jobs.schema.base import short_id
-from shared.jobs.searching import motions_at
-from shared.jobs.submit import check_text
-from shared.jobs.webhooks import get_webhook
+from marey.errors import InvalidInput
+from marey.jobs import schema
+from marey.jobs.journal import among
+from marey.jobs.schema.base import short_id
+from marey.jobs.searching import motions_at
+from marey.jobs.submit import check_text
+from marey.jobs.webhooks import get_webhook
 
 LAST = "last"
 SHORT = 8

@@ -11,10 +11,10 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.jobs import schema
-from shared.jobs.held import HeldItem, document, drop_empty_lease, end_dead, end_items, give_back, hold
-from shared.jobs.ids import new_id
-from shared.jobs.journal import (
+from marey.jobs import schema
+from marey.jobs.held import HeldItem, document, drop_empty_lease, end_dead, end_items, give_back, hold
+from marey.jobs.ids import new_id
+from marey.jobs.journal import (
     CLOCK,
     LaneChange,
     LockedJob,
@@ -25,10 +25,10 @@ from shared.jobs.journal import (
     record,
     returned,
 )
-from shared.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
-from shared.jobs.operate import cancel_if_failing
-from shared.jobs.policy import Policy, policy
-from shared.jobs.states import Cause, ItemState, Stage
+from marey.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
+from marey.jobs.operate import cancel_if_failing
+from marey.jobs.policy import Policy, policy
+from marey.jobs.states import Cause, ItemState, Stage
 
 # The lease stays until the announcement stands; heartbeats may go on.
 HOLD_LEASE = sa.text("""

@@ -11,17 +11,17 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import Conflict, InvalidFile, NotFound
-from shared.jobs import schema
-from shared.jobs.database import transaction
-from shared.jobs.deadlines import BULK, MAINTENANCE
-from shared.jobs.gc import ObjectStore, asset_key, remove_unused_assets
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, LockedJob, NewEvent, lock_job_of, record
-from shared.jobs.operate import delete, refuse_needed
-from shared.jobs.states import ENDED
-from shared.jobs.submit import TEXTS_LOCK
-from shared.jobs.types import NO_TEXT, Erasure
+from marey.errors import Conflict, InvalidFile, NotFound
+from marey.jobs import schema
+from marey.jobs.database import transaction
+from marey.jobs.deadlines import BULK, MAINTENANCE
+from marey.jobs.gc import ObjectStore, asset_key, remove_unused_assets
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, LockedJob, NewEvent, lock_job_of, record
+from marey.jobs.operate import delete, refuse_needed
+from marey.jobs.states import ENDED
+from marey.jobs.submit import TEXTS_LOCK
+from marey.jobs.types import NO_TEXT, Erasure
 
 ROUND = 200
 """Jobs or files of one round."""
@@ -71,7 +71,7 @@ FORGET_TEXTS = sa.text("""
 
 
 class FileStore(ObjectStore, Protocol):
-    """What rewriting files needs of an asset store (`shared.storage.AssetStore` fits)."""
+    """What rewriting files needs of an asset store (`marey.storage.AssetStore` fits)."""
 
     def get(self, key: str) -> bytes: ...
     def put(self, key: str, source: bytes) -> object: ...

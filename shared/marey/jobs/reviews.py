@@ -10,15 +10,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput
-from shared.jobs import schema
-from shared.jobs.journal import CLOCK, LaneChange, LockedJob, NewEvent, among, change_lanes, lock_job_of, record
-from shared.jobs.listings import items_of, motions_of
-from shared.jobs.operate import refuse_erased, refuse_needed
-from shared.jobs.quotas import take_room
-from shared.jobs.states import ENDED, ItemState, JobControl, Review
-from shared.jobs.submit import check_text, write_items
-from shared.jobs.types import SEED_LIMIT, ItemRow, MotionRow, NewItem, Reroll
+from marey.errors import Conflict, InvalidInput
+from marey.jobs import schema
+from marey.jobs.journal import CLOCK, LaneChange, LockedJob, NewEvent, among, change_lanes, lock_job_of, record
+from marey.jobs.listings import items_of, motions_of
+from marey.jobs.operate import refuse_erased, refuse_needed
+from marey.jobs.quotas import take_room
+from marey.jobs.states import ENDED, ItemState, JobControl, Review
+from marey.jobs.submit import check_text, write_items
+from marey.jobs.types import SEED_LIMIT, ItemRow, MotionRow, NewItem, Reroll
 
 MAX_REVIEWED = 1000
 """Motions of one call."""

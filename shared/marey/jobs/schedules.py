@@ -9,17 +9,17 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput, NotFound
-from shared.jobs import schema
-from shared.jobs.cron import check_cron, check_zone, last_time, next_time
-from shared.jobs.evaluation_types import EvaluationRequest, NewEvaluation, NewSchedule, ScheduleChange, ScheduleRow
-from shared.jobs.evaluations import create_evaluation, lock_evaluation, move_evaluation
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.states import EvaluationState
-from shared.jobs.submit import check_text
-from shared.jobs.types import Page
+from marey.errors import InvalidInput, NotFound
+from marey.jobs import schema
+from marey.jobs.cron import check_cron, check_zone, last_time, next_time
+from marey.jobs.evaluation_types import EvaluationRequest, NewEvaluation, NewSchedule, ScheduleChange, ScheduleRow
+from marey.jobs.evaluations import create_evaluation, lock_evaluation, move_evaluation
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.states import EvaluationState
+from marey.jobs.submit import check_text
+from marey.jobs.types import Page
 
 
 def create_schedule(conn: sa.Connection, new: NewSchedule) -> UUID:

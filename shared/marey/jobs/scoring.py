@@ -8,9 +8,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, NotFound
-from shared.jobs import schema
-from shared.jobs.evaluation_types import (
+from marey.errors import Conflict, NotFound
+from marey.jobs import schema
+from marey.jobs.evaluation_types import (
     REPORT_FORMATS,
     EarlierRun,
     EvaluationRequest,
@@ -19,13 +19,13 @@ from shared.jobs.evaluation_types import (
     NewScore,
     ScoreRows,
 )
-from shared.jobs.evaluations import get_evaluation, load_prompts, lock_evaluation, move_evaluation
-from shared.jobs.held import Held, document, drop_empty_lease, end_items, hold
-from shared.jobs.journal import NewEvent, record
-from shared.jobs.lease_types import AssetDigest, Committed
-from shared.jobs.results import store_assets
-from shared.jobs.states import Cause, EvaluationState, ItemState
-from shared.jobs.types import Problem
+from marey.jobs.evaluations import get_evaluation, load_prompts, lock_evaluation, move_evaluation
+from marey.jobs.held import Held, document, drop_empty_lease, end_items, hold
+from marey.jobs.journal import NewEvent, record
+from marey.jobs.lease_types import AssetDigest, Committed
+from marey.jobs.results import store_assets
+from marey.jobs.states import Cause, EvaluationState, ItemState
+from marey.jobs.types import Problem
 
 OWN = ("index", "variant", "prompt", "seconds", "seed", "frames", "fps", "elapsed", "licence")
 HISTORY = 20

@@ -21,10 +21,10 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import TSQUERY
 
-from shared.jobs import schema
-from shared.jobs.pages import Order
-from shared.jobs.submit import check_text
-from shared.jobs.types import MotionFilter
+from marey.jobs import schema
+from marey.jobs.pages import Order
+from marey.jobs.submit import check_text
+from marey.jobs.types import MotionFilter
 
 WALKED = 20_000
 """Motions that are looked at in order before the index is asked: some 10 ms."""

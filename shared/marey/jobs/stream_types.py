@@ -8,10 +8,10 @@ from datetime import datetime
 from typing import NamedTuple
 from uuid import UUID
 
-from shared.jobs.states import StreamState
-from shared.jobs.types import Problem
-from shared.streams.acts import Begun
-from shared.streams.reads import ReadAs
+from marey.jobs.states import StreamState
+from marey.jobs.types import Problem
+from marey.streams.acts import Begun
+from marey.streams.reads import ReadAs
 
 
 @dataclass(frozen=True)

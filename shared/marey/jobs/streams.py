@@ -1,6 +1,6 @@
 """Live streams: rows that say where each stands, and chunks of tokens from which it goes on after its worker died.
 
-Who may write a stream is decided on Redis (`shared.streams.redis`): a lease of 1.5 s with a fencing number. Every write
+Who may write a stream is decided on Redis (`marey.streams.redis`): a lease of 1.5 s with a fencing number. Every write
 of a worker here names that number, and changes nothing once a newer lease has written.
 """
 
@@ -14,19 +14,19 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import Busy, NotFound
-from shared.jobs import schema
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.outbox import tell_of_stream
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.states import OPEN_STREAMS, StreamState
-from shared.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
-from shared.jobs.submit import check_text, submit
-from shared.jobs.tenants import get_tenant
-from shared.jobs.types import NewItem, NewJob, Page, Problem
-from shared.streams.acts import Begun
-from shared.streams.reads import ReadAs
+from marey.errors import Busy, NotFound
+from marey.jobs import schema
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.outbox import tell_of_stream
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.states import OPEN_STREAMS, StreamState
+from marey.jobs.stream_types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
+from marey.jobs.submit import check_text, submit
+from marey.jobs.tenants import get_tenant
+from marey.jobs.types import NewItem, NewJob, Page, Problem
+from marey.streams.acts import Begun
+from marey.streams.reads import ReadAs
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
 RETRY_SECONDS = 10

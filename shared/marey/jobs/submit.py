@@ -13,15 +13,15 @@ import psycopg
 import sqlalchemy as sa
 from psycopg import sql
 
-from shared import characters
-from shared.errors import InvalidInput
-from shared.jobs import schema
-from shared.jobs.idempotency import take_key
-from shared.jobs.ids import new_id
-from shared.jobs.journal import Lane, LaneChange, NewEvent, among, change_lanes, lock_job, record
-from shared.jobs.quotas import check_queue, take_room
-from shared.jobs.states import JobState, Stage
-from shared.jobs.types import (
+from marey import characters
+from marey.errors import InvalidInput
+from marey.jobs import schema
+from marey.jobs.idempotency import take_key
+from marey.jobs.ids import new_id
+from marey.jobs.journal import Lane, LaneChange, NewEvent, among, change_lanes, lock_job, record
+from marey.jobs.quotas import check_queue, take_room
+from marey.jobs.states import JobState, Stage
+from marey.jobs.types import (
     MAX_KEEP_DAYS,
     NO_TEXT,
     PRIORITY_LIMIT,
@@ -166,7 +166,7 @@ def check_share(share: float | None) -> None:
 
 
 def check_text(text: str | None, where: str) -> None:
-    """Check that Postgres can hold a text; what may come in is checked at the edge (`shared.characters`).
+    """Check that Postgres can hold a text; what may come in is checked at the edge (`marey.characters`).
 
     Raises:
         InvalidInput: it holds NUL or a lone surrogate.

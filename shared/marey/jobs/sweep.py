@@ -7,17 +7,17 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.jobs import schema
-from shared.jobs.database import transaction
-from shared.jobs.deadlines import BULK
-from shared.jobs.deliveries import forget_events
-from shared.jobs.held import drop_empty_lease, end_dead, give_back, held_items
-from shared.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
-from shared.jobs.lease_types import SweepReport
-from shared.jobs.operate import cancel_if_failing
-from shared.jobs.policy import Policy, policy
-from shared.jobs.states import Cause, ItemState
-from shared.jobs.types import Problem
+from marey.jobs import schema
+from marey.jobs.database import transaction
+from marey.jobs.deadlines import BULK
+from marey.jobs.deliveries import forget_events
+from marey.jobs.held import drop_empty_lease, end_dead, give_back, held_items
+from marey.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
+from marey.jobs.lease_types import SweepReport
+from marey.jobs.operate import cancel_if_failing
+from marey.jobs.policy import Policy, policy
+from marey.jobs.states import Cause, ItemState
+from marey.jobs.types import Problem
 
 
 def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:

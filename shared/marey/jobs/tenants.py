@@ -10,10 +10,10 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.errors import Conflict, InvalidInput, NotFound
-from shared.jobs import schema
-from shared.jobs.journal import CLOCK
-from shared.jobs.tenant_types import Quotas, TenantRow
+from marey.errors import Conflict, InvalidInput, NotFound
+from marey.jobs import schema
+from marey.jobs.journal import CLOCK
+from marey.jobs.tenant_types import Quotas, TenantRow
 
 FORM = re.compile(r"[a-z0-9][a-z0-9_-]{0,62}")
 LARGEST = {"queued": 2**31 - 1, "running": 2**31 - 1, "bytes": 2**63 - 1, "streams": 2**31 - 1}

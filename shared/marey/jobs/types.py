@@ -1,4 +1,4 @@
-"""What goes into and comes out of the repositories of `shared.jobs`: frozen dataclasses, nothing that knows SQL."""
+"""What goes into and comes out of the repositories of `marey.jobs`: frozen dataclasses, nothing that knows SQL."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from datetime import datetime
 from typing import Generic, TypeVar
 from uuid import UUID
 
-from shared.errors import MareyError
-from shared.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from marey.errors import MareyError
+from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
 
 DEFAULT_TENANT = "default"
 TEXT_QUEUE = "text"
@@ -28,7 +28,7 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class Problem:
-    """Why an item failed, for a person: the shape of `shared.errors.MareyError`."""
+    """Why an item failed, for a person: the shape of `marey.errors.MareyError`."""
 
     type: str
     message: str
@@ -99,7 +99,7 @@ class NewJob:
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
     traceparent: str | None = None
-    """Of the request, as `shared.tracing` writes it."""
+    """Of the request, as `marey.tracing` writes it."""
 
 
 @dataclass(frozen=True)

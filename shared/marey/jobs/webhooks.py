@@ -8,15 +8,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound
-from shared.jobs import schema
-from shared.jobs.ids import new_id
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.pages import Order, cut_page, mark_of, page_limit
-from shared.jobs.schema import webhook, webhook_delivery
-from shared.jobs.submit import check_text
-from shared.jobs.types import Page
-from shared.jobs.webhook_types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
+from marey.errors import Conflict, InvalidInput, NotFound
+from marey.jobs import schema
+from marey.jobs.ids import new_id
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.pages import Order, cut_page, mark_of, page_limit
+from marey.jobs.schema import webhook, webhook_delivery
+from marey.jobs.submit import check_text
+from marey.jobs.types import Page
+from marey.jobs.webhook_types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
 
 MAX_WEBHOOKS = 20
 """Of a tenant: each of its events is written once for each that wants it."""

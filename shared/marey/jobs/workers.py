@@ -5,10 +5,10 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from shared.jobs import schema
-from shared.jobs.journal import CLOCK, interval
-from shared.jobs.lease_types import SchedulerRow, WorkerBeat, WorkerRow
-from shared.jobs.policy import Policy, policy
+from marey.jobs import schema
+from marey.jobs.journal import CLOCK, interval
+from marey.jobs.lease_types import SchedulerRow, WorkerBeat, WorkerRow
+from marey.jobs.policy import Policy, policy
 
 SCHEDULER = "scheduler"
 """Queue of the rows by which schedulers say that they work: they are no workers."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.measures.inputs import Array, Numbers, at_least, embeddings, integers
+from marey.errors import InvalidInput
+from marey.measures.inputs import Array, Numbers, at_least, embeddings, integers
 
 _AT_ONCE = 2_000_000  # draws held: under 64 MB with what they pick
 

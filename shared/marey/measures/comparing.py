@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.measures.bootstrap import Difference, paired_bootstrap
-from shared.measures.scores import MotionScore
+from marey.errors import InvalidInput
+from marey.measures.bootstrap import Difference, paired_bootstrap
+from marey.measures.scores import MotionScore
 
 OBEYED, RETRIEVED = "obeyed", "r_precision_3_of_32"
 COMPARED = {OBEYED: "obeyed", RETRIEVED: "retrieved"}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 Array = NDArray[np.float64]
 Numbers = NDArray[Any]

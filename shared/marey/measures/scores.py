@@ -1,6 +1,6 @@
 """What was measured on each motion of an evaluation: the part of a report that later runs are paired with.
 
-Standard library only. The rest of a report is the evaluator's own (`workers.evaluator.report`).
+Standard library only. The rest of a report is the evaluator's own (`marey.evaluator.report`).
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from shared.documents import parse_json
-from shared.errors import InvalidFile, InvalidInput
+from marey.documents import parse_json
+from marey.errors import InvalidFile, InvalidInput
 
 SCHEMA, VERSION = "marey.evaluation-report", 1
 

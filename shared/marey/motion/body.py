@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import global_rotations
-from shared.motion.rotations import to_matrix
-from shared.motion.skeleton import Skeleton
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import global_rotations
+from marey.motion.rotations import to_matrix
+from marey.motion.skeleton import Skeleton
 
 Part = Literal["left", "right", "middle", "face"]
 Vector = tuple[float, float, float]

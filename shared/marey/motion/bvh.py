@@ -14,13 +14,13 @@ from typing import Literal
 
 import numpy as np
 
-from shared.errors import InvalidFile, NotFound, TooLarge
-from shared.motion.bvh_header import LARGEST, Header, Joint
-from shared.motion.bvh_write import format_bvh, write_bvh
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
-from shared.motion.skeleton import Skeleton, mirror_by_name
-from shared.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.errors import InvalidFile, NotFound, TooLarge
+from marey.motion.bvh_header import LARGEST, Header, Joint
+from marey.motion.bvh_write import format_bvh, write_bvh
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
+from marey.motion.skeleton import Skeleton, mirror_by_name
+from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 
 __all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "read_bvh", "write_bvh"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from shared.errors import InvalidFile, TooLarge
+from marey.errors import InvalidFile, TooLarge
 
 MAX_JOINTS = 512  # a rig with face and fingers has about 300
 LARGEST = 1e9  # of any number: a degree or a millimetre is never that much

@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shared.errors import Conflict, InvalidInput, TooLarge
-from shared.motion.bvh import MAX_FRAMES
-from shared.motion.bvh_write import Layout
-from shared.motion.files import write_atomically
-from shared.motion.rotations import Array, continuous_euler, slerp
-from shared.motion.skeleton import Skeleton
+from marey.errors import Conflict, InvalidInput, TooLarge
+from marey.motion.bvh import MAX_FRAMES
+from marey.motion.bvh_write import Layout
+from marey.motion.files import write_atomically
+from marey.motion.rotations import Array, continuous_euler, slerp
+from marey.motion.skeleton import Skeleton
 
 PAGE = 4096  # bytes; some systems have larger ones, whose borders are borders of these
 COUNT_WIDTH = len(str(MAX_FRAMES))

@@ -9,11 +9,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.files import write_atomically
-from shared.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
-from shared.motion.skeleton import Skeleton
-from shared.motion.units import METRES, Z_TO_Y, Unit, Up
+from marey.errors import InvalidInput
+from marey.motion.files import write_atomically
+from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
+from marey.motion.skeleton import Skeleton
+from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 
 
 class Posed(Protocol):

@@ -16,14 +16,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.arrays import check_array, text_of
-from shared.arrays import parse_npz as parse_arrays
-from shared.documents import parse_json
-from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
-from shared.motion.files import write_atomically
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.rotations import Array
-from shared.motion.skeleton import Skeleton, skeleton_of
+from marey.arrays import check_array, text_of
+from marey.arrays import parse_npz as parse_arrays
+from marey.documents import parse_json
+from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.motion.files import write_atomically
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import Array
+from marey.motion.skeleton import Skeleton, skeleton_of
 
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]

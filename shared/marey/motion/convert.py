@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.errors import Conflict, InvalidInput
-from shared.motion.bvh import BvhClip, read_bvh, write_bvh
-from shared.motion.clip import MotionClip, load_npz
-from shared.motion.feet import find_contacts
-from shared.motion.kinematics import facing, forward_kinematics
-from shared.motion.resample import frame_times, interpolate, interpolate_rotations, resample
-from shared.motion.rigs import feet_and_facing
-from shared.motion.rotations import Array, about, multiply, rotate
-from shared.motion.skeleton import known_order, skeleton_of
-from shared.motion.units import Unit, Up
+from marey.errors import Conflict, InvalidInput
+from marey.motion.bvh import BvhClip, read_bvh, write_bvh
+from marey.motion.clip import MotionClip, load_npz
+from marey.motion.feet import find_contacts
+from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
+from marey.motion.rigs import feet_and_facing
+from marey.motion.rotations import Array, about, multiply, rotate
+from marey.motion.skeleton import known_order, skeleton_of
+from marey.motion.units import Unit, Up
 
 KINDS = (".bvh", ".npz")
 

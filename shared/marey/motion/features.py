@@ -24,11 +24,11 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput, NotFound
-from shared.motion.filters import smooth
-from shared.motion.kinematics import across, facing
-from shared.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
-from shared.motion.skeleton import HUMANML3D, KIT, Skeleton
+from marey.errors import InvalidInput, NotFound
+from marey.motion.filters import smooth
+from marey.motion.kinematics import across, facing
+from marey.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d
+from marey.motion.skeleton import HUMANML3D, KIT, Skeleton
 
 Float32 = NDArray[np.float32]
 

@@ -17,10 +17,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.legs import follow_feet, foot_chain
-from shared.motion.rotations import Array, normalize
-from shared.motion.skeleton import Skeleton
+from marey.errors import InvalidInput
+from marey.motion.legs import follow_feet, foot_chain
+from marey.motion.rotations import Array, normalize
+from marey.motion.skeleton import Skeleton
 
 Bool = NDArray[np.bool_]
 

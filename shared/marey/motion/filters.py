@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.motion.rotations import Array
+from marey.motion.rotations import Array
 
 
 def smooth(values: Array, sigma: float, *, cut: float = 3.0) -> Array:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from shared.errors import InvalidInput
-from shared.motion.clip import MotionClip
-from shared.motion.features import FeatureLayout
-from shared.motion.feet import clean_feet, find_contacts
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.pose import solve_pose
-from shared.motion.resample import frame_times, interpolate, interpolate_rotations
-from shared.motion.rotations import Array
+from marey.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.features import FeatureLayout
+from marey.motion.feet import clean_feet, find_contacts
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.pose import solve_pose
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations
+from marey.motion.rotations import Array
 
 
 def finish_motion(

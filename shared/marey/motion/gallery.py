@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from shared.errors import InvalidInput
-from shared.motion.clip import MotionClip
-from shared.motion.files import write_atomically
-from shared.motion.pages import asset, fill, script_json, whole_page
-from shared.motion.paper import one_line
-from shared.motion.player import motion_document
+from marey.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.files import write_atomically
+from marey.motion.pages import asset, fill, script_json, whole_page
+from marey.motion.paper import one_line
+from marey.motion.player import motion_document
 
 MOST_CARDS = 400
 """Motions of a page: a clip of 10 s takes 50 kB."""

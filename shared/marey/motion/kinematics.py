@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.motion.rotations import Array, cross, multiply, normalize, rotate
-from shared.motion.skeleton import Skeleton
+from marey.motion.rotations import Array, cross, multiply, normalize, rotate
+from marey.motion.skeleton import Skeleton
 
 UP = np.array([0.0, 1.0, 0.0])
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.filters import smooth, smooth_above
-from shared.motion.kinematics import facing
-from shared.motion.rotations import Array, between, dot, length, normalize, rotate
-from shared.motion.skeleton import Skeleton
+from marey.motion.filters import smooth, smooth_above
+from marey.motion.kinematics import facing
+from marey.motion.rotations import Array, between, dot, length, normalize, rotate
+from marey.motion.skeleton import Skeleton
 
 STRETCH = 0.99  # of its length: how far a moved foot may stretch a leg that was not straighter before (16 degrees)
 MAX_DROP = 0.06  # metres that the hips come down for a foot; beyond that the foot gives way

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from shared.motion.features import Float32, HeadingLayout
-from shared.motion.feet import Bool
-from shared.motion.live_features import LiveDecoder, RootState
-from shared.motion.live_feet import FeetState, LiveFeet
-from shared.motion.live_poses import LivePoses, PoseState
-from shared.motion.rotations import Array
-from shared.motion.rows import Rows
-from shared.motion.skeleton import Skeleton
+from marey.motion.features import Float32, HeadingLayout
+from marey.motion.feet import Bool
+from marey.motion.live_features import LiveDecoder, RootState
+from marey.motion.live_feet import FeetState, LiveFeet
+from marey.motion.live_poses import LivePoses, PoseState
+from marey.motion.rotations import Array
+from marey.motion.rows import Rows
+from marey.motion.skeleton import Skeleton
 
 MEMORY = 40
 """Frames after which poses and feet no longer show where they began."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.motion.features import Float32, HeadingLayout, to_world
-from shared.motion.rotations import Array
-from shared.motion.rows import Rows
+from marey.errors import InvalidInput
+from marey.motion.features import Float32, HeadingLayout, to_world
+from marey.motion.rotations import Array
+from marey.motion.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,14 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.feet import FLOOR_BAND, RELEASE, RULE, Bool, ContactRule, need_feet, over_floor
-from shared.motion.kinematics import facing
-from shared.motion.legs import draw_foot, foot_chain, leg_lengths, soft_stretch, two_bone_knee
-from shared.motion.pose import checked_joints
-from shared.motion.rotations import Array, length
-from shared.motion.rows import Rows
-from shared.motion.skeleton import Skeleton
+from marey.errors import InvalidInput
+from marey.motion.feet import FLOOR_BAND, RELEASE, RULE, Bool, ContactRule, need_feet, over_floor
+from marey.motion.kinematics import facing
+from marey.motion.legs import draw_foot, foot_chain, leg_lengths, soft_stretch, two_bone_knee
+from marey.motion.pose import checked_joints
+from marey.motion.rotations import Array, length
+from marey.motion.rows import Rows
+from marey.motion.skeleton import Skeleton
 
 FLAT = slice(0, 3, 2)  # X and Z: the floor plane
 TOES = slice(1, 4, 2)  # of ankles and toes in the order of `Skeleton.feet`

@@ -11,9 +11,9 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from shared.motion.body import dress
-from shared.motion.pages import asset, body_document, code_hashes, fill, script_json, whole_page
-from shared.motion.skeleton import HUMANML3D
+from marey.motion.body import dress
+from marey.motion.pages import asset, body_document, code_hashes, fill, script_json, whole_page
+from marey.motion.skeleton import HUMANML3D
 
 SKELETONS = (HUMANML3D,)
 """Those that live streams have; another one is drawn as thin bones. The first stands there while there is no stream."""

@@ -21,12 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.pose import PLANE_PRIOR, Pose, checked_joints
-from shared.motion.rotations import Array, dot
-from shared.motion.rows import Rows
-from shared.motion.skeleton import Skeleton
-from shared.motion.solver import FrameSolver
+from marey.errors import InvalidInput
+from marey.motion.pose import PLANE_PRIOR, Pose, checked_joints
+from marey.motion.rotations import Array, dot
+from marey.motion.rows import Rows
+from marey.motion.skeleton import Skeleton
+from marey.motion.solver import FrameSolver
 
 SEEN_SECONDS = 0.05  # time constant of the mean of what frames show
 SPRING = 20.0  # 1/s; at 40 a limb that bends again turns by 50 degrees a frame at 20 fps, at 20 by 30

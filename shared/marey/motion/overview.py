@@ -10,11 +10,11 @@ from math import ceil, sqrt
 
 from PIL import Image
 
-from shared.errors import InvalidInput
-from shared.motion.clip import MotionClip
-from shared.motion.paper import Paper, Theme
-from shared.motion.render import MARGIN, draw_legend, facts_of
-from shared.motion.strip import chosen_frames, draw_lanes, draw_pose, make_strip
+from marey.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.paper import Paper, Theme
+from marey.motion.render import MARGIN, draw_legend, facts_of
+from marey.motion.strip import chosen_frames, draw_lanes, draw_pose, make_strip
 
 CELL = (112, 153)  # pixels a pose
 POSES = 6

@@ -14,16 +14,16 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 
-from shared.characters import escape
-from shared.motion.body import Body
-from shared.motion.skeleton import Skeleton
+from marey.characters import escape
+from marey.motion.body import Body
+from marey.motion.skeleton import Skeleton
 
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _POLICY = '\n<meta http-equiv="Content-Security-Policy" content="{policy}">'
 _STYLE = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 
 
-def asset(name: str, package: str = "shared.motion") -> str:
+def asset(name: str, package: str = "marey.motion") -> str:
     """The text of a file in a package's `assets`."""
     return (resources.files(package) / "assets" / name).read_text(encoding="utf-8")
 

@@ -11,8 +11,8 @@ from typing import Literal
 
 from PIL import Image, ImageDraw, ImageFont
 
-from shared.errors import InvalidInput
-from shared.motion.body import Part
+from marey.errors import InvalidInput
+from marey.motion.body import Part
 
 Colour = tuple[int, int, int]
 

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.body import dress_clip
-from shared.motion.clip import MotionClip
-from shared.motion.files import write_atomically
-from shared.motion.pages import asset, body_document, fill, script_json, whole_page
-from shared.motion.paper import one_line
-from shared.motion.render import caption_of, facts_of
+from marey.errors import InvalidInput
+from marey.motion.body import dress_clip
+from marey.motion.clip import MotionClip
+from marey.motion.files import write_atomically
+from marey.motion.pages import asset, body_document, fill, script_json, whole_page
+from marey.motion.paper import one_line
+from marey.motion.render import caption_of, facts_of
 
 THEMES = ("auto", "light", "dark")
 

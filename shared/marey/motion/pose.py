@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.motion.filters import smooth
-from shared.motion.kinematics import bone_lengths
-from shared.motion.rigid import bodies_of, fit_rotation, rest_vectors
-from shared.motion.rotations import Array, conjugate, normalize, rotate, unroll
-from shared.motion.skeleton import Skeleton
-from shared.motion.solver import FrameSolver
+from marey.errors import InvalidInput
+from marey.motion.filters import smooth
+from marey.motion.kinematics import bone_lengths
+from marey.motion.rigid import bodies_of, fit_rotation, rest_vectors
+from marey.motion.rotations import Array, conjugate, normalize, rotate, unroll
+from marey.motion.skeleton import Skeleton
+from marey.motion.solver import FrameSolver
 
 PLANE_SECONDS = 0.1  # standard deviation of the smoothing of bend planes in time
 PLANE_PRIOR = 0.05  # weight of the neutral swing beside a fully visible bend plane (1)

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from shared.errors import InvalidInput
-from shared.motion.body import Part, forward_of
-from shared.motion.clip import MotionClip
-from shared.motion.files import write_atomically
-from shared.motion.kinematics import facing
-from shared.motion.paper import Paper, Theme, theme_named
-from shared.motion.strip import Strip, chosen_frames, draw_lanes, draw_pose, make_strip, view_points
+from marey.errors import InvalidInput
+from marey.motion.body import Part, forward_of
+from marey.motion.clip import MotionClip
+from marey.motion.files import write_atomically
+from marey.motion.kinematics import facing
+from marey.motion.paper import Paper, Theme, theme_named
+from marey.motion.strip import Strip, chosen_frames, draw_lanes, draw_pose, make_strip, view_points
 
 CELL = (196, 268)  # pixels a pose
 PLAN = 232

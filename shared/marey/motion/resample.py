@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.rotations import Array, normalize, unroll
+from marey.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import Array, normalize, unroll
 
 SLOWEST, FASTEST = 1.0, 240.0  # frames a second; film and games use 23.976 to 120
 

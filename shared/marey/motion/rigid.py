@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shared.motion.rotations import Array, rotate
-from shared.motion.skeleton import Skeleton
+from marey.motion.rotations import Array, rotate
+from marey.motion.skeleton import Skeleton
 
 
 class BodyFit:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from shared.motion.skeleton import Skeleton
+from marey.motion.skeleton import Skeleton
 
 _SIDES = {"l": 0, "left": 0, "r": 1, "right": 1}
 # In order of trust: `shoulder` is the upper arm in SMPL and the collar bone elsewhere, `hip` the thigh in some.

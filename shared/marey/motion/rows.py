@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from shared.motion.rotations import Array
+from marey.motion.rotations import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,8 +31,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.rigid import BodyFit, bodies_of
-from shared.motion.rotations import (
+from marey.motion.rigid import BodyFit, bodies_of
+from marey.motion.rotations import (
     IDENTITY,
     Array,
     aimed,
@@ -45,7 +45,7 @@ from shared.motion.rotations import (
     normalize,
     rotate,
 )
-from shared.motion.skeleton import Skeleton
+from marey.motion.skeleton import Skeleton
 
 # Neutral limb directions of a left limb in its parent's T-pose frame: the middle of what the joint can reach, so that
 # the opposite direction, where the shortest swing is not defined, is out of reach (up and back, behind the body).

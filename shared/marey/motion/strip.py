@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageChops, ImageDraw, ImageFilter
 
-from shared.errors import InvalidInput
-from shared.motion.body import Body, dress_clip
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import global_rotations
-from shared.motion.paper import Paper, Theme, blend
-from shared.motion.raster import Camera, shade
-from shared.motion.rotations import to_matrix
+from marey.errors import InvalidInput
+from marey.motion.body import Body, dress_clip
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import global_rotations
+from marey.motion.paper import Paper, Theme, blend
+from marey.motion.raster import Camera, shade
+from marey.motion.rotations import to_matrix
 
 SMOOTH = 2  # figures are drawn this much larger and shrunk
 GRID = 0.5  # metres

@@ -11,9 +11,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from shared.bundles import Bundle, BundleWriter, TextSpec
-from shared.errors import InvalidBundle
-from shared.motion.features import layout
+from marey.bundles import Bundle, BundleWriter, TextSpec
+from marey.errors import InvalidBundle
+from marey.motion.features import layout
 
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})
 """Of a tokenizer: state of the codebooks' training, as large as they; and what stands in the bundle's statistics."""

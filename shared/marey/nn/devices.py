@@ -1,6 +1,6 @@
 """Which device, and what it does fast.
 
-`python -m shared.nn.devices cuda` says whether there is one, for processes that do without torch.
+`python -m marey.nn.devices cuda` says whether there is one, for processes that do without torch.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import torch
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 HINT = "Set MAREY_DEVICE (of a training, --device) to cpu or auto."
 

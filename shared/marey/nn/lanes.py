@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import torch
 
-from shared.nn.threads import one_thread
+from marey.nn.threads import one_thread
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import torch
 from torch import Tensor, nn
 
-from shared.nn.quantizer import Quantized
+from marey.nn.quantizer import Quantized
 
 ROOT = slice(0, 4)
 """Yaw rate, X and Z displacement, height: the columns every HumanML3D-like layout begins with."""

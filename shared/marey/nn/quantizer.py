@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from shared.nn.distributed import all_reduce_sum, broadcast
+from marey.nn.distributed import all_reduce_sum, broadcast
 
 NO_TOKEN = -1
 """Token of a level that was dropped, or of a position beyond the clip: decodes to the zero vector."""

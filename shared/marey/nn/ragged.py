@@ -2,7 +2,7 @@
 
 Everything but attention acts on each row alone, so only rows that exist are computed, (R, w) for the whole batch; for
 attention they are laid out in sequences padded to whole vectors (`ROWS`, `pad_length`). Packed products give a row
-the same bits beside any others (`shared.nn.packed`), so a batch changes nobody's.
+the same bits beside any others (`marey.nn.packed`), so a batch changes nobody's.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-from shared.nn.quantizer import ResidualQuantizer
+from marey.nn.quantizer import ResidualQuantizer
 
 Scale = Literal["elementwise", "scalar", "none"]
 

@@ -13,9 +13,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.lanes import ONE_LANE, Lanes
-from shared.nn.packed import can_pack, pack_linears, packed_gelu
-from shared.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
+from marey.nn.lanes import ONE_LANE, Lanes
+from marey.nn.packed import can_pack, pack_linears, packed_gelu
+from marey.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
 
 
 def dropout(x: Tensor, rate: float, *, training: bool) -> Tensor:

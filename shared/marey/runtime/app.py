@@ -72,7 +72,7 @@ class QueueAMQP(AMQP):
 
 def create_app(queue_url: str) -> Celery:
     """The app on `queue_url` (`redis://…`, `rediss://…` or `redis+socket:///path`). Connects to nothing yet."""
-    app = Celery("marey", broker=queue_url, amqp=f"{__name__}:{QueueAMQP.__name__}", include=["shared.runtime.tasks"])
+    app = Celery("marey", broker=queue_url, amqp=f"{__name__}:{QueueAMQP.__name__}", include=["marey.runtime.tasks"])
     app.conf.update(
         broker_transport_options=transport_options(),
         result_backend_transport_options={"visibility_timeout": VISIBILITY_TIMEOUT},

@@ -14,20 +14,20 @@ from types import FrameType
 from typing import cast
 from uuid import UUID
 
-from shared.errors import InvalidInput, Unreachable
-from shared.jobs import HEARTBEAT, WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
-from shared.jobs import Heartbeat as Answer
-from shared.runtime.committer import Committer
-from shared.runtime.exposition import expose, measure_gpu
-from shared.runtime.faults import patiently
-from shared.runtime.handler import Handler, HandlerFactory, Role
-from shared.runtime.lease import Heartbeat
-from shared.runtime.logs import configure_logging, logger
-from shared.runtime.loop import Drain, end_child
-from shared.runtime.status import WorkerStatus, status_file, write_status
-from shared.settings import Settings, settings
-from shared.storage import open_store
-from shared.tracing import configure_tracing, end_tracing
+from marey.errors import InvalidInput, Unreachable
+from marey.jobs import HEARTBEAT, WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
+from marey.jobs import Heartbeat as Answer
+from marey.runtime.committer import Committer
+from marey.runtime.exposition import expose, measure_gpu
+from marey.runtime.faults import patiently
+from marey.runtime.handler import Handler, HandlerFactory, Role
+from marey.runtime.lease import Heartbeat
+from marey.runtime.logs import configure_logging, logger
+from marey.runtime.loop import Drain, end_child
+from marey.runtime.status import WorkerStatus, status_file, write_status
+from marey.settings import Settings, settings
+from marey.storage import open_store
+from marey.tracing import configure_tracing, end_tracing
 
 log = logger(__name__)
 

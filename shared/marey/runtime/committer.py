@@ -13,8 +13,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import MareyError, Unreachable
-from shared.jobs import (
+from marey.errors import MareyError, Unreachable
+from marey.jobs import (
     AssetDigest,
     Committed,
     ItemFailure,
@@ -31,12 +31,12 @@ from shared.jobs import (
     release,
     transaction,
 )
-from shared.runtime.faults import as_problem, patiently
-from shared.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
-from shared.runtime.lease import Heartbeat, HeldLease
-from shared.runtime.logs import logger
-from shared.runtime.watching import ids_of
-from shared.storage import AssetStore, NewObject
+from marey.runtime.faults import as_problem, patiently
+from marey.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
+from marey.runtime.lease import Heartbeat, HeldLease
+from marey.runtime.logs import logger
+from marey.runtime.watching import ids_of
+from marey.storage import AssetStore, NewObject
 
 log = logger(__name__)
 

@@ -6,10 +6,10 @@ import sys
 
 from prometheus_client import start_http_server
 
-from shared import metrics
-from shared.errors import Conflict
-from shared.runtime.logs import logger
-from shared.settings import Settings
+from marey import metrics
+from marey.errors import Conflict
+from marey.runtime.logs import logger
+from marey.settings import Settings
 
 log = logger(__name__)
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import tenacity
 
-from shared.errors import MareyError, Unreachable
+from marey.errors import MareyError, Unreachable
 
 T = TypeVar("T")
 

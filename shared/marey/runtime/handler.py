@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 from uuid import UUID
 
-from shared.errors import MareyError
-from shared.jobs.lease_types import Claim, ClaimedItem
-from shared.runtime.scoring import ScoreInput
+from marey.errors import MareyError
+from marey.jobs.lease_types import Claim, ClaimedItem
+from marey.runtime.scoring import ScoreInput
 
 
 @dataclass(frozen=True)

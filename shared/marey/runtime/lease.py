@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable, Collection, Iterable
 from uuid import UUID
 
-from shared.errors import Unreachable
-from shared.jobs import Claim
-from shared.jobs import Heartbeat as Answer
-from shared.runtime.logs import logger
-from shared.runtime.watching import Work
+from marey.errors import Unreachable
+from marey.jobs import Claim
+from marey.jobs import Heartbeat as Answer
+from marey.runtime.logs import logger
+from marey.runtime.watching import Work
 
 log = logger(__name__)
 
@@ -27,7 +27,7 @@ Renew = Callable[[UUID, Collection[UUID], bool], Answer]
 class HeldLease:
     """A claim being worked on: what the handler tells the heartbeat and what the heartbeat tells the handler.
 
-    It is the `BatchControl` of `shared.runtime.handler`. Its state is a few attributes replaced as a whole, so the
+    It is the `BatchControl` of `marey.runtime.handler`. Its state is a few attributes replaced as a whole, so the
     decode loop pays no lock.
     """
 

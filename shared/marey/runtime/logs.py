@@ -1,6 +1,6 @@
 """Structured logs: JSON lines for machines, readable lines for people, never a prompt or a secret.
 
-Lines about work carry its `job`, `lease` and `trace` by themselves (`shared.runtime.watching`); those of a request its
+Lines about work carry its `job`, `lease` and `trace` by themselves (`marey.runtime.watching`); those of a request its
 `trace`. Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
 """
 
@@ -15,8 +15,8 @@ import structlog
 from structlog.stdlib import BoundLogger
 from structlog.typing import EventDict, ExcInfo, Processor, WrappedLogger
 
-from shared import tracing
-from shared.characters import escape, unescaped
+from marey import tracing
+from marey.characters import escape, unescaped
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
 """Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""

@@ -14,16 +14,16 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import MareyError, Unreachable
-from shared.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts, transaction
-from shared.runtime.committer import Committer
-from shared.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
-from shared.runtime.handler import Batch, Failed, Handler
-from shared.runtime.lease import Heartbeat, HeldLease
-from shared.runtime.logs import logger
-from shared.runtime.scoring import score_input
-from shared.runtime.watching import ids_of
-from shared.storage import AssetStore
+from marey.errors import MareyError, Unreachable
+from marey.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts, transaction
+from marey.runtime.committer import Committer
+from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
+from marey.runtime.handler import Batch, Failed, Handler
+from marey.runtime.lease import Heartbeat, HeldLease
+from marey.runtime.logs import logger
+from marey.runtime.scoring import score_input
+from marey.runtime.watching import ids_of
+from marey.storage import AssetStore
 
 log = logger(__name__)
 

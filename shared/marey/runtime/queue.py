@@ -12,9 +12,9 @@ import redis
 from redis.backoff import NoBackoff
 from redis.retry import Retry
 
-from shared.errors import Unreachable
-from shared.runtime.app import CONNECT_TIMEOUT, HEALTH_CHECK_INTERVAL, SOCKET_TIMEOUT
-from shared.versions import check_redis
+from marey.errors import Unreachable
+from marey.runtime.app import CONNECT_TIMEOUT, HEALTH_CHECK_INTERVAL, SOCKET_TIMEOUT
+from marey.versions import check_redis
 
 SOCKET_SCHEME = "redis+socket://"
 

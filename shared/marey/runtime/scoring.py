@@ -8,8 +8,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.errors import NotFound
-from shared.jobs import (
+from marey.errors import NotFound
+from marey.jobs import (
     SEARCH,
     EarlierRun,
     EvaluationJob,
@@ -19,7 +19,7 @@ from shared.jobs import (
     load_score,
     transaction,
 )
-from shared.storage import AssetStore
+from marey.storage import AssetStore
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds. Live
 workers and the scheduler say the same, each by a `Teller`.
 
-`python -m shared.runtime.status` is the liveness probe of a machine's workers, with `ready` the readiness probe.
+`python -m marey.runtime.status` is the liveness probe of a machine's workers, with `ready` the readiness probe.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from pathlib import Path
 
 import psutil
 
-from shared.errors import MareyError
-from shared.private_home import open_private
-from shared.settings import settings
+from marey.errors import MareyError
+from marey.private_home import open_private
+from marey.settings import settings
 
 TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats

@@ -11,12 +11,12 @@ import time
 from celery import shared_task
 from celery.signals import worker_process_init, worker_process_shutdown
 
-from shared.errors import MareyError, Unreachable
-from shared.runtime.app import DRAIN
-from shared.runtime.child import NAME_VARIABLE, Child
-from shared.runtime.logs import logger
-from shared.runtime.status import WorkerStatus, write_status
-from shared.settings import settings
+from marey.errors import MareyError, Unreachable
+from marey.runtime.app import DRAIN
+from marey.runtime.child import NAME_VARIABLE, Child
+from marey.runtime.logs import logger
+from marey.runtime.status import WorkerStatus, write_status
+from marey.settings import settings
 
 log = logger(__name__)
 

@@ -9,9 +9,9 @@ from uuid import UUID
 
 from structlog.contextvars import bound_contextvars
 
-from shared import metrics, tracing
-from shared.jobs import Claim
-from shared.tracing import Span
+from marey import metrics, tracing
+from marey.jobs import Claim
+from marey.tracing import Span
 
 MOST_IDS = 64
 """Items named in one attribute or line; a claim holds no more."""

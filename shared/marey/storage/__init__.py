@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shared.errors import InvalidInput
-from shared.settings import Settings
-from shared.storage.folder import FolderStore
-from shared.storage.port import CHUNK, PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
+from marey.errors import InvalidInput
+from marey.settings import Settings
+from marey.storage.folder import FolderStore
+from marey.storage.port import CHUNK, PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
 
 __all__ = [
     "CHUNK",
@@ -46,7 +46,7 @@ def open_store(chosen: Settings) -> AssetStore:
             where="MAREY_STORE",
             hint="Set MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY (or the _FILE of each).",
         )
-    from shared.storage.s3 import S3Options, S3Store  # minio costs 0.2 s of import; the folder does without
+    from marey.storage.s3 import S3Options, S3Store  # minio costs 0.2 s of import; the folder does without
 
     return S3Store(
         S3Options(

@@ -14,9 +14,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from shared.errors import Unreachable
-from shared.metrics import STORE_ERRORS
-from shared.storage.port import (
+from marey.errors import Unreachable
+from marey.metrics import STORE_ERRORS
+from marey.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
     PUBLIC,

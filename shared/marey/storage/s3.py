@@ -14,11 +14,11 @@ import urllib3
 from minio import Minio
 from minio.error import InvalidResponseError, MinioException, S3Error, ServerError
 
-from shared.disposition import attachment
-from shared.errors import Unreachable
-from shared.metrics import STORE_ERRORS
-from shared.storage.deadlines import Silence, open_pool
-from shared.storage.port import (
+from marey.disposition import attachment
+from marey.errors import Unreachable
+from marey.metrics import STORE_ERRORS
+from marey.storage.deadlines import Silence, open_pool
+from marey.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,
     PUBLIC,
@@ -31,7 +31,7 @@ from shared.storage.port import (
     no_such_object,
     range_past_end,
 )
-from shared.tls import UNTRUSTED_HINT, trusting_context, verification_error
+from marey.tls import UNTRUSTED_HINT, trusting_context, verification_error
 
 PROBE = "doctor/none"
 """A key without an object."""

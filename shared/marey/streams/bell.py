@@ -11,7 +11,7 @@ from typing import Any
 
 import redis
 
-from shared.streams.redis import reached
+from marey.streams.redis import reached
 
 KEY = "marey:streams:begun"
 

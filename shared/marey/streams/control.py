@@ -13,8 +13,8 @@ from typing import Any, Literal, cast, get_args
 
 import redis
 
-from shared.errors import InvalidInput
-from shared.streams.redis import BLOCK_MS, KEEP_MS, reached, stream_entries, stream_key
+from marey.errors import InvalidInput
+from marey.streams.redis import BLOCK_MS, KEEP_MS, reached, stream_entries, stream_key
 
 Kind = Literal["steer", "pause", "resume", "stop"]
 KINDS: tuple[str, ...] = get_args(Kind)

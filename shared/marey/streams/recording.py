@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
-from shared.arrays import parse_safetensors
-from shared.documents import parse_json
-from shared.errors import InvalidFile
-from shared.text.features import TextFeatures
+from marey.arrays import parse_safetensors
+from marey.documents import parse_json
+from marey.errors import InvalidFile
+from marey.text.features import TextFeatures
 
 FORMAT = 1
 Prompts: TypeAlias = Sequence[tuple[int, str]]

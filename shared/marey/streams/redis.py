@@ -26,8 +26,8 @@ from redis.exceptions import ConnectionError as NoConnection
 from redis.exceptions import OutOfMemoryError, ReadOnlyError
 from redis.exceptions import TimeoutError as TookTooLong
 
-from shared.errors import Conflict, InvalidInput, Unreachable
-from shared.streams.frames import Frame, encode_frame
+from marey.errors import Conflict, InvalidInput, Unreachable
+from marey.streams.frames import Frame, encode_frame
 
 LEASE_MS = 1500
 RENEW_SECONDS = 0.4  # three renewals may fail before the lease is lost
@@ -121,7 +121,7 @@ class FrameStream:
     """The frames of one stream.
 
     Args:
-        client: answers in bytes (`decode_responses` off), with timeouts (`shared.runtime.queue.redis_client`).
+        client: answers in bytes (`decode_responses` off), with timeouts (`marey.runtime.queue.redis_client`).
         stream: its id, 1 to 64 letters, digits, `_` and `-`.
         lease_ms, kept, keep_ms: how long a lease lasts, how many frames are kept, how long an idle stream is.
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import redis
 
-from shared.streams.redis import reached, stream_key
+from marey.streams.redis import reached, stream_key
 
 KEEP_MS = 10_000
 TOUCH_SECONDS = 3.0  # two may fail before the key is gone

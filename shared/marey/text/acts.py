@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from shared.text.clauses import LIMBS, LISTS, SIDES, SUBJECTS, Clause
-from shared.text.graph import SemanticGraph
-from shared.text.telling import noun_of, told
+from marey.text.clauses import LIMBS, LISTS, SIDES, SUBJECTS, Clause
+from marey.text.graph import SemanticGraph
+from marey.text.telling import noun_of, told
 
 MOST = 6
 """Acts of a prompt; what comes behind them stays in the last."""

@@ -3,7 +3,7 @@ the parser that GraphMotion and HGM³ used.
 
 BERT over the words' pieces, the predicate marked by token type 1, one linear layer to BIO tags, Viterbi over the
 probabilities. AllenNLP took its predicates from spaCy's part-of-speech tagger; here they come from the `light`
-labeller, which learned them from that tool's output. Import the archive once with `python -m shared.text.convert`.
+labeller, which learned them from that tool's output. Import the archive once with `python -m marey.text.convert`.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Any
 
 import torch
 
-from shared.bundles import Bundle, find_bundle
-from shared.errors import InvalidBundle
-from shared.nn.threads import one_thread
-from shared.text.bio import start_scores, transition_scores, viterbi
-from shared.text.keys import labeller_bundle
-from shared.text.roles import Frame, PredicateFinder, spans_to_arguments
-from shared.text.wordpiece import WordPieces
+from marey.bundles import Bundle, find_bundle
+from marey.errors import InvalidBundle
+from marey.nn.threads import one_thread
+from marey.text.bio import start_scores, transition_scores, viterbi
+from marey.text.keys import labeller_bundle
+from marey.text.roles import Frame, PredicateFinder, spans_to_arguments
+from marey.text.wordpiece import WordPieces
 
 PREFIX = "bert_model."
 PROJECTION = "tag_projection_layer."
@@ -84,6 +84,6 @@ class BertLabeller:
 
 
 def _light() -> PredicateFinder:
-    from shared.text.light import LightLabeller
+    from marey.text.light import LightLabeller
 
     return LightLabeller.load(find_bundle(labeller_bundle("light")))

@@ -1,7 +1,7 @@
 """Importing public weights, once, offline: pickled checkpoints become safetensors. Nothing else here reads pickle.
 
-    python -m shared.text.convert bert-srl ARCHIVE.tar.gz --bert FOLDER -o models/srl-bert
-    python -m shared.text.convert encoder FOLDER
+    python -m marey.text.convert bert-srl ARCHIVE.tar.gz --bert FOLDER -o models/srl-bert
+    python -m marey.text.convert encoder FOLDER
 
 `--bert` names a folder with the `config.json` and `vocab.txt` of bert-base-uncased: the archive only names the model.
 Checkpoints are read with `weights_only=True`, which refuses anything but tensors.
@@ -22,11 +22,11 @@ from typing import IO, Any, cast
 import torch
 from safetensors.torch import save_file  # pyright: ignore[reportUnknownVariableType]
 
-from shared.bundles import Bundle, BundleWriter, DataSource
-from shared.characters import escape
-from shared.errors import InvalidFile, MareyError
-from shared.text.bert_srl import PREFIX, PROJECTION
-from shared.text.pretrained import read_config
+from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.characters import escape
+from marey.errors import InvalidFile, MareyError
+from marey.text.bert_srl import PREFIX, PROJECTION
+from marey.text.pretrained import read_config
 
 ARCHIVE_FILES = ("config.json", "weights.th", "vocabulary/labels.txt")
 
@@ -125,14 +125,14 @@ def _read_tar(archive: Path) -> dict[str, bytes]:
 
 CARD = """# Role labeller imported from AllenNLP
 
-`structured-prediction-srl-bert` ({name}), Shi & Lin 2019, converted to safetensors by `python -m shared.text.convert`.
+`structured-prediction-srl-bert` ({name}), Shi & Lin 2019, converted to safetensors by `python -m marey.text.convert`.
 Trained by AllenNLP on OntoNotes 5.0. Predicates come from the `light` labeller, not from spaCy.
 """
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The command line of this module; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m shared.text.convert", description=__doc__.split("\n")[0])  # pyright: ignore[reportOptionalMemberAccess]
+    parser = argparse.ArgumentParser(prog="python -m marey.text.convert", description=__doc__.split("\n")[0])  # pyright: ignore[reportOptionalMemberAccess]
     commands = parser.add_subparsers(dest="command", required=True)
     srl = commands.add_parser("bert-srl", help="an AllenNLP SRL archive to a labeller bundle")
     srl.add_argument("archive", type=Path)

@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidFile, NotFound
-from shared.hashing import sha256_of
-from shared.settings import Settings, settings
+from marey.errors import InvalidFile, NotFound
+from marey.hashing import sha256_of
+from marey.settings import Settings, settings
 
 WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
 HUB = {
@@ -115,7 +115,7 @@ def weights_sha256(folder: Path) -> str:
         raise InvalidFile(
             "holds no safetensors file",
             where=str(folder),
-            hint="Pickled weights are not loaded: convert them once with `python -m shared.text.convert`.",
+            hint="Pickled weights are not loaded: convert them once with `python -m marey.text.convert`.",
         )
     hashes = [_file_sha256(file, file.stat().st_mtime_ns, file.stat().st_size) for file in files]
     return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
-from shared.arrays import parse_safetensors
-from shared.documents import parse_json
-from shared.errors import InvalidFile
-from shared.text.graph import SemanticGraph
+from marey.arrays import parse_safetensors
+from marey.documents import parse_json
+from marey.errors import InvalidFile
+from marey.text.graph import SemanticGraph
 
 FORMAT = 1
 MAX_HEADER_BYTES = 2**20
@@ -29,7 +29,7 @@ class TextFeatures:
     graph: SemanticGraph  # of the rewritten prompt
     nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
     not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
-    acts: tuple[str, ...] = ()  # where there are several (`shared.text.acts`): each as a sentence, in the order of time
+    acts: tuple[str, ...] = ()  # where there are several (`marey.text.acts`): each as a sentence, in the order of time
     act_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
 
     @property

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from shared.errors import InvalidFile, NotFound, Unreachable
-from shared.settings import Settings, settings
-from shared.text.encoders import find_weights
+from marey.errors import InvalidFile, NotFound, Unreachable
+from marey.settings import Settings, settings
+from marey.text.encoders import find_weights
 
 log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.text.roles import Frame
+from marey.text.roles import Frame
 
 LEVELS = ("motion", "action", "specific")
 EDGE_TYPES = (

@@ -6,8 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 
-from shared.text.graph import SemanticGraph
-from shared.text.words import DIRECTIONS, NUMBERS, SIDES, bare, lemma
+from marey.text.graph import SemanticGraph
+from marey.text.words import DIRECTIONS, NUMBERS, SIDES, bare, lemma
 
 LIGHT_VERBS = frozenset({"be"})
 _DIGITS = re.compile(r"^(\d+(?:[.,]\d+)?)\D{0,3}$")

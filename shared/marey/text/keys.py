@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 
-from shared.bundles import TextSpec, find_bundle
-from shared.errors import InvalidBundle
-from shared.settings import Settings, settings
+from marey.bundles import TextSpec, find_bundle
+from marey.errors import InvalidBundle
+from marey.settings import Settings, settings
 
 PIPELINE_VERSION = 5
 """Raise it when the graph, the acts or the features of the same prompt change for any reason but weights."""
@@ -30,7 +30,7 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
     if spec.encoder_sha256 is None or (spec.labeller_sha256 is None and spec.labeller != NO_LABELLER):
         raise InvalidBundle(
             "the bundle does not say which encoder and labeller weights it was trained with",
-            hint="Resolve its text specification first (shared.text.keys.resolve).",
+            hint="Resolve its text specification first (marey.text.keys.resolve).",
         )
     parts = [
         PIPELINE_VERSION,
@@ -60,7 +60,7 @@ def resolve(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
     """
     changes: dict[str, str] = {}
     if spec.encoder_sha256 is None:
-        from shared.text.encoders import find_weights, weights_sha256
+        from marey.text.encoders import find_weights, weights_sha256
 
         changes["encoder_sha256"] = weights_sha256(find_weights(spec.encoder, config=config))
     if spec.labeller_sha256 is None and spec.labeller != NO_LABELLER:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from shared.text.keys import NO_LABELLER
-from shared.text.roles import Frame, RoleLabeller
+from marey.text.keys import NO_LABELLER
+from marey.text.roles import Frame, RoleLabeller
 
 
 class NoLabeller:

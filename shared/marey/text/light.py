@@ -13,15 +13,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle
-from shared.nn.threads import one_thread
-from shared.text.bio import start_scores, transition_scores, viterbi
-from shared.text.encoders import weights_sha256
-from shared.text.fetching import need_weights
-from shared.text.light_network import SUFFIX_BUCKETS, LightConfig, LightNetwork
-from shared.text.minilm import MiniLM
-from shared.text.roles import Frame, spans_to_arguments
+from marey.bundles import Bundle
+from marey.errors import InvalidBundle
+from marey.nn.threads import one_thread
+from marey.text.bio import start_scores, transition_scores, viterbi
+from marey.text.encoders import weights_sha256
+from marey.text.fetching import need_weights
+from marey.text.light_network import SUFFIX_BUCKETS, LightConfig, LightNetwork
+from marey.text.minilm import MiniLM
+from marey.text.roles import Frame, spans_to_arguments
 
 MAX_SEGMENT_WORDS = 60
 MAX_PIECES = 8  # of one word: a typed-over word must not crowd out the rest; 60 * 8 + 2 < 512

@@ -13,8 +13,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.compiled import compiled
-from shared.text.minilm import WIDTH as STATE_WIDTH
+from marey.nn.compiled import compiled
+from marey.text.minilm import WIDTH as STATE_WIDTH
 
 SUFFIX_BUCKETS = 1024
 SUFFIXES = 2  # of two and three letters

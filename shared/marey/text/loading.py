@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shared.bundles import find_bundle
-from shared.errors import InvalidBundle, NotFound
-from shared.settings import settings
-from shared.text.encoders import WIDTHS, TextEncoder
-from shared.text.fetching import need_weights
-from shared.text.keys import NO_LABELLER, labeller_bundle
-from shared.text.labellers import NoLabeller
-from shared.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
-from shared.text.roles import RoleLabeller
+from marey.bundles import find_bundle
+from marey.errors import InvalidBundle, NotFound
+from marey.settings import settings
+from marey.text.encoders import WIDTHS, TextEncoder
+from marey.text.fetching import need_weights
+from marey.text.keys import NO_LABELLER, labeller_bundle
+from marey.text.labellers import NoLabeller
+from marey.text.rewriters import NoRewriter, PromptRewriter, RulesRewriter
+from marey.text.roles import RoleLabeller
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
@@ -31,14 +31,14 @@ def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
         raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
     folder = path or need_weights(name)
     if name == "minilm":
-        from shared.text.minilm_encoder import MiniLMEncoder
+        from marey.text.minilm_encoder import MiniLMEncoder
 
         return MiniLMEncoder(folder)
     if name == "clip-vit-b32":
-        from shared.text.clip_encoder import ClipEncoder
+        from marey.text.clip_encoder import ClipEncoder
 
         return ClipEncoder(folder)
-    from shared.text.t5_encoder import T5Encoder
+    from marey.text.t5_encoder import T5Encoder
 
     return T5Encoder(name, folder)
 
@@ -56,15 +56,15 @@ def load_labeller(name: str) -> RoleLabeller:
         bundle = find_bundle(labeller_bundle(name))
     except NotFound as error:
         if name == "bert-srl":
-            error.hint = "Import AllenNLP's archive once: `python -m shared.text.convert bert-srl --help`."
+            error.hint = "Import AllenNLP's archive once: `python -m marey.text.convert bert-srl --help`."
         raise
     model = bundle.manifest.model
     if bundle.manifest.kind == "labeller" and model == "light":
-        from shared.text.light import LightLabeller
+        from marey.text.light import LightLabeller
 
         return LightLabeller.load(bundle)
     if bundle.manifest.kind == "labeller" and model == "bert-srl":
-        from shared.text.bert_srl import BertLabeller
+        from marey.text.bert_srl import BertLabeller
 
         return BertLabeller(bundle)
     raise InvalidBundle(
@@ -82,11 +82,11 @@ def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
     if name == "none":
         return NoRewriter()
     if name == "rules":
-        from shared.text.spelling import Speller
+        from marey.text.spelling import Speller
 
         return RulesRewriter(labeller, Speller.load())
     if name == "openai":
-        from shared.text.openai_rewriter import Endpoint, OpenAIRewriter
+        from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
 
         return OpenAIRewriter(Endpoint.of(settings()))
     raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules, openai.")

@@ -1,12 +1,12 @@
 """The forward pass of MiniLM (Wang et al. 2020, arXiv 2002.10957; BERT's layers), written for short sentences.
 
 `transformers`' BertModel gives the same numbers, but takes twice as long at batch 1 (11 ms against 5.4 ms for 12
-words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`shared.text.compiled`).
+words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`marey.text.compiled`).
 It is the labeller's; node features come from the float32 one, since "left hand" and "right hand" lie closer together
 (cosine .9) than int8 is exact (cosine .98).
 
 Many texts go through one product of all their tokens (`last`), so that the weights are read once for all of them. On
-a CPU the float32 matrices are packed, and a token's bits do not depend on the texts beside it (`shared.nn.packed`).
+a CPU the float32 matrices are packed, and a token's bits do not depend on the texts beside it (`marey.nn.packed`).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariable
 from tokenizers import Tokenizer
 from torch import Tensor, nn
 
-from shared.errors import InvalidFile
-from shared.nn.compiled import compiled
-from shared.nn.packed import PackedLinear, can_pack
+from marey.errors import InvalidFile
+from marey.nn.compiled import compiled
+from marey.nn.packed import PackedLinear, can_pack
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

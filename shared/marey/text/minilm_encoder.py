@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.nn.threads import one_thread
-from shared.text.encoders import WIDTHS, Encoding, weights_sha256
-from shared.text.minilm import MAX_TOKENS, MiniLM
+from marey.nn.threads import one_thread
+from marey.text.encoders import WIDTHS, Encoding, weights_sha256
+from marey.text.minilm import MAX_TOKENS, MiniLM
 
 MAX_TEXTS = 32
 """Texts of one pass: more gain nothing, and the longest take 100 MB."""

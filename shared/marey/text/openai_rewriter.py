@@ -19,11 +19,11 @@ from pathlib import Path
 import httpx2
 from pydantic import SecretStr
 
-from shared.errors import InvalidInput, MareyError
-from shared.prompts import check_prompt
-from shared.settings import Settings
-from shared.text.rewriters import NotRewritten
-from shared.tls import trusting_context
+from marey.errors import InvalidInput, MareyError
+from marey.prompts import check_prompt
+from marey.settings import Settings
+from marey.text.rewriters import NotRewritten
+from marey.tls import trusting_context
 
 log = logging.getLogger(__name__)
 

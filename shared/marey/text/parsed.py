@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from shared.text.graph import SemanticGraph
-from shared.text.words import EDGE_PUNCTUATION
+from marey.text.graph import SemanticGraph
+from marey.text.words import EDGE_PUNCTUATION
 
 NO_ACTION = (
     "no action found: the model reads the prompt as one sentence without actions; "

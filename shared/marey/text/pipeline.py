@@ -12,25 +12,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidBundle
-from shared.prompts import check_prompt
-from shared.text.acts import acts_of
-from shared.text.encoders import Encoding, TextEncoder
-from shared.text.features import TextFeatures
-from shared.text.graph import Node, SemanticGraph, build_graph
-from shared.text.guard import changed_meaning
-from shared.text.keys import NO_LABELLER, feature_key
-from shared.text.labellers import OneAtATime
-from shared.text.loading import load_encoder, load_labeller, load_rewriter
-from shared.text.parsed import ParsedPrompt, warnings_of, without_punctuation
-from shared.text.rewriters import NotRewritten, PromptRewriter
-from shared.text.roles import RoleLabeller
-from shared.text.telling import told_in_order
-from shared.text.words import EDGE_PUNCTUATION
+from marey.bundles import TextSpec
+from marey.errors import InvalidBundle
+from marey.prompts import check_prompt
+from marey.text.acts import acts_of
+from marey.text.encoders import Encoding, TextEncoder
+from marey.text.features import TextFeatures
+from marey.text.graph import Node, SemanticGraph, build_graph
+from marey.text.guard import changed_meaning
+from marey.text.keys import NO_LABELLER, feature_key
+from marey.text.labellers import OneAtATime
+from marey.text.loading import load_encoder, load_labeller, load_rewriter
+from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
+from marey.text.rewriters import NotRewritten, PromptRewriter
+from marey.text.roles import RoleLabeller
+from marey.text.telling import told_in_order
+from marey.text.words import EDGE_PUNCTUATION
 
 if TYPE_CHECKING:
-    from shared.text.spelling import Speller
+    from marey.text.spelling import Speller
 
 log = logging.getLogger(__name__)
 
@@ -145,7 +145,7 @@ class TextPipeline:
             return prompt, error.message
         if rewritten == prompt:
             return prompt, None
-        from shared.text.spelling import Speller
+        from marey.text.spelling import Speller
 
         if self._speller is None:
             self._speller = Speller.load()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
-from shared.documents import read_json
-from shared.errors import InvalidFile, NotFound
+from marey.documents import read_json
+from marey.errors import InvalidFile, NotFound
 
 
 def read_config(folder: Path) -> dict[str, Any]:

@@ -1,5 +1,5 @@
-"""Prompt rewriting: the port, `none` and `rules`; `openai` stands in `shared.text.openai_rewriter`. What any of them
-makes passes the same guard (`shared.text.guard`)."""
+"""Prompt rewriting: the port, `none` and `rules`; `openai` stands in `marey.text.openai_rewriter`. What any of them
+makes passes the same guard (`marey.text.guard`)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from shared.errors import MareyError
-from shared.text.roles import Frame, RoleLabeller
-from shared.text.words import SINGULAR, UNITS, bare, inflected, is_past, lemma
+from marey.errors import MareyError
+from marey.text.roles import Frame, RoleLabeller
+from marey.text.words import SINGULAR, UNITS, bare, inflected, is_past, lemma
 
 if TYPE_CHECKING:
-    from shared.text.spelling import Speller
+    from marey.text.spelling import Speller
 
 _AUXILIARIES = """
 is are was were be been being am get gets got has have had will would can could should may might must to does do did not

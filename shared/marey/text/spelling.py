@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import lru_cache
 
-from shared.text.fetching import need_weights
-from shared.text.minilm import load_tokenizer
-from shared.text.words import one_slip
+from marey.text.fetching import need_weights
+from marey.text.minilm import load_tokenizer
+from marey.text.words import one_slip
 
 MIN_LETTERS = 4
 _MOTION_WORDS = """

@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.errors import InvalidFile
-from shared.nn.threads import one_thread
-from shared.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
-from shared.text.pretrained import load_pretrained, read_config
+from marey.errors import InvalidFile
+from marey.nn.threads import one_thread
+from marey.text.encoders import HUB, WIDTHS, Encoding, weights_sha256
+from marey.text.pretrained import load_pretrained, read_config
 
 MAX_TOKENS = 512
 FEED_FORWARD = {"t5-base": "relu", "t5-v1_1-base": "gated-gelu"}

@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from shared.text.clauses import DOING, LIMBS, LISTS, SIDES, SUBJECTS, Clause
-from shared.text.words import inflected, is_past, lemma
+from marey.text.clauses import DOING, LIMBS, LISTS, SIDES, SUBJECTS, Clause
+from marey.text.words import inflected, is_past, lemma
 
 NOBODY = "a person"
 

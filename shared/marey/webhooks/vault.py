@@ -14,8 +14,8 @@ from pathlib import Path
 
 from cryptography.fernet import Fernet, InvalidToken, MultiFernet
 
-from shared.errors import InvalidInput, Refused
-from shared.settings import Settings
+from marey.errors import InvalidInput, Refused
+from marey.settings import Settings
 
 KEY_FILE = "webhook.key"
 WHERE = "MAREY_WEBHOOK_KEY"

@@ -13,10 +13,10 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.jobs import create_engine, transaction
-from shared.runtime.embedded import EmbeddedServer
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.jobs import create_engine, transaction
+from marey.runtime.embedded import EmbeddedServer
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.support.compose import services, waits_for
 from tests.support.composed import Network, Process, free_ports, write_secrets

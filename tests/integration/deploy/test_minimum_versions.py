@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from services.cli import checkup_backing as backing
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.jobs import create_engine, downgrade, server_version, transaction, upgrade
-from shared.runtime.queue import check_queue, redis_client
-from shared.versions import POSTGRES, REDIS
+from marey.cli import checkup_backing as backing
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.jobs import create_engine, downgrade, server_version, transaction, upgrade
+from marey.runtime.queue import check_queue, redis_client
+from marey.versions import POSTGRES, REDIS
 from tests.servers.debian import INSTALLED, debian_postgres, debian_redis
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import Hand, add_mogo

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.settings import Settings
-from shared.storage import FolderStore
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
+from marey.storage import FolderStore
 from tests.support.evaluations import ToyEvaluator, ToyTexts, models_of
 from tests.support.runtime import Loop
 from tests.support.toy import ToyHandler

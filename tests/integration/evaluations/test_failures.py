@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.errors import Conflict, InvalidInput
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.jobs import (
+from marey.errors import Conflict, InvalidInput
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.jobs import (
     DEFAULT_TENANT,
     AssetDigest,
     EvaluationState,
@@ -27,8 +26,9 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.settings import Settings
-from shared.storage import FolderStore
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
+from marey.storage import FolderStore
 from tests.servers.audit import audit as audit_tables
 from tests.support.evaluations import (
     GENERATOR,

@@ -7,18 +7,18 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.errors import NotFound
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.jobs import (
+from marey.errors import NotFound
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationRow,
     EvaluationState,
     get_job,
     transaction,
 )
-from shared.settings import Settings
-from shared.storage import FolderStore
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
+from marey.storage import FolderStore
 from tests.servers.audit import audit as audit_tables
 from tests.support.evaluations import (
     GENERATOR,

@@ -7,8 +7,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.jobs import (
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationRequest,
     NewSchedule,

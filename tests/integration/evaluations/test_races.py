@@ -8,10 +8,8 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from services.scheduler import evaluations as steps
-from services.scheduler.evaluations import Evaluations
-from shared.errors import InvalidInput, NotFound, Unreachable
-from shared.jobs import (
+from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.jobs import (
     DEFAULT_TENANT,
     AssetDigest,
     EvaluationState,
@@ -36,9 +34,11 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.states import EVALUATION_TRANSITIONS
-from shared.settings import Settings
-from shared.storage import FolderStore
+from marey.jobs.states import EVALUATION_TRANSITIONS
+from marey.scheduler import evaluations as steps
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
+from marey.storage import FolderStore
 from tests.servers.jobs import let_expire
 from tests.support.evaluations import (
     CLIPS,
@@ -143,7 +143,7 @@ def test_a_worker_that_dies_while_it_measures_is_followed_by_another(
 def test_an_outage_of_the_store_while_motions_are_read_costs_nothing(
     engine: sa.Engine, scheduler: Evaluations, loop: Loop, judge: ToyEvaluator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shared.runtime.loop.OUTAGE_PAUSE", 0.01)
+    monkeypatch.setattr("marey.runtime.loop.OUTAGE_PAUSE", 0.01)
     judge.problems = [Unreachable("the store is away")]
     evaluation = new_evaluation(engine)
     row = finish(scheduler, loop, engine, evaluation)

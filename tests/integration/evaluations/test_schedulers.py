@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     EvaluationState,
     transaction,
 )
-from shared.settings import REPOSITORY, Settings
-from shared.storage import FolderStore
+from marey.settings import REPOSITORY, Settings
+from marey.storage import FolderStore
 from tests.support.evaluations import (
     ToyEvaluator,
     ToyTexts,

@@ -10,9 +10,8 @@ from zoneinfo import ZoneInfo
 import pytest
 import sqlalchemy as sa
 
-from services.scheduler.evaluations import Evaluations
-from shared.errors import InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import InvalidInput, NotFound
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationRequest,
     EvaluationState,
@@ -30,8 +29,9 @@ from shared.jobs import (
     schema,
     transaction,
 )
-from shared.jobs.cron import next_time
-from shared.settings import Settings
+from marey.jobs.cron import next_time
+from marey.scheduler.evaluations import Evaluations
+from marey.settings import Settings
 from tests.support.evaluations import (
     GENERATOR,
     at_once,

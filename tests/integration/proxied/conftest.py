@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 import redis
 
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.runtime.embedded import EmbeddedServer
-from shared.runtime.queue import redis_client
-from shared.settings import Settings
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.runtime.embedded import EmbeddedServer
+from marey.runtime.queue import redis_client
+from marey.settings import Settings
 from tests.servers.ports import free_ports
 from tests.servers.receiver import Authority
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift

@@ -10,11 +10,11 @@ from urllib.parse import urlsplit
 import httpx2
 import pytest
 
-from services.cli import client as client_module
-from services.cli.client import Client
-from services.cli.live.link import Link
-from services.cli.place import Server
-from shared.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
+from marey.cli import client as client_module
+from marey.cli.client import Client
+from marey.cli.live.link import Link
+from marey.cli.place import Server
+from marey.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
 from tests.servers.nginx import PROGRAM, Nginx
 from tests.servers.ports import free_ports
 from tests.servers.receiver import Authority

@@ -9,11 +9,11 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from services.cli.client import Client
-from services.cli.live.link import Link
-from services.cli.place import Server
-from shared.errors import Unreachable
-from shared.settings import Settings
+from marey.cli.client import Client
+from marey.cli.live.link import Link
+from marey.cli.place import Server
+from marey.errors import Unreachable
+from marey.settings import Settings
 from tests.servers.receiver import Authority
 from tests.servers.swift import Swift
 from tests.servers.tls_front import TlsFront

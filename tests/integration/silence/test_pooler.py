@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import InvalidInput
-from shared.jobs import EVENT_CHANNEL, Listener, check_listening, create_engine, get_job, transaction, upgrade
-from shared.jobs.deadlines import BULK, ORDINARY
+from marey.errors import InvalidInput
+from marey.jobs import EVENT_CHANNEL, Listener, check_listening, create_engine, get_job, transaction, upgrade
+from marey.jobs.deadlines import BULK, ORDINARY
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.servers.pooler import PROGRAM, pooler
@@ -76,7 +76,7 @@ def test_api_and_scheduler_refuse_to_start_behind_a_transaction_pooler(
     environment = {**os.environ, "MAREY_DATABASE_URL": pooled, "MAREY_QUEUE_URL": queue_url}
     for command in ("api", "scheduler"):
         ended = subprocess.run(
-            [sys.executable, "-m", "services.cli", command],
+            [sys.executable, "-m", "marey.cli", command],
             env={**environment, "MAREY_HOME": str(short_home / "home")},
             capture_output=True,
             text=True,

@@ -11,17 +11,17 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from shared.errors import Unreachable
-from shared.jobs import StreamState
-from shared.runtime.live.main import REDIS_SECONDS
-from shared.runtime.queue import SOCKET_SCHEME, redis_client
-from shared.streams.frames import Frame
-from shared.streams.redis import FrameStream
+from marey.errors import Unreachable
+from marey.jobs import StreamState
+from marey.mogo.bundle import random_bundle
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.runtime.live.main import REDIS_SECONDS
+from marey.runtime.queue import SOCKET_SCHEME, redis_client
+from marey.streams.frames import Frame
+from marey.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.live_loop import LiveWorker, Studio
-from workers.mogo.bundle import random_bundle
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
 
 STREAMS = 3
 FRAMES = 20

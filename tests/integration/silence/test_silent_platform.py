@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from services.api import tailer as tailer_module
-from services.cli.watching import watch_job
-from shared.jobs import create_engine, outages
-from shared.runtime.embedded import EmbeddedServer
+from marey.api import tailer as tailer_module
+from marey.cli.watching import watch_job
+from marey.jobs import create_engine, outages
+from marey.runtime.embedded import EmbeddedServer
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.runtime import Loop

@@ -13,12 +13,12 @@ import kombu.utils.functional
 import pytest
 import redis
 
-from shared.errors import Unreachable
-from shared.runtime import app as queue_app
-from shared.runtime.app import RECONNECT_MAX, create_app
-from shared.runtime.embedded import EmbeddedServer
-from shared.runtime.queue import redis_client
-from shared.streams.redis import FrameStream
+from marey.errors import Unreachable
+from marey.runtime import app as queue_app
+from marey.runtime.app import RECONNECT_MAX, create_app
+from marey.runtime.embedded import EmbeddedServer
+from marey.runtime.queue import redis_client
+from marey.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy
 
 DEADLINE = 0.5

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from shared.errors import Unreachable
-from shared.jobs import asset_key
-from shared.storage import NewObject, deadlines
-from shared.storage.s3 import S3Store
+from marey.errors import Unreachable
+from marey.jobs import asset_key
+from marey.storage import NewObject, deadlines
+from marey.storage.s3 import S3Store
 from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import Swift
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from services.api.streams import messages, session
-from shared.runtime.embedded import start_valkey
-from shared.runtime.queue import redis_client
-from shared.settings import Settings
-from shared.streams.control import Control
-from shared.streams.redis import FrameStream
+from marey.api.streams import messages, session
+from marey.runtime.embedded import start_valkey
+from marey.runtime.queue import redis_client
+from marey.settings import Settings
+from marey.streams.control import Control
+from marey.streams.redis import FrameStream
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import PATIENCE, Hand, watching
 from tests.support.streams_api import begin, beside, new_key

@@ -8,13 +8,13 @@ import httpx2
 import pytest
 import redis
 
-from services.api.streams import protocol
-from shared.jobs import StreamState
-from shared.motion.skeleton import HUMANML3D
-from shared.settings import Settings
-from shared.streams.control import Control
-from shared.streams.reads import ReadAs
-from shared.streams.watch import Watch
+from marey.api.streams import protocol
+from marey.jobs import StreamState
+from marey.motion.skeleton import HUMANML3D
+from marey.settings import Settings
+from marey.streams.control import Control
+from marey.streams.reads import ReadAs
+from marey.streams.watch import Watch
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import Hand, watching
 from tests.support.streams_api import LATE, WALK, begin, beside, until

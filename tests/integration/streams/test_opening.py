@@ -11,8 +11,8 @@ import httpx2
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from services.api import stream_hub as hub
-from shared.settings import Settings
+from marey.api import stream_hub as hub
+from marey.settings import Settings
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import PATIENCE, watching
 from tests.support.streams_api import WALK, beside, close_code, new_key, refused

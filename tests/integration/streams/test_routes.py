@@ -11,9 +11,9 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from shared.jobs import schema, take_stream, transaction
-from shared.motion.skeleton import HUMANML3D
-from shared.streams.control import Control, ControlQueue
+from marey.jobs import schema, take_stream, transaction
+from marey.motion.skeleton import HUMANML3D
+from marey.streams.control import Control, ControlQueue
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import BUNDLE, PATIENCE, Hand
 from tests.support.streams_api import WALK, begin, close_code, new_key, refused, until, waiting_for_a_row

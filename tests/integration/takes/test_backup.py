@@ -12,9 +12,9 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from services.cli.backup import Manifest, export_tenant, import_tenant
-from shared.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
-from shared.jobs import (
+from marey.cli.backup import Manifest, export_tenant, import_tenant
+from marey.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
+from marey.jobs import (
     GarbageReport,
     ItemFailure,
     JobRow,
@@ -35,8 +35,8 @@ from shared.jobs import (
     review,
     transaction,
 )
-from shared.jobs.types import EventRow, ItemRow
-from shared.storage import FolderStore
+from marey.jobs.types import EventRow, ItemRow
+from marey.storage import FolderStore
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.marey import Marey

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     NewMotion,
     WorkerBeat,
     beat,
@@ -20,7 +20,7 @@ from shared.jobs import (
     set_quotas,
     transaction,
 )
-from shared.jobs.quotas import EXPECTED_BYTES
+from marey.jobs.quotas import EXPECTED_BYTES
 from tests.servers.jobs import claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.command import Command
 from tests.support.live_api import LiveApi

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from services.cli.client import Client
-from services.cli.commands.fetch import fetch_job
-from services.cli.manifest import RECORD, remove_left, write_manifest
-from services.cli.place import Server
-from shared.errors import InvalidFile
+from marey.cli.client import Client
+from marey.cli.commands.fetch import fetch_job
+from marey.cli.manifest import RECORD, remove_left, write_manifest
+from marey.cli.place import Server
+from marey.errors import InvalidFile
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

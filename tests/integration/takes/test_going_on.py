@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from services.cli.client import Client
-from services.cli.evaluating import watch_evaluation
+from marey.cli.client import Client
+from marey.cli.evaluating import watch_evaluation
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from services.cli.csv_cells import restore
-from services.cli.manifest import NAME, RAW_COLUMNS
-from shared.characters import find_forbidden
-from shared.jobs import schema, transaction
+from marey.characters import find_forbidden
+from marey.cli.csv_cells import restore
+from marey.cli.manifest import NAME, RAW_COLUMNS
+from marey.jobs import schema, transaction
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

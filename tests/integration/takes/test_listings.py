@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.cli import console
+from marey.cli import console
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

@@ -11,8 +11,8 @@ import httpx2
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, NotFound
-from shared.jobs import (
+from marey.errors import Conflict, NotFound
+from marey.jobs import (
     DEFAULT_TENANT,
     KEPT,
     AssetDigest,
@@ -45,10 +45,10 @@ from shared.jobs import (
     told_prompts,
     transaction,
 )
-from shared.jobs.types import NewJob
-from shared.motion.clip import parse_npz, without_prompt
-from shared.storage import FolderStore
-from shared.streams.reads import ReadAs
+from marey.jobs.types import NewJob
+from marey.motion.clip import parse_npz, without_prompt
+from marey.storage import FolderStore
+from marey.streams.reads import ReadAs
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 from tests.support.command import Command

@@ -16,7 +16,7 @@ import psutil
 import pytest
 from PIL import Image
 
-from shared.motion.overview import GAP, MARGIN, TILE
+from marey.motion.overview import GAP, MARGIN, TILE
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 from tests.support.walker import walker
@@ -138,7 +138,7 @@ def test_an_interrupt_ends_the_command_and_all_that_draws(api: LiveApi, tmp_path
         api.work(walker(seconds=0.5).to_npz())
     (tmp_path / "r.png").write_bytes(b"old")
     environment = {**os.environ, "MAREY_SERVER": api.url, "MAREY_KEY": api.key}
-    command = [sys.executable, "-m", "services.cli", "review", job, "-o", str(tmp_path / "r.png"), "--overwrite"]
+    command = [sys.executable, "-m", "marey.cli", "review", job, "-o", str(tmp_path / "r.png"), "--overwrite"]
     running = psutil.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 60
     while len(drawing := [each for each in running.children() if "spawn_main" in " ".join(each.cmdline())]) < 2:

@@ -9,8 +9,8 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import Conflict, InvalidInput, NotFound
+from marey.jobs import (
     SEED_LIMIT,
     ItemRow,
     JobState,

@@ -8,7 +8,7 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import MotionFilter, MotionRow, Review, list_motions, review, searching, transaction
+from marey.jobs import MotionFilter, MotionRow, Review, list_motions, review, searching, transaction
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, new_item, parse_texts, submit_items
 
@@ -29,7 +29,7 @@ FILTERS = {
 
 @pytest.fixture(scope="module")
 def engine(module_database_url: str) -> Iterator[sa.Engine]:
-    from shared.jobs import create_engine, upgrade
+    from marey.jobs import create_engine, upgrade
 
     engine = create_engine(module_database_url)
     upgrade(engine)

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shared.jobs import (
+from marey.jobs import (
     MotionFilter,
     Review,
     create_engine,

@@ -11,7 +11,7 @@ from uuid import uuid4
 
 import pytest
 
-from shared.jobs import create_key, create_tenant, transaction
+from marey.jobs import create_key, create_tenant, transaction
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 
@@ -76,7 +76,7 @@ def drawn(api: LiveApi, *arguments: str) -> str:
     """Return the output of a command on a terminal of 80 columns."""
     master, slave = pty.openpty()
     environment = {**os.environ, "COLUMNS": "80", "TERM": "xterm", "MAREY_SERVER": api.url, "MAREY_KEY": api.key}
-    command = [sys.executable, "-m", "services.cli", *arguments]
+    command = [sys.executable, "-m", "marey.cli", *arguments]
     process = subprocess.Popen(command, stdout=slave, env=environment)
     os.close(slave)
     output = b""

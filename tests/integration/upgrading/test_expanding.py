@@ -9,10 +9,10 @@ import pytest
 import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 
-from shared.jobs import downgrade, upgrade
-from tests.support.marey import REPOSITORY
+from marey.jobs import downgrade, upgrade
+from tests.support.marey import MIGRATIONS
 
-REVISIONS = [s.revision for s in ScriptDirectory(str(REPOSITORY / "migrations")).walk_revisions()][::-1]
+REVISIONS = [s.revision for s in ScriptDirectory(str(MIGRATIONS)).walk_revisions()][::-1]
 
 COLUMNS = """
     SELECT table_name, column_name, data_type, is_nullable = 'YES', column_default IS NOT NULL

@@ -11,16 +11,16 @@ import pytest
 import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 
-from shared.jobs import check_revision, create_engine, downgrade, schema, transaction, upgrade
+from marey.jobs import check_revision, create_engine, downgrade, schema, transaction, upgrade
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.support.filled import STATES, fill
-from tests.support.marey import REPOSITORY
+from tests.support.marey import MIGRATIONS
 
 Row = dict[str, Any]
 Tables = dict[str, list[Row]]
 numbers = count()
-REVISIONS = [s.revision for s in ScriptDirectory(str(REPOSITORY / "migrations")).walk_revisions()][::-1]
+REVISIONS = [s.revision for s in ScriptDirectory(str(MIGRATIONS)).walk_revisions()][::-1]
 
 LOST: dict[str, tuple[str, Callable[[Row], bool]]] = {
     "0007": ("idempotency", lambda row: row["evaluation_id"] is not None),

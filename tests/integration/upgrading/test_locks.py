@@ -10,11 +10,11 @@ import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 from sqlalchemy import event
 
-from shared.errors import Conflict
-from shared.jobs import check_revision, downgrade, migrate, upgrade
-from tests.support.marey import REPOSITORY
+from marey.errors import Conflict
+from marey.jobs import check_revision, downgrade, migrate, upgrade
+from tests.support.marey import MIGRATIONS
 
-REVISIONS = [s.revision for s in ScriptDirectory(str(REPOSITORY / "migrations")).walk_revisions()][::-1]
+REVISIONS = [s.revision for s in ScriptDirectory(str(MIGRATIONS)).walk_revisions()][::-1]
 
 
 @pytest.fixture

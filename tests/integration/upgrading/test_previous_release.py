@@ -15,7 +15,7 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from shared.bundles import Bundle
+from marey.bundles import Bundle
 from tests.servers.ports import free_ports
 from tests.support.marey import TINY, tiny_models
 from tests.support.releases import Release, earlier_release, this_release, wait_until

@@ -13,15 +13,15 @@ import pytest
 import sqlalchemy as sa
 from pydantic import SecretStr
 
-from services.api.health.metrics import render
-from services.cli import checkup
-from services.cli import checkup_backing as backing
-from services.cli.checkup import models
-from services.cli.findings import Check
-from shared.jobs import WorkerBeat, beat, beat_scheduler, downgrade, transaction
-from shared.runtime.queue import redis_client
-from shared.settings import Settings
-from shared.storage import FolderStore
+from marey.api.health.metrics import render
+from marey.cli import checkup
+from marey.cli import checkup_backing as backing
+from marey.cli.checkup import models
+from marey.cli.findings import Check
+from marey.jobs import WorkerBeat, beat, beat_scheduler, downgrade, transaction
+from marey.runtime.queue import redis_client
+from marey.settings import Settings
+from marey.storage import FolderStore
 from tests.servers.jobs import claim_some, parse_texts, submit_items
 from tests.support.live_api import BUNDLE, write_bundle
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import sqlalchemy as sa
 
-from services.api.health.metrics import bounded
-from shared.jobs import QueueDepth, get_job, outbox_state, pause, queue_depths, transaction
-from shared.jobs.schema import tenant
-from shared.metrics import OTHER_TENANTS
+from marey.api.health.metrics import bounded
+from marey.jobs import QueueDepth, get_job, outbox_state, pause, queue_depths, transaction
+from marey.jobs.schema import tenant
+from marey.metrics import OTHER_TENANTS
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 
 

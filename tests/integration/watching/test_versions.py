@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 import sqlalchemy as sa
 
-from services.cli import checkup_backing as backing
-from services.scheduler import servers
-from shared import versions
-from shared.errors import Conflict
-from shared.jobs import check_revision, upgrade
-from shared.runtime.queue import check_queue
+from marey import versions
+from marey.cli import checkup_backing as backing
+from marey.errors import Conflict
+from marey.jobs import check_revision, upgrade
+from marey.runtime.queue import check_queue
+from marey.scheduler import servers
 
 
 @pytest.fixture

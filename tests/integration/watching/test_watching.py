@@ -13,9 +13,9 @@ import pytest
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
-from shared import tracing
-from shared.jobs import transaction
-from shared.jobs.schema import item, job, motion
+from marey import tracing
+from marey.jobs import transaction
+from marey.jobs.schema import item, job, motion
 from tests.chaos.driver import Cluster
 from tests.servers.collector import Collector, Spanned
 from tests.servers.ports import free_ports

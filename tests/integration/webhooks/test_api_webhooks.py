@@ -13,12 +13,12 @@ import pytest
 from standardwebhooks.webhooks import Webhook
 from structlog.testing import capture_logs
 
-from services.cli.ports import try_port
-from services.scheduler.sending import Sender
-from services.scheduler.webhooks import Deliverer
-from shared.addresses import Allowed
-from shared.jobs import EventKind, transaction
-from shared.runtime.embedded import EmbeddedServer
+from marey.addresses import Allowed
+from marey.cli.ports import try_port
+from marey.jobs import EventKind, transaction
+from marey.runtime.embedded import EmbeddedServer
+from marey.scheduler.sending import Sender
+from marey.scheduler.webhooks import Deliverer
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR, wait

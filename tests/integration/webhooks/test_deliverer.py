@@ -17,10 +17,8 @@ import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from standardwebhooks.webhooks import Webhook
 
-from services.scheduler.sending import Sender
-from services.scheduler.webhooks import EACH, Deliverer
-from shared.addresses import Allowed
-from shared.jobs import (
+from marey.addresses import Allowed
+from marey.jobs import (
     DEFAULT_TENANT,
     Attempt,
     DeliveryState,
@@ -30,8 +28,10 @@ from shared.jobs import (
     send_test,
     transaction,
 )
-from shared.settings import REPOSITORY
-from shared.webhooks.vault import Vault, new_signing_secret
+from marey.scheduler.sending import Sender
+from marey.scheduler.webhooks import EACH, Deliverer
+from marey.settings import REPOSITORY
+from marey.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.evaluations import wait
@@ -177,7 +177,7 @@ def test_what_was_claimed_or_sent_and_not_written_down_is_told_again_under_the_s
 def test_who_stops_gives_back_what_is_under_way(
     engine: sa.Engine, receiver: Receiver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.scheduler.webhooks.STOP_SECONDS", 0.1)
+    monkeypatch.setattr("marey.scheduler.webhooks.STOP_SECONDS", 0.1)
     receiver.answer = hang
     webhook = new_webhook(engine, receiver.url())
     with delivering(engine):

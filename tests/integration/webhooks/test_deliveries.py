@@ -7,8 +7,8 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from shared.errors import Conflict, InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import Conflict, InvalidInput, NotFound
+from marey.jobs import (
     DEFAULT_TENANT,
     Attempt,
     DeliveryState,
@@ -33,8 +33,8 @@ from shared.jobs import (
     sweep,
     transaction,
 )
-from shared.jobs.deliveries import DELAYS, JITTER, MAX_WAIT
-from shared.jobs.webhooks import MAX_WEBHOOKS
+from marey.jobs.deliveries import DELAYS, JITTER, MAX_WAIT
+from marey.jobs.webhooks import MAX_WEBHOOKS
 from tests.servers.jobs import submit_items
 from tests.support.webhooks import deliveries, errors, events_written, new_webhook, time_passes, told
 

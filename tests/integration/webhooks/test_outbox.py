@@ -9,7 +9,7 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from shared.jobs import (
+from marey.jobs import (
     DEFAULT_TENANT,
     EvaluationState,
     EventKind,

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from services.scheduler.sending import Sender
-from shared.addresses import Allowed
-from shared.jobs import Attempt
+from marey.addresses import Allowed
+from marey.jobs import Attempt
+from marey.scheduler.sending import Sender
 from tests.servers.receiver import LOOPBACK, Authority, Receiver, drip, endless, hang, stalling, status
 
 BODY = b'{"type":"job.ended"}'

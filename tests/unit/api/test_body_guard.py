@@ -7,8 +7,8 @@ from typing import Any
 
 from starlette.types import Message, Receive, Scope, Send
 
-from services.http.bodies import SMALL_BODY, BodyGuard, Patience
-from services.http.body_room import BodyRoom
+from marey.http.bodies import SMALL_BODY, BodyGuard, Patience
+from marey.http.body_room import BodyRoom
 
 SIZE = SMALL_BODY + 1
 

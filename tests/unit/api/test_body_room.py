@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.http import body_room
-from services.http.body_room import BodyRoom
-from shared.errors import Overloaded
+from marey.errors import Overloaded
+from marey.http import body_room
+from marey.http.body_room import BodyRoom
 
 TOTAL, TENANT = 100, 60
 REQUESTS = st.lists(

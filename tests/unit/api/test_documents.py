@@ -11,9 +11,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from services.api import documents
-from services.api.documents import Document
-from shared.errors import InvalidInput, TooLarge
+from marey.api import documents
+from marey.api.documents import Document
+from marey.errors import InvalidInput, TooLarge
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

@@ -8,16 +8,16 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from services.api.app import create_app
-from services.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
-from shared.characters import LINE_PATTERN, TEXT_PATTERN
-from shared.settings import Settings
+from marey.api.app import create_app
+from marey.characters import LINE_PATTERN, TEXT_PATTERN
+from marey.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
+from marey.settings import Settings
 
 READ_BY_HAND = {
-    "NewItemBody": {"prompt", "tags", "name", "model"},  # shared.items
-    "EvaluationPromptBody": {"prompt", "expected"},  # shared.evaluation_prompts
-    "NewStreamBody": {"prompt", "name", "model"},  # shared.items
-    "ParseBody": {"prompts"},  # shared.prompts
+    "NewItemBody": {"prompt", "tags", "name", "model"},  # marey.items
+    "EvaluationPromptBody": {"prompt", "expected"},  # marey.evaluation_prompts
+    "NewStreamBody": {"prompt", "name", "model"},  # marey.items
+    "ParseBody": {"prompts"},  # marey.prompts
 }
 NOT_STORED = {"cursor", "reference", "Range", "If-Range", "If-None-Match", "Last-Event-ID"}
 """Parsed into something else, or only compared."""

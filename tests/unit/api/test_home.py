@@ -7,8 +7,8 @@ import re
 import pytest
 from starlette.testclient import TestClient
 
-from services.api.app import create_app
-from shared.settings import Settings
+from marey.api.app import create_app
+from marey.settings import Settings
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,14 @@ import pytest
 from fastapi import FastAPI
 from starlette.testclient import TestClient
 
-import services.api.live
-from services.api.catalogue import Catalogue
-from services.api.live.routes import MOST_EXAMPLES, router
-from shared.bundles import find_bundle
-from shared.motion.live_page import live_page
-from shared.settings import Settings
-from workers.mogo.examples import LEAST, SETS, act_of
-from workers.training.checks.prompts import evaluation_prompts
+import marey.api.live
+from marey.api.catalogue import Catalogue
+from marey.api.live.routes import MOST_EXAMPLES, router
+from marey.bundles import find_bundle
+from marey.mogo.examples import LEAST, SETS, act_of
+from marey.motion.live_page import live_page
+from marey.settings import Settings
+from marey.training.checks.prompts import evaluation_prompts
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def test_examples_are_prompts_that_the_bundle_was_measured_to_obey() -> None:
     found = re.search(r'<script type="application/json" id="suggested">(.*?)</script>', page)
     assert found is not None
     offered = json.loads(found[1])
-    measured = json.loads((Path(services.api.live.__file__).parent / "examples.json").read_text())
+    measured = json.loads((Path(marey.api.live.__file__).parent / "examples.json").read_text())
     rows = {row["prompt"]: row for row in measured[find_bundle("mogo-starter").reference]}
     assert 3 <= len(offered) <= MOST_EXAMPLES
     for prompt in offered:

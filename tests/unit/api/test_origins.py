@@ -6,10 +6,10 @@ import pytest
 from starlette.testclient import TestClient, WebSocketDenialResponse
 from starlette.types import Receive, Scope, Send
 
-from services.api.app import create_app
-from services.http.guards import HostGuard
-from shared.origins import check_origins, origin_of
-from shared.settings import Settings
+from marey.api.app import create_app
+from marey.http.guards import HostGuard
+from marey.origins import check_origins, origin_of
+from marey.settings import Settings
 
 APP, STRANGER = "https://app.example.com", "https://evil.example"
 

@@ -8,9 +8,9 @@ from uuid import uuid4
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.api.tailer import last_progress_only
-from services.http.ranges import parse_range
-from shared.jobs import EventRow
+from marey.api.tailer import last_progress_only
+from marey.http.ranges import parse_range
+from marey.jobs import EventRow
 
 
 @given(st.text("bytes=0123456789-, ", max_size=20), st.integers(0, 100))

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.api.jobs.events import EventStream
-from services.http.places import Places, Shares
-from shared.errors import Busy
-from shared.jobs import ApiKey
+from marey.api.jobs.events import EventStream
+from marey.errors import Busy
+from marey.http.places import Places, Shares
+from marey.jobs import ApiKey
 
 SHARES = Shares(total=12, tenant=7, key=4)
 TENANTS = ("ann", "bob", "cat")

@@ -15,20 +15,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
-import services.api.docs
-from services.api.app import create_app
-from services.api.evaluations.schemas import NewEvaluationBody
-from services.api.jobs.schemas import JobPatch, NewJobBody
-from services.api.motions.schemas import NewRerollBody, NewReviewBody
-from services.api.reference import EXAMPLES
-from services.api.schedules.schemas import NewScheduleBody, SchedulePatch
-from services.api.streams.schemas import NewStreamBody
-from services.api.webhooks.schemas import NewWebhookBody, WebhookPatch
-from services.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
-from services.text.routes import ParseBody
-from shared.expected import read_expected
-from shared.items import MAX_TAG_LENGTH, SETTINGS, read_item
-from shared.settings import Settings
+import marey.api.docs
+from marey.api.app import create_app
+from marey.api.evaluations.schemas import NewEvaluationBody
+from marey.api.jobs.schemas import JobPatch, NewJobBody
+from marey.api.motions.schemas import NewRerollBody, NewReviewBody
+from marey.api.reference import EXAMPLES
+from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
+from marey.api.streams.schemas import NewStreamBody
+from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
+from marey.expected import read_expected
+from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
+from marey.items import MAX_TAG_LENGTH, SETTINGS, read_item
+from marey.settings import Settings
+from marey.text_service.routes import ParseBody
 
 BODIES = {
     model.__name__: model
@@ -37,7 +37,7 @@ BODIES = {
         *(NewEvaluationBody, NewScheduleBody, SchedulePatch, NewWebhookBody, WebhookPatch),
     )
 }
-ASSETS = Path(services.api.docs.__file__).parent / "assets"
+ASSETS = Path(marey.api.docs.__file__).parent / "assets"
 BOUNDS = {
     "integer": [("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")],
     "number": [("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")],

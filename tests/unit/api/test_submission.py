@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from services.api.catalogue import Catalogue
-from services.api.jobs import service
-from services.api.jobs.schemas import JobFields
-from services.api.jobs.service import MAX_MODELS, Submission, read_document, read_ndjson
-from shared.errors import NotFound, TooLarge
-from shared.items import MAX_UNKNOWN, InvalidItems
-from shared.offers import Offer
-from shared.settings import Settings
+from marey.api.catalogue import Catalogue
+from marey.api.jobs import service
+from marey.api.jobs.schemas import JobFields
+from marey.api.jobs.service import MAX_MODELS, Submission, read_document, read_ndjson
+from marey.errors import NotFound, TooLarge
+from marey.items import MAX_UNKNOWN, InvalidItems
+from marey.offers import Offer
+from marey.settings import Settings
 from tests.support.live_api import write_bundle
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.text.limits import Ticket, WordLimit
-from shared.errors import Busy
+from marey.errors import Busy
+from marey.text_service.limits import Ticket, WordLimit
 
 LIMIT = 100
 

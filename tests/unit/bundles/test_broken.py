@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from services.api.models.schemas import ModelsView
-from shared.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
-from shared.errors import InvalidBundle, MareyError
-from shared.offers import offers
-from shared.settings import Settings
+from marey.api.models.schemas import ModelsView
+from marey.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
+from marey.errors import InvalidBundle, MareyError
+from marey.offers import offers
+from marey.settings import Settings
 
 GOOD, BAD = "a-good", "b-broken"
 

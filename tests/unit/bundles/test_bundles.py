@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.bundles import Bundle, BundleWriter, find_bundle, list_bundles
-from shared.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused
-from shared.settings import Settings
+from marey.bundles import Bundle, BundleWriter, find_bundle, list_bundles
+from marey.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused
+from marey.settings import Settings
 
 
 def write(path: Path, *, licence: str = "MIT", max_shard_bytes: int = 2**20, overwrite: bool = False) -> Bundle:

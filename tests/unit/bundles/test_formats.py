@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from safetensors.numpy import save
 
-from shared.bundles import Bundle, BundleWriter, DataSource, TextSpec
-from shared.bundles.manifest import DESCRIPTIVE, BundleManifest, parse_manifest
-from shared.errors import InvalidBundle, MareyError
-from shared.text.keys import PIPELINE_VERSION, feature_key
+from marey.bundles import Bundle, BundleWriter, DataSource, TextSpec
+from marey.bundles.manifest import DESCRIPTIVE, BundleManifest, parse_manifest
+from marey.errors import InvalidBundle, MareyError
+from marey.text.keys import PIPELINE_VERSION, feature_key
 from tests.support.marey import REPOSITORY
 
 SHIPPED = {

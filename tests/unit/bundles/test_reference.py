@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from shared.bundles import Bundle, choose_evaluator
-from shared.bundles.reference import reference_prompts
-from shared.errors import InvalidBundle, NotFound
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.settings import Settings
+from marey.bundles import Bundle, choose_evaluator
+from marey.bundles.reference import reference_prompts
+from marey.errors import InvalidBundle, NotFound
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.settings import Settings
 from tests.support.evaluations import CLIPS, JUDGE, write_evaluator, write_generator
 
 

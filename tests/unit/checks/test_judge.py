@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.training.checks.judge import Expectation, judge, straightness
+from marey.training.checks.rates import ALL_EXPECTATIONS, RealClip, name_of, rates
 from tests.support.bodies import FPS, Body, bower, lift, raiser, runner, steady, walker, waver
-from workers.training.checks.judge import Expectation, judge, straightness
-from workers.training.checks.rates import ALL_EXPECTATIONS, RealClip, name_of, rates
 
 MOTIONS = {
     "walk": walker,

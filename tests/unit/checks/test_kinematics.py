@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.motion.feet import runs
+from marey.motion.feet import runs
+from marey.training.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
+from marey.training.checks.quality import quality
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
-from workers.training.checks.quality import quality
 
 
 @pytest.mark.parametrize("turn", [-150, -90, 0, 45, 90, 170])

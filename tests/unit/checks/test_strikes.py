@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.training.checks.judge import Expectation, judge
+from marey.training.checks.strikes import is_lively, kicks, punches, slashes
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.judge import Expectation, judge
-from workers.training.checks.strikes import is_lively, kicks, punches, slashes
 
 
 def standing(seconds: float = 4.0):

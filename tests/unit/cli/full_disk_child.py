@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from services.cli.client import Client
-from services.cli.fetching import Download, download_all
-from services.cli.lines import Lines
-from services.cli.manifest import COLUMNS, write_manifest
-from services.cli.place import Server
-from shared.errors import MareyError
-from shared.hashing import sha256_of
-from shared.motion.bvh import read_bvh
-from shared.motion.bvh_live import LiveBVH
-from shared.motion.files import write_atomically
-from shared.motion.skeleton import HUMANML3D
-from shared.spool import IN_MEMORY
-from shared.storage import FolderStore, NewObject
+from marey.cli.client import Client
+from marey.cli.fetching import Download, download_all
+from marey.cli.lines import Lines
+from marey.cli.manifest import COLUMNS, write_manifest
+from marey.cli.place import Server
+from marey.errors import MareyError
+from marey.hashing import sha256_of
+from marey.motion.bvh import read_bvh
+from marey.motion.bvh_live import LiveBVH
+from marey.motion.files import write_atomically
+from marey.motion.skeleton import HUMANML3D
+from marey.spool import IN_MEMORY
+from marey.storage import FolderStore, NewObject
 
 FOLDER, LIMIT = Path(sys.argv[1]), int(sys.argv[2])
 BIG = hashlib.shake_128(b"marey").digest(4 * LIMIT)

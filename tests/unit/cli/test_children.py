@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from services.cli.children import Child
+from marey.cli.children import Child
 
 BEFORE = "marey: an error of the process before it\n"
 

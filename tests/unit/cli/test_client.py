@@ -10,11 +10,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from services.cli import client as client_module
-from services.cli.client import Client
-from services.cli.place import Server
-from shared.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
-from shared.items import InvalidItems
+from marey.cli import client as client_module
+from marey.cli.client import Client
+from marey.cli.place import Server
+from marey.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
+from marey.items import InvalidItems
 
 
 @dataclass

@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from services.cli import console
-from services.cli.live.screen import Screen
-from services.cli.main import app
-from shared.characters import LINES, find_forbidden
+from marey.characters import LINES, find_forbidden
+from marey.cli import console
+from marey.cli.live.screen import Screen
+from marey.cli.main import app
 
 TEXT = st.text(st.characters(), max_size=40)
 ATTACK = "a\x1b[2J\x1b]8;;http://evil\x07b\x9b31m\x7f\u202egnp.\u2066x\udc80\r"
@@ -105,7 +105,7 @@ def test_errors_that_quote_an_argument_escape_it(arguments: list[str]) -> None:
 
 def test_the_traceback_of_a_bug_is_escaped() -> None:
     code = (
-        "import sys; from services.cli import main; main.app.command('bug')(lambda: 1 / len('') if 0 else "
+        "import sys; from marey.cli import main; main.app.command('bug')(lambda: 1 / len('') if 0 else "
         "(_ for _ in ()).throw(RuntimeError('a\\x1b[2Jb'))); sys.argv = ['marey', 'bug']; main.run()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

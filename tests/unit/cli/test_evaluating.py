@@ -9,11 +9,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from services.cli.commands import schedules
-from services.cli.evaluating import Asked, check_evaluation, repeats_of
-from services.cli.roles.serving import default_roles, parse_roles
-from shared.errors import InvalidInput, ItemsFailed, NotFound, Regressed
-from shared.settings import Settings
+from marey.cli.commands import schedules
+from marey.cli.evaluating import Asked, check_evaluation, repeats_of
+from marey.cli.roles.serving import default_roles, parse_roles
+from marey.errors import InvalidInput, ItemsFailed, NotFound, Regressed
+from marey.settings import Settings
 from tests.support.evaluations import write_evaluator, write_generator
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from services.cli.client import Client
-from services.cli.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
-from services.cli.place import Server
-from shared.errors import InvalidFile
+from marey.cli.client import Client
+from marey.cli.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
+from marey.cli.place import Server
+from marey.errors import InvalidFile
 
 ITEM: dict[str, Any] = {
     "id": "i",

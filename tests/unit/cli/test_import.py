@@ -12,12 +12,12 @@ HEAVY = (
 
 
 def test_the_command_line_imports_no_server_and_no_numbers() -> None:
-    code = "import services.cli.main, sys; print(*sys.modules)"
+    code = "import marey.cli.main, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(HEAVY) & set(done.stdout.split())
 
 
 def test_the_client_needs_nothing_but_its_own_packages() -> None:
-    code = "import services.cli.client, services.cli.watching, services.cli.fetching, sys; print(*sys.modules)"
+    code = "import marey.cli.client, marey.cli.watching, marey.cli.fetching, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(HEAVY[:-1]) & set(done.stdout.split())

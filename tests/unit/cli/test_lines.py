@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from services.cli.lines import PIECE, Lines
-from shared.errors import InvalidInput
-from shared.spool import IN_MEMORY
+from marey.cli.lines import PIECE, Lines
+from marey.errors import InvalidInput
+from marey.spool import IN_MEMORY
 
 
 @pytest.mark.parametrize("count", [1, 3, 2 * IN_MEMORY // 30])

@@ -9,14 +9,14 @@ import time
 import numpy as np
 import pytest
 
-from services.cli.live import link as link_module
-from services.cli.live.frames import Head, head_of
-from services.cli.live.link import Link
-from services.cli.live.pace import Pace
-from services.cli.live.steering import message_of
-from services.cli.place import Server
-from shared.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
-from shared.streams.frames import Frame, encode_frame
+from marey.cli.live import link as link_module
+from marey.cli.live.frames import Head, head_of
+from marey.cli.live.link import Link
+from marey.cli.live.pace import Pace
+from marey.cli.live.steering import message_of
+from marey.cli.place import Server
+from marey.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.streams.frames import Frame, encode_frame
 from tests.support.stream_server import KEY, STREAM, Plan, StreamServer
 
 IDENTITY = np.tile([1.0, 0, 0, 0], (22, 1))

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.names import (
+from marey.characters import find_forbidden
+from marey.cli.names import (
     DEFAULT_TEMPLATE,
     FileNames,
     Naming,
@@ -17,9 +18,8 @@ from services.cli.names import (
     safe_component,
     slug,
 )
-from shared.characters import find_forbidden
-from shared.errors import InvalidInput
-from shared.items import NAME, RESERVED, read_item
+from marey.errors import InvalidInput
+from marey.items import NAME, RESERVED, read_item
 
 
 def naming(name: str = "wave") -> Naming:

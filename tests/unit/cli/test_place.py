@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from services.cli.place import Server, find_server
-from shared.errors import InvalidFile, Unauthenticated
+from marey.cli.place import Server, find_server
+from marey.errors import InvalidFile, Unauthenticated
 
 URL = "https://marey.example.com"
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from services.cli import client as client_module
-from services.cli.client import ATTEMPTS, Client
-from services.cli.live import link as link_module
-from services.cli.live.link import Link
-from services.cli.place import Server
-from shared.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
+from marey.cli import client as client_module
+from marey.cli.client import ATTEMPTS, Client
+from marey.cli.live import link as link_module
+from marey.cli.live.link import Link
+from marey.cli.place import Server
+from marey.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
 from tests.servers.receiver import Authority
 from tests.support.proxied import receive_until_refused
 

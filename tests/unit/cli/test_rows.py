@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
-from shared.errors import InvalidFile, InvalidInput, NotFound
-from shared.evaluation_prompts import EvaluationPrompt
-from shared.items import InvalidItems, Item
+from marey.cli.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
+from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.evaluation_prompts import EvaluationPrompt
+from marey.items import InvalidItems, Item
 
 
 def write(folder: Path, name: str, content: str | bytes) -> str:

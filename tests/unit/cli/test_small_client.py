@@ -28,7 +28,7 @@ MISSING = ("torch", "numpy", "pydantic_settings", "sqlalchemy", "fastapi", "cele
     ],
 )
 def test_a_command_that_needs_an_extra_exits_2_and_names_it(arguments: list[str], extra: str, tmp_path: object) -> None:
-    code = f"import sys; sys.modules.update(dict.fromkeys({MISSING})); from services.cli.main import run; run()"
+    code = f"import sys; sys.modules.update(dict.fromkeys({MISSING})); from marey.cli.main import run; run()"
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False, cwd=None
     )

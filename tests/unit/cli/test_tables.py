@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.rows import read_file, right_items
-from services.cli.tables import ExtraColumns, csv_rows, delimiter_of
-from shared.items import COLUMNS, InvalidItems, Item, Unreadable
+from marey.cli.rows import read_file, right_items
+from marey.cli.tables import ExtraColumns, csv_rows, delimiter_of
+from marey.items import COLUMNS, InvalidItems, Item, Unreadable
 
 
 def items(path: Path, extra: ExtraColumns = "refuse", **options: Any) -> list[Item]:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from services.cli import rows
-from services.cli.rows import evaluation_prompts_from_file, items_from_file
-from services.cli.text_files import MAX_LINE
-from shared.errors import InvalidFile, InvalidInput, MareyError, TooLarge
-from shared.items import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
+from marey.cli import rows
+from marey.cli.rows import evaluation_prompts_from_file, items_from_file
+from marey.cli.text_files import MAX_LINE
+from marey.errors import InvalidFile, InvalidInput, MareyError, TooLarge
+from marey.items import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
 
 CSV = b"prompt,seed\na person walks,1\na person bows,2\n"
 PACKED = gzip.compress(CSV, mtime=0)
@@ -25,8 +25,8 @@ MEMORY_MIB = 64
 MEASURED = """
 import re, sys
 from pathlib import Path
-from services.cli.rows import items_from_file
-from shared.errors import TooLarge
+from marey.cli.rows import items_from_file
+from marey.errors import TooLarge
 def peak():  # of this program alone: ru_maxrss begins at what the parent had
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
 before = peak()

@@ -10,11 +10,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from services.api.jobs.events import PING_SECONDS
-from services.cli import client as client_module
-from services.cli.client import QUIET_SECONDS, Client
-from services.cli.place import Server
-from services.cli.watching import watch_job
+from marey.api.jobs.events import PING_SECONDS
+from marey.cli import client as client_module
+from marey.cli.client import QUIET_SECONDS, Client
+from marey.cli.place import Server
+from marey.cli.watching import watch_job
 
 COUNTERS = {"succeeded": 1, "failed": 0, "dead": 0, "cancelled": 0}
 

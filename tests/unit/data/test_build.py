@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.errors import Conflict, InvalidFile, NotFound
+from marey.errors import Conflict, InvalidFile, NotFound
+from marey.training.checks.judge import Expectation, judge
+from marey.training.checks.rates import RealClip
+from marey.training.data import compose
+from marey.training.data.build import LAYOUT, build, swap_sides, windows
+from marey.training.data.compose import Counts
+from marey.training.data.inspect import summarize
+from marey.training.data.pack import JointsPack, PackClip
+from marey.training.data.prepared import PreparedData
+from marey.training.data.retime import held_longer
+from marey.training.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.judge import Expectation, judge
-from workers.training.checks.rates import RealClip
-from workers.training.data import compose
-from workers.training.data.build import LAYOUT, build, swap_sides, windows
-from workers.training.data.compose import Counts
-from workers.training.data.inspect import summarize
-from workers.training.data.pack import JointsPack, PackClip
-from workers.training.data.prepared import PreparedData
-from workers.training.data.retime import held_longer
-from workers.training.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
 
 MOTIONS = {
     "2/walk": lambda k: walker(3.0 + 0.5 * k),
@@ -312,7 +312,7 @@ def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
 
 
 def test_a_failed_build_leaves_no_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("workers.training.data.build.compose", lambda *_: 1 / 0)
+    monkeypatch.setattr("marey.training.data.build.compose", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         build([synthetic_pack()], tmp_path / "out")
     assert list(tmp_path.iterdir()) == []

@@ -6,13 +6,13 @@ from typing import get_args
 
 import pytest
 
+from marey.training.checks.prompts import PromptSet, evaluation_prompts
+from marey.training.data.captions import captions, joined_caption, long_caption, seeded, short_caption
+from marey.training.data.describe import ACTS, STYLE_NAMES, describe
+from marey.training.data.english import conjugate, gerund, third, with_adjective
+from marey.training.data.grammar import grammar
+from marey.training.data.phrases import PAIR
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
-from workers.training.checks.prompts import PromptSet, evaluation_prompts
-from workers.training.data.captions import captions, joined_caption, long_caption, seeded, short_caption
-from workers.training.data.describe import ACTS, STYLE_NAMES, describe
-from workers.training.data.english import conjugate, gerund, third, with_adjective
-from workers.training.data.grammar import grammar
-from workers.training.data.phrases import PAIR
 
 FPS = 20.0
 

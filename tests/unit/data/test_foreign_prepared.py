@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shared.errors import InvalidFile
-from shared.hashing import sha256_of
+from marey.errors import InvalidFile
+from marey.hashing import sha256_of
+from marey.training.data import manifest as names
+from marey.training.data.prepared import PreparedData
+from marey.training.texts import CaptionTexts
 from tests.support.prepared import write_prepared
-from workers.training.data import manifest as names
-from workers.training.data.prepared import PreparedData
-from workers.training.texts import CaptionTexts
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.errors import InvalidFile, NotFound
+from marey.errors import InvalidFile, NotFound
+from marey.training.data.pack import JointsPack, PackClip
 from tests.support.bodies import runner, walker
-from workers.training.data.pack import JointsPack, PackClip
 
 FAR = np.array([40.0, 0.0, -30.0])  # float16 of world positions would be off by centimetres there
 

@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.errors import InvalidFile
-from shared.motion.bvh import parse_bvh
-from shared.motion.kinematics import bone_lengths
-from shared.motion.skeleton import HUMANML3D
+from marey.errors import InvalidFile
+from marey.motion.bvh import parse_bvh
+from marey.motion.kinematics import bone_lengths
+from marey.motion.skeleton import HUMANML3D
+from marey.training.checks.kinematics import gait
+from marey.training.data.retarget import read_source, resample_points, retarget
+from marey.training.data.rigs import BANDAI_NAMCO, ICLONE
 from tests.support.bodies import LENGTH, Body, bandai_bvh, lift, steady, walker, waver
-from workers.training.checks.kinematics import gait
-from workers.training.data.retarget import read_source, resample_points, retarget
-from workers.training.data.rigs import BANDAI_NAMCO, ICLONE
 
 
 def retargeted(joints, **options):

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.training.data.soundness import is_broken
 from tests.support.bodies import FPS, bower, runner, walker, waver
-from workers.training.data.soundness import is_broken
 
 
 @pytest.mark.parametrize("make", [lambda: walker(cadence=3.2), runner, bower, lambda: waver("both")])

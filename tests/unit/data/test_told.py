@@ -7,11 +7,11 @@ from typing import get_args
 
 import pytest
 
+from marey.training.checks.prompts import PromptSet, evaluation_prompts
+from marey.training.data.captions import caption, seeded
+from marey.training.data.told import told, told_caption, told_sequence
 from tests.support.bodies import bower, raiser, runner, walker, waver
 from tests.unit.data.test_captions import facts, plain
-from workers.training.checks.prompts import PromptSet, evaluation_prompts
-from workers.training.data.captions import caption, seeded
-from workers.training.data.told import told, told_caption, told_sequence
 
 SIDE = {"side", "other", "hands", "arms", "it", "one", "is"}
 GAIT = {"steps", "metres", "seconds", "pace"}

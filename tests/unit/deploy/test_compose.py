@@ -7,13 +7,13 @@ import re
 import pytest
 import typer
 
-from services.cli import children
-from services.cli.main import app
-from services.cli.roles.serving import HANDLERS, parse_roles
-from services.scheduler import main as scheduler
-from shared.runtime import worker
-from shared.runtime.live import main as live
-from shared.settings import Settings
+from marey.cli import children
+from marey.cli.main import app
+from marey.cli.roles.serving import HANDLERS, parse_roles
+from marey.runtime import worker
+from marey.runtime.live import main as live
+from marey.scheduler import main as scheduler
+from marey.settings import Settings
 from tests.support.compose import Service, image_environment, read_compose, services
 
 ALL = services()

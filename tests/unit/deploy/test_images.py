@@ -30,7 +30,7 @@ def test_the_build_context_is_what_is_copied_and_nothing_else() -> None:
 
 def test_the_images_hold_every_package_of_the_distribution() -> None:
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())
-    assert set(project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]) <= set(copied("server-build"))
+    assert set(project["tool"]["hatch"]["build"]["dev-mode-dirs"]) <= set(copied("server-build"))
 
 
 def test_torch_is_the_one_of_the_lock_and_the_makefile() -> None:

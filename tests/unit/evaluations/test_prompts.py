@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput, TooLarge
-from shared.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
-from shared.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
-from shared.items import InvalidItems
-from workers.training.checks.judge import Act, Side
+from marey.errors import InvalidInput, TooLarge
+from marey.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
+from marey.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
+from marey.items import InvalidItems
+from marey.training.checks.judge import Act, Side
 
 acts = st.one_of(
     st.builds(ExpectedAct, st.sampled_from(TRAVELS), st.just(""), st.booleans()),

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from shared.bundles import Bundle
+from marey.bundles import Bundle
+from marey.evaluator.assembly import assemble
+from marey.evaluator.config import TINY
+from marey.evaluator.reference import Reference
+from marey.evaluator.tmr import TMREvaluator
+from marey.evaluator.train import train_stage
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.staging import TrainOptions
 from tests.support.prepared import write_prepared
-from workers.evaluator.assembly import assemble
-from workers.evaluator.config import TINY
-from workers.evaluator.reference import Reference
-from workers.evaluator.tmr import TMREvaluator
-from workers.evaluator.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.staging import TrainOptions
 
 ACTS = tuple(f"{verb} {place}" for verb in ("walks", "runs", "waves", "bows") for place in ("here", "there", "away"))
 

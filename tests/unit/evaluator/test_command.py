@@ -7,10 +7,10 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from services.cli.commands.train import app
-from shared.bundles import Bundle
+from marey.bundles import Bundle
+from marey.cli.commands.train import app
+from marey.evaluator.reference import Reference
 from tests.support.prepared import write_prepared
-from workers.evaluator.reference import Reference
 
 
 def test_the_command_line_trains_an_evaluator_and_writes_its_bundle(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.measures.comparing import OBEYED, RETRIEVED
-from workers.evaluator.comparing import Earlier, alarms, changes
-from workers.evaluator.report import Baseline, Metric, MotionScore
+from marey.errors import InvalidInput
+from marey.evaluator.comparing import Earlier, alarms, changes
+from marey.evaluator.report import Baseline, Metric, MotionScore
+from marey.measures.comparing import OBEYED, RETRIEVED
 
 METRICS = {
     OBEYED: Metric(OBEYED, "Prompts obeyed", "%", "higher", 1),

@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch.distributions import Normal, kl_divergence
 
-from workers.evaluator.losses import divergence, divergences, info_nce, latent_distance, reconstruction
-from workers.evaluator.model import Gaussian
+from marey.evaluator.losses import divergence, divergences, info_nce, latent_distance, reconstruction
+from marey.evaluator.model import Gaussian
 
 
 def gaussian(mean: float, log_variance: float) -> Gaussian:

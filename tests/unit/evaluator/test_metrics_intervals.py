@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.measures.bootstrap import paired_bootstrap
-from workers.evaluator.metrics.intervals import redraw, repeated
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.intervals import redraw, repeated
+from marey.measures.bootstrap import paired_bootstrap
 
 # -- repeats ---------------------------------------------------------------------------------------------------------
 

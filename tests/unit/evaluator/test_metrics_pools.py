@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from workers.evaluator.metrics.pools import draw_distinct_pools, draw_pools
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.pools import draw_distinct_pools, draw_pools
 
 
 @settings(deadline=None)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from workers.evaluator.metrics.intervals import redraw
-from workers.evaluator.metrics.retrieval import all_ranks, clip_score, label_ceiling, matching_score, r_precision
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.intervals import redraw
+from marey.evaluator.metrics.retrieval import all_ranks, clip_score, label_ceiling, matching_score, r_precision
 
 SEEDS = st.integers(0, 2**32 - 1)
 DISTANCES = ["euclidean", "cosine"]

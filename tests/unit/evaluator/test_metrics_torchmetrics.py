@@ -10,8 +10,8 @@ from torchmetrics.image.fid import FrechetInceptionDistance
 from torchmetrics.image.kid import KernelInceptionDistance
 from torchmetrics.retrieval import RetrievalHitRate
 
-from workers.evaluator.metrics.distribution import fid, kid
-from workers.evaluator.metrics.retrieval import r_precision
+from marey.evaluator.metrics.distribution import fid, kid
+from marey.evaluator.metrics.retrieval import r_precision
 
 WIDTH, POOL = 16, 32
 

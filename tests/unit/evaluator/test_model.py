@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from shared.errors import InvalidInput
-from workers.evaluator.config import CONFIGS, STARTER, TINY, EvaluatorConfig
-from workers.evaluator.model import TMR, Gaussian, MotionDecoder, MotionEncoder, SentenceEncoder
+from marey.errors import InvalidInput
+from marey.evaluator.config import CONFIGS, STARTER, TINY, EvaluatorConfig
+from marey.evaluator.model import TMR, Gaussian, MotionDecoder, MotionEncoder, SentenceEncoder
 
 FRAMES = [21, 34, 48]
 WORDS = [3, 11, 7]

@@ -10,20 +10,20 @@ import pytest
 from torch import Tensor
 from typer.testing import CliRunner
 
-from services.cli.commands.train import app
-from shared.bundles import Bundle
-from shared.errors import InvalidFile, InvalidInput
-from shared.nn.motion_tokenizer import MotionTokenizer
-from shared.nn.quantizer import Quantized
+from marey.bundles import Bundle
+from marey.cli.commands.train import app
+from marey.errors import InvalidFile, InvalidInput
+from marey.evaluator.assembly import renew_reference
+from marey.evaluator.measuring import check
+from marey.evaluator.reconstruction import find_reconstruction, reconstruct
+from marey.evaluator.reference import Reference
+from marey.evaluator.rows import Ruler, truth_row
+from marey.evaluator.tmr import TMREvaluator
+from marey.hgm3.bundle import random_bundle
+from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.nn.quantizer import Quantized
+from marey.training.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
-from workers.evaluator.assembly import renew_reference
-from workers.evaluator.measuring import check
-from workers.evaluator.reconstruction import find_reconstruction, reconstruct
-from workers.evaluator.reference import Reference
-from workers.evaluator.rows import Ruler, truth_row
-from workers.evaluator.tmr import TMREvaluator
-from workers.hgm3.bundle import random_bundle
-from workers.training.data.prepared import PreparedData
 
 GENERATOR = "perfect@0123456789ab"
 

@@ -11,8 +11,14 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from shared.errors import InvalidFile, InvalidInput, NotFound
-from shared.jobs import (
+from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
+from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.report import Report, from_json, to_html, to_json, to_markdown
+from marey.evaluator.reporting import report_of, summary_of
+from marey.evaluator.scoring import REPEATS, label_ceilings
+from marey.evaluator.tmr import TMREvaluator
+from marey.jobs import (
     AssetDigest,
     EarlierRun,
     EvaluationJob,
@@ -22,18 +28,12 @@ from shared.jobs import (
     MadeItem,
     Problem,
 )
-from shared.measures.comparing import OBEYED, RETRIEVED
-from shared.motion.clip import parse_npz
-from shared.motion.features import HUMANML3D_263
-from shared.motion.finish import finish_motion
-from shared.runtime.scoring import ScoreInput
-from workers.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
-from workers.evaluator.reference import Reference, ReferenceSplit
-from workers.evaluator.report import Report, from_json, to_html, to_json, to_markdown
-from workers.evaluator.reporting import report_of, summary_of
-from workers.evaluator.scoring import REPEATS, label_ceilings
-from workers.evaluator.tmr import TMREvaluator
-from workers.training.data.prepared import PreparedData
+from marey.measures.comparing import OBEYED, RETRIEVED
+from marey.motion.clip import parse_npz
+from marey.motion.features import HUMANML3D_263
+from marey.motion.finish import finish_motion
+from marey.runtime.scoring import ScoreInput
+from marey.training.data.prepared import PreparedData
 
 NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
 

@@ -11,13 +11,13 @@ import pytest
 import torch
 import torch.nn.functional as F
 
-from shared.bundles import Bundle
-from shared.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
-from workers.evaluator.loading import load_evaluator
-from workers.evaluator.t2m import T2MEvaluator
-from workers.evaluator.t2m_import import import_t2m, main
-from workers.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
-from workers.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
+from marey.bundles import Bundle
+from marey.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
+from marey.evaluator.loading import load_evaluator
+from marey.evaluator.t2m import T2MEvaluator
+from marey.evaluator.t2m_import import import_t2m, main
+from marey.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_words import TAGS, TaggedCaptions, WordVectors, read_line
 
 SMALL = T2MConfig(movement=12, motion_hidden=10, text_hidden=8, width=6, word_width=5)
 VOCABULARY = ["a", "person", "walk", "left", "unk", "sos", "eos", "wave"]

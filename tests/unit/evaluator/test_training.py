@@ -12,27 +12,27 @@ import pytest
 import torch
 from safetensors.numpy import save
 
-from shared.bundles import Bundle, TextSpec
-from shared.errors import InvalidBundle, InvalidFile, InvalidInput, NotFound
-from shared.hashing import sha256_of
-from shared.text.encoders import TextEncoder
+from marey.bundles import Bundle, TextSpec
+from marey.errors import InvalidBundle, InvalidFile, InvalidInput, NotFound
+from marey.evaluator.assembly import assemble
+from marey.evaluator.bundle import load_networks
+from marey.evaluator.config import TINY, EvaluatorConfig
+from marey.evaluator.labels import label_of
+from marey.evaluator.loading import load_evaluator
+from marey.evaluator.port import check_reads
+from marey.evaluator.reference import FILE, Reference
+from marey.evaluator.sentences import open_encoder
+from marey.evaluator.stage_tmr import TMRStage
+from marey.evaluator.tmr import TMREvaluator
+from marey.evaluator.train import train_stage
+from marey.hashing import sha256_of
+from marey.text.encoders import TextEncoder
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.motions import MotionData
+from marey.training.parts import load_part
+from marey.training.staging import TrainOptions
 from tests.support.prepared import farthest_move, write_prepared
-from workers.evaluator.assembly import assemble
-from workers.evaluator.bundle import load_networks
-from workers.evaluator.config import TINY, EvaluatorConfig
-from workers.evaluator.labels import label_of
-from workers.evaluator.loading import load_evaluator
-from workers.evaluator.port import check_reads
-from workers.evaluator.reference import FILE, Reference
-from workers.evaluator.sentences import open_encoder
-from workers.evaluator.stage_tmr import TMRStage
-from workers.evaluator.tmr import TMREvaluator
-from workers.evaluator.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.motions import MotionData
-from workers.training.parts import load_part
-from workers.training.staging import TrainOptions
 
 ACTS = (
     "walk", "run", "wave", "bow", "kick", "punch", "jump", "sit", "stand", "turn",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from marey.evaluator.report import Report
 from tests.support.reports import sample_report
 from tests.support.walker import walker
-from workers.evaluator.report import Report
 
 
 @pytest.fixture(scope="session")

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.errors import InvalidFile, InvalidInput
+from marey.errors import InvalidFile, InvalidInput
+from marey.evaluator.report import Change, Exhibit, Report, Value, from_json, to_json
 from tests.support.reports import sample_report
-from workers.evaluator.report import Change, Exhibit, Report, Value, from_json, to_json
 
 BASE = sample_report()
 FLOATS = st.floats(-1e12, 1e12, allow_nan=False)

@@ -7,8 +7,8 @@ import re
 
 import pytest
 
+from marey.evaluator.report import HeatCell, Reference, Report, Row, to_markdown
 from tests.support.reports import sample_report
-from workers.evaluator.report import HeatCell, Reference, Report, Row, to_markdown
 
 HOSTILE = (
     "</script><script>alert(1)</script> | `a` \\| *b* _c_ [d](http://e.f) ![g](h) ~i~ $j$ #1 @k\n\n# title\n- item"

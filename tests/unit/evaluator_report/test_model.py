@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from shared.errors import InvalidInput
-from tests.support.reports import METRICS, sample_report
-from workers.evaluator.report import (
+from marey.errors import InvalidInput
+from marey.evaluator.report import (
     Baseline,
     Change,
     Exhibit,
@@ -25,6 +24,7 @@ from workers.evaluator.report import (
     Value,
     sentence_of,
 )
+from tests.support.reports import METRICS, sample_report
 
 NOW = datetime(2026, 11, 23, tzinfo=UTC)
 NAN, INFINITE = float("nan"), float("inf")

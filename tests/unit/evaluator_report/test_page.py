@@ -13,10 +13,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from shared.motion.pages import asset
-from tests.support.reports import UNMEASURED, sample_report
-from tests.support.walker import walker
-from workers.evaluator.report import (
+from marey.evaluator.report import (
     Baseline,
     Exhibit,
     HeatCell,
@@ -30,7 +27,10 @@ from workers.evaluator.report import (
     to_html,
     to_json,
 )
-from workers.evaluator.report.page import PACKAGE
+from marey.evaluator.report.page import PACKAGE
+from marey.motion.pages import asset
+from tests.support.reports import UNMEASURED, sample_report
+from tests.support.walker import walker
 
 HOSTILE = (
     "</script><script>alert(1)</script><!-- %SCRIPTS% %POLICY% -->\" ' & \u202e\u2028 <img src=x onerror=alert(1)>"
@@ -157,7 +157,7 @@ def test_no_mark_of_the_template_is_left(page: Page) -> None:
     assert not re.search(r"%[A-Z]{4,}%", page.html)
 
 
-@pytest.mark.parametrize(("name", "package"), [("report.js", PACKAGE), ("small_players.js", "shared.motion")])
+@pytest.mark.parametrize(("name", "package"), [("report.js", PACKAGE), ("small_players.js", "marey.motion")])
 def test_no_text_is_ever_read_as_html_or_as_code(name: str, package: str) -> None:
     code = asset(name, package)
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", code)

@@ -6,8 +6,8 @@ import dataclasses
 
 import pytest
 
-from workers.evaluator.report import HeatCell, Metric, Report
-from workers.evaluator.report.tables import heat_of, in_percent, tables_of, trended, weakest_of
+from marey.evaluator.report import HeatCell, Metric, Report
+from marey.evaluator.report.tables import heat_of, in_percent, tables_of, trended, weakest_of
 
 
 def lines(report: Report, table: int = 0):

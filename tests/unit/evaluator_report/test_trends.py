@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from marey.evaluator.report import TrendPoint
+from marey.evaluator.report.trends import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, describe, plot, ticks_of
 from tests.support.reports import METRICS, MONDAY
-from workers.evaluator.report import TrendPoint
-from workers.evaluator.report.trends import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, describe, plot, ticks_of
 
 R1 = METRICS[0]
 

@@ -7,8 +7,8 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from workers.evaluator.report import Change, Metric, Repeats, Report
-from workers.evaluator.report.words import headline, intervals_of, moment, number, signed
+from marey.evaluator.report import Change, Metric, Repeats, Report
+from marey.evaluator.report.words import headline, intervals_of, moment, number, signed
 
 THREE = Metric("m", "M", digits=3)
 

@@ -13,21 +13,21 @@ from uuid import UUID, uuid4
 import numpy as np
 import pytest
 
-from shared.bundles import Bundle
-from shared.errors import InvalidFile, InvalidInput
-from shared.jobs import Claim, ClaimedItem, Stage
-from shared.motion.bvh import parse_bvh
-from shared.motion.clip import MotionClip, parse_npz
-from shared.runtime.handler import Batch, Done, Export, Failed, Outcome
-from shared.settings import Settings
-from shared.text.features import TextFeatures
-from shared.text.graph import build_graph
-from workers.generating.handler import GeneratorHandler
-from workers.hgm3 import bundle as hgm3
-from workers.hgm3.generate import Generator as Hgm3Generator
-from workers.mogo import bundle as mogo
-from workers.mogo.config import TINY
-from workers.mogo.generate import Generator as MogoGenerator
+from marey.bundles import Bundle
+from marey.errors import InvalidFile, InvalidInput
+from marey.generating.handler import GeneratorHandler
+from marey.hgm3 import bundle as hgm3
+from marey.hgm3.generate import Generator as Hgm3Generator
+from marey.jobs import Claim, ClaimedItem, Stage
+from marey.mogo import bundle as mogo
+from marey.mogo.config import TINY
+from marey.mogo.generate import Generator as MogoGenerator
+from marey.motion.bvh import parse_bvh
+from marey.motion.clip import MotionClip, parse_npz
+from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
+from marey.settings import Settings
+from marey.text.features import TextFeatures
+from marey.text.graph import build_graph
 
 
 class Control:

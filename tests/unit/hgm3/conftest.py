@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
+from marey.hgm3.bundle import random_bundle
+from marey.hgm3.generate import Generator
+from marey.training.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.generate import Generator
-from workers.training.data.prepared import PreparedData
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.bundles import find_bundle
-from workers.hgm3.ablation import table, train_variant
-from workers.hgm3.assembly import assemble
-from workers.hgm3.config import TINY
-from workers.hgm3.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.staging import TrainOptions
+from marey.bundles import find_bundle
+from marey.hgm3.ablation import table, train_variant
+from marey.hgm3.assembly import assemble
+from marey.hgm3.config import TINY
+from marey.hgm3.train import train_stage
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.staging import TrainOptions
 
 
 def test_a_variant_differs_from_its_bundle_in_the_masked_transformer_alone(

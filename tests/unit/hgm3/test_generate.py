@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 import torch
 
-from shared.errors import InvalidBundle, InvalidInput
+from marey.errors import InvalidBundle, InvalidInput
+from marey.generating.port import Request
+from marey.hgm3.bundle import random_bundle
+from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from marey.hgm3.config import InferenceConfig
+from marey.hgm3.decoding import condition_level
+from marey.hgm3.generate import Generated, Generator, Settings
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
-from workers.generating.port import Request
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from workers.hgm3.config import InferenceConfig
-from workers.hgm3.decoding import condition_level
-from workers.hgm3.generate import Generated, Generator, Settings
 
 COUNT = 32
 FLAT = Settings(motion_steps=0, action_steps=0)

@@ -8,17 +8,17 @@ from dataclasses import replace
 import pytest
 import torch
 
-from shared.motion.features import HUMANML3D_263
-from shared.nn.motion_tokenizer import biased_std
-from shared.nn.sampling import guide
+from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
+from marey.hgm3.config import PAPER, STARTER, TINY, named_config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
+from marey.hgm3.tokenizer import Tokenizer
+from marey.motion.features import HUMANML3D_263
+from marey.nn.motion_tokenizer import biased_std
+from marey.nn.sampling import guide
+from marey.training.joints import heading_joints, world_joints
+from marey.training.tokenizing import tokenizer_loss
 from tests.support.prepared import graph, made_up_texts, swinging, text_features
-from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
-from workers.hgm3.config import PAPER, STARTER, TINY, named_config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
-from workers.hgm3.tokenizer import Tokenizer
-from workers.training.joints import heading_joints, world_joints
-from workers.training.tokenizing import tokenizer_loss
 
 CPU = torch.device("cpu")
 
@@ -287,8 +287,8 @@ def test_paper_sizes_are_the_published_ones() -> None:
 
 
 def test_the_starter_bundle_fits_in_16_megabytes() -> None:
-    from shared.nn.bundling import stored
-    from workers.hgm3.bundle import Networks
+    from marey.hgm3.bundle import Networks
+    from marey.nn.bundling import stored
 
     networks = Networks.build(STARTER).parts()
     kept = [v for n in networks.values() for k, v in n.state_dict().items() if stored(k)]
@@ -296,7 +296,7 @@ def test_the_starter_bundle_fits_in_16_megabytes() -> None:
 
 
 def test_every_configuration_builds() -> None:
-    from workers.hgm3.bundle import Networks
+    from marey.hgm3.bundle import Networks
 
     for name in ("starter", "tiny"):
         Networks.build(named_config(name))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from shared.errors import InvalidInput
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.obedience import main
+from marey.errors import InvalidInput
+from marey.hgm3.bundle import random_bundle
+from marey.hgm3.obedience import main
 
 
 def test_a_report_counts_each_prompt_and_seed(tmp_path: Path) -> None:

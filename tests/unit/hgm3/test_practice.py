@@ -9,26 +9,26 @@ import numpy as np
 import pytest
 import torch
 
-from shared.bundles import Bundle
-from shared.errors import InvalidFile
+from marey.bundles import Bundle
+from marey.errors import InvalidFile
+from marey.hgm3 import practice
+from marey.hgm3.assembly import take_apart
+from marey.hgm3.bundle import random_bundle
+from marey.hgm3.config import TINY, HGM3Config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.generate import Generator
+from marey.hgm3.practice import practise
+from marey.hgm3.stage_masked import MaskedStage
+from marey.hgm3.tokenizer import Tokenizer
+from marey.hgm3.train import train_stage
+from marey.training.budget import Budget
+from marey.training.checks.judge import Expectation, Verdict
+from marey.training.data.prepared import PreparedData
+from marey.training.drawn import FILE, Drawn, load_drawn
+from marey.training.motions import MotionData, TokenData
+from marey.training.staging import TrainOptions
+from marey.training.texts import CaptionTexts
 from tests.support.prepared import text_features, write_prepared
-from workers.hgm3 import practice
-from workers.hgm3.assembly import take_apart
-from workers.hgm3.bundle import random_bundle
-from workers.hgm3.config import TINY, HGM3Config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.generate import Generator
-from workers.hgm3.practice import practise
-from workers.hgm3.stage_masked import MaskedStage
-from workers.hgm3.tokenizer import Tokenizer
-from workers.hgm3.train import train_stage
-from workers.training.budget import Budget
-from workers.training.checks.judge import Expectation, Verdict
-from workers.training.data.prepared import PreparedData
-from workers.training.drawn import FILE, Drawn, load_drawn
-from workers.training.motions import MotionData, TokenData
-from workers.training.staging import TrainOptions
-from workers.training.texts import CaptionTexts
 
 CPU = torch.device("cpu")
 

@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 import torch
 
-from shared.bundles import Bundle
-from shared.errors import InvalidInput, NotFound
-from shared.nn.devices import fast_bf16
+from marey.bundles import Bundle
+from marey.errors import InvalidInput, NotFound
+from marey.generating.port import Request
+from marey.hgm3.assembly import assemble, take_apart
+from marey.hgm3.config import TINY, HGM3Config, named_config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.generate import Generator
+from marey.hgm3.stage_masked import MaskedStage
+from marey.hgm3.tokenizer import Tokenizer
+from marey.hgm3.train import train_stage
+from marey.nn.devices import fast_bf16
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.loop import RunOptions, StepContext, train
+from marey.training.motions import MotionData, TokenData
+from marey.training.parts import load_part
+from marey.training.staging import TrainOptions
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
 from tests.support.prepared import farthest_move, text_features
-from workers.generating.port import Request
-from workers.hgm3.assembly import assemble, take_apart
-from workers.hgm3.config import TINY, HGM3Config, named_config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.generate import Generator
-from workers.hgm3.stage_masked import MaskedStage
-from workers.hgm3.tokenizer import Tokenizer
-from workers.hgm3.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.loop import RunOptions, StepContext, train
-from workers.training.motions import MotionData, TokenData
-from workers.training.parts import load_part
-from workers.training.staging import TrainOptions
-from workers.training.texts import CaptionTexts
-from workers.training.tokenizing import TokenizerStage
 
 CPU = torch.device("cpu")
 

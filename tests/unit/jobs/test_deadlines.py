@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from shared.jobs import deadlines
-from shared.jobs.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
-from shared.settings import Settings
+from marey.jobs import deadlines
+from marey.jobs.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
+from marey.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[3]
 BAR = 15.0

@@ -7,7 +7,7 @@ from itertools import product
 
 import pytest
 
-from shared.jobs.states import (
+from marey.jobs.states import (
     ENDED,
     EVALUATION_TRANSITIONS,
     OPEN,

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from shared.errors import InvalidFile
-from shared.measures.scores import read_scores
+from marey.errors import InvalidFile
+from marey.evaluator.report import to_json
+from marey.measures.scores import read_scores
 from tests.support.reports import sample_report
-from workers.evaluator.report import to_json
 
 REPORT = sample_report()
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from marey.training.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
-from workers.training.data.prepared import PreparedData
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import torch
 
-from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.streaming import Streams
+from marey.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.streaming import Streams
 
 
 def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 import torch
 
-from workers.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
-from workers.mogo.assembly import assemble
-from workers.mogo.config import TINY
-from workers.mogo.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.motions import TOKENS
-from workers.training.staging import TrainOptions
+from marey.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
+from marey.mogo.assembly import assemble
+from marey.mogo.config import TINY
+from marey.mogo.train import train_stage
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.motions import TOKENS
+from marey.training.staging import TrainOptions
 
 from .networks import columns, prompts
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 import torch
 
-from shared.streams.acts import Begun
-from workers.mogo.clock import UNTOLD, Clock
-from workers.mogo.config import TINY
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.plan import STOPS
-from workers.mogo.streaming import Streams
+from marey.mogo.clock import UNTOLD, Clock
+from marey.mogo.config import TINY
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.plan import STOPS
+from marey.mogo.streaming import Streams
+from marey.streams.acts import Begun
 
 from .networks import columns, prompts, transformer
 

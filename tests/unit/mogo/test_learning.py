@@ -8,11 +8,11 @@ import pytest
 import torch
 import torch.nn.functional as F
 
-from workers.mogo.config import TINY
-from workers.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
-from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
-from workers.mogo.tokenizer import Tokenizer
-from workers.training.tokenizing import tokenizer_loss
+from marey.mogo.config import TINY
+from marey.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
+from marey.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from marey.mogo.tokenizer import Tokenizer
+from marey.training.tokenizing import tokenizer_loss
 
 from .networks import columns, opened, prompts, transformer
 

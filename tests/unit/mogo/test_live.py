@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.motion.live import LiveMotion
-from shared.runtime.live.port import LiveFrame
-from shared.streams.acts import Begun
-from shared.streams.frames import decode_frame, encode_frame
+from marey.errors import InvalidInput
+from marey.mogo.bundle import random_bundle
+from marey.mogo.config import TINY
+from marey.mogo.generate import Generator, Settings
+from marey.mogo.live import LiveRoom
+from marey.motion.live import LiveMotion
+from marey.runtime.live.port import LiveFrame
+from marey.streams.acts import Begun
+from marey.streams.frames import decode_frame, encode_frame
 from tests.support.prepared import text_features
-from workers.mogo.bundle import random_bundle
-from workers.mogo.config import TINY
-from workers.mogo.generate import Generator, Settings
-from workers.mogo.live import LiveRoom
 
 
 @pytest.fixture(scope="module")

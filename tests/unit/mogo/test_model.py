@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from shared.errors import InvalidInput
-from workers.mogo.attention import RelativeAttention
-from workers.mogo.config import PAPER, STARTER, TINY, MOGOConfig
-from workers.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
+from marey.errors import InvalidInput
+from marey.mogo.attention import RelativeAttention
+from marey.mogo.config import PAPER, STARTER, TINY, MOGOConfig
+from marey.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
 
 from .networks import columns, prompts, transformer
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marey.mogo import obedience
+from marey.mogo.bundle import random_bundle
+from marey.mogo.obedience import main, pairs_of, steered
+from marey.training.checks.prompts import EvaluationPrompt, evaluation_prompts
 from tests.support.bodies import bower, walker
-from workers.mogo import obedience
-from workers.mogo.bundle import random_bundle
-from workers.mogo.obedience import main, pairs_of, steered
-from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
 
 FPS = 20.0
 

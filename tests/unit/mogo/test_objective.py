@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 import torch
 
-from workers.mogo import train
-from workers.mogo.config import TINY, MOGOConfig
-from workers.mogo.losses import LevelSums
-from workers.mogo.stage_transformer import TransformerStage
-from workers.mogo.tokenizer import Tokenizer
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.loop import StepContext
-from workers.training.motions import MotionData, TokenData
-from workers.training.sentences import SentenceData
-from workers.training.staging import TrainOptions
-from workers.training.texts import CaptionTexts
-from workers.training.tokenizing import TokenizerStage
+from marey.mogo import train
+from marey.mogo.config import TINY, MOGOConfig
+from marey.mogo.losses import LevelSums
+from marey.mogo.stage_transformer import TransformerStage
+from marey.mogo.tokenizer import Tokenizer
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.loop import StepContext
+from marey.training.motions import MotionData, TokenData
+from marey.training.sentences import SentenceData
+from marey.training.staging import TrainOptions
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
 
 CPU = torch.device("cpu")
 

@@ -10,14 +10,14 @@ import pytest
 import structlog
 import torch
 
+from marey.mogo.bundle import random_bundle
+from marey.mogo.config import TINY
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.replay import Replayed
+from marey.mogo.streaming import Streams
 from tests.support.prepared import text_features
-from workers.mogo.bundle import random_bundle
-from workers.mogo.config import TINY
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.replay import Replayed
-from workers.mogo.streaming import Streams
 
 from .networks import columns, opened, prompts, transformer
 

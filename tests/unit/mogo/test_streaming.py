@@ -7,13 +7,13 @@ from dataclasses import replace
 import pytest
 import torch
 
-from shared.errors import InvalidInput
-from shared.nn.sampling import guide
-from shared.streams.acts import Begun
+from marey.errors import InvalidInput
+from marey.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.streaming import Streams
+from marey.nn.sampling import guide
+from marey.streams.acts import Begun
 from tests.support.processors import PACKED_TYPES
-from workers.mogo.config import TINY, InferenceConfig, MOGOConfig
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.streaming import Streams
 
 from .networks import columns, opened, prompts, transformer
 

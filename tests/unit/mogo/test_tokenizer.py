@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from workers.mogo.config import TINY
-from workers.mogo.tokenizer import DecoderState, Tokenizer
+from marey.mogo.config import TINY
+from marey.mogo.tokenizer import DecoderState, Tokenizer
 
 LEVELS = TINY.tokenizer.levels
 

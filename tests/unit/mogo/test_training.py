@@ -9,26 +9,26 @@ import numpy as np
 import pytest
 import torch
 
-from shared.errors import InvalidInput, NotFound
+from marey.errors import InvalidInput, NotFound
+from marey.mogo import steers
+from marey.mogo.assembly import assemble, take_apart
+from marey.mogo.config import TINY, MOGOConfig
+from marey.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from marey.mogo.rollouts import Rollouts
+from marey.mogo.samples import MIN_FRAMES, Stretch
+from marey.mogo.stage_transformer import TransformerStage
+from marey.mogo.steers import LEAST_ENTERED, load_steers
+from marey.mogo.tokenizer import Tokenizer
+from marey.mogo.train import train_stage
+from marey.training.budget import Budget
+from marey.training.data.prepared import PreparedData
+from marey.training.motions import MotionData, TokenData
+from marey.training.pairs import Pairs
+from marey.training.parts import load_part
+from marey.training.sentences import SentenceData
+from marey.training.staging import TrainOptions
+from marey.training.texts import CaptionTexts
 from tests.support.prepared import farthest_move
-from workers.mogo import steers
-from workers.mogo.assembly import assemble, take_apart
-from workers.mogo.config import TINY, MOGOConfig
-from workers.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
-from workers.mogo.rollouts import Rollouts
-from workers.mogo.samples import MIN_FRAMES, Stretch
-from workers.mogo.stage_transformer import TransformerStage
-from workers.mogo.steers import LEAST_ENTERED, load_steers
-from workers.mogo.tokenizer import Tokenizer
-from workers.mogo.train import train_stage
-from workers.training.budget import Budget
-from workers.training.data.prepared import PreparedData
-from workers.training.motions import MotionData, TokenData
-from workers.training.pairs import Pairs
-from workers.training.parts import load_part
-from workers.training.sentences import SentenceData
-from workers.training.staging import TrainOptions
-from workers.training.texts import CaptionTexts
 
 CPU = torch.device("cpu")
 

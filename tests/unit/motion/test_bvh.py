@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
-from shared.motion import bvh, bvh_header
-from shared.motion.bvh import format_bvh, parse_bvh, read_bvh, write_bvh
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.rotations import about, angle_between, multiply, to_euler
-from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.motion import bvh, bvh_header
+from marey.motion.bvh import format_bvh, parse_bvh, read_bvh, write_bvh
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import about, angle_between, multiply, to_euler
+from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS
 from tests.support.exported import tumbling
 from tests.support.walker import walker
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidFile, InvalidInput, NotFound, TooLarge
-from shared.motion import clip as clips
-from shared.motion.clip import KEYS, MotionClip, load_npz, parse_npz
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.skeleton import HUMANML3D, SNAPMOGEN
+from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.motion import clip as clips
+from marey.motion.clip import KEYS, MotionClip, load_npz, parse_npz
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.skeleton import HUMANML3D, SNAPMOGEN
 from tests.support.exported import tumbling
 from tests.support.walker import walker
 

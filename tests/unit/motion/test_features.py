@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput, NotFound
-from shared.motion.features import (
+from marey.errors import InvalidInput, NotFound
+from marey.motion.features import (
     HUMANML3D_263,
     KIT_251,
     LAYOUTS,
@@ -17,10 +17,10 @@ from shared.motion.features import (
     layout,
     mirror_joints,
 )
-from shared.motion.filters import smooth
-from shared.motion.kinematics import facing, forward_kinematics
-from shared.motion.rotations import about, angle_between, from_6d, from_rotvec, multiply, rotate
-from shared.motion.skeleton import HUMANML3D, Skeleton
+from marey.motion.filters import smooth
+from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.rotations import about, angle_between, from_6d, from_rotvec, multiply, rotate
+from marey.motion.skeleton import HUMANML3D, Skeleton
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker
 

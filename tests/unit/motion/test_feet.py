@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
-from shared.motion.filters import smooth_above
-from shared.motion.kinematics import bone_lengths
-from shared.motion.legs import two_bone_knee
-from shared.motion.pose import solve_pose
-from shared.motion.resample import frame_times, interpolate, interpolate_rotations
-from shared.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton
+from marey.errors import InvalidInput
+from marey.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
+from marey.motion.filters import smooth_above
+from marey.motion.kinematics import bone_lengths
+from marey.motion.legs import two_bone_knee
+from marey.motion.pose import solve_pose
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations
+from marey.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton
 from tests.support.motions import drift
 from tests.support.stepping import sliding, stepping
 from tests.support.walker import walker

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import Conflict, InvalidFile, InvalidInput, NotFound
-from shared.motion.bvh import BvhClip, format_bvh, parse_bvh, read_bvh, write_bvh
-from shared.motion.clip import MotionClip, load_npz
-from shared.motion.convert import convert, steady
-from shared.motion.features import HUMANML3D_263, KIT_251
-from shared.motion.feet import skate
-from shared.motion.finish import finish_motion
-from shared.motion.kinematics import bone_lengths, facing, forward_kinematics
-from shared.motion.resample import frame_times, interpolate, interpolate_rotations, resample
-from shared.motion.rotations import about, angle_between, multiply
-from shared.motion.skeleton import HUMANML3D
+from marey.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from marey.motion.bvh import BvhClip, format_bvh, parse_bvh, read_bvh, write_bvh
+from marey.motion.clip import MotionClip, load_npz
+from marey.motion.convert import convert, steady
+from marey.motion.features import HUMANML3D_263, KIT_251
+from marey.motion.feet import skate
+from marey.motion.finish import finish_motion
+from marey.motion.kinematics import bone_lengths, facing, forward_kinematics
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
+from marey.motion.rotations import about, angle_between, multiply
+from marey.motion.skeleton import HUMANML3D
 from tests.support.exported import tumbling
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker

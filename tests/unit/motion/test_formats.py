@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.motion.clip import KEYS
+from marey.motion.clip import KEYS
 from tests.support.walker import walker
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "formats.md"

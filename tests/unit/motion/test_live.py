@@ -5,14 +5,14 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.motion.features import HUMANML3D_263
-from shared.motion.finish import finish_motion
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.live import MEMORY, LiveMotion, LiveState
-from shared.motion.live_features import LiveDecoder
-from shared.motion.rotations import angle_between
-from shared.motion.skeleton import HUMANML3D, Skeleton
+from marey.errors import InvalidInput
+from marey.motion.features import HUMANML3D_263
+from marey.motion.finish import finish_motion
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.live import MEMORY, LiveMotion, LiveState
+from marey.motion.live_features import LiveDecoder
+from marey.motion.rotations import angle_between
+from marey.motion.skeleton import HUMANML3D, Skeleton
 from tests.support.motions import drift
 from tests.support.stepping import TOES, sliding
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.motion.features import HUMANML3D_263, KIT_251
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.live_features import LiveDecoder, RootState
+from marey.errors import InvalidInput
+from marey.motion.features import HUMANML3D_263, KIT_251
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.live_features import LiveDecoder, RootState
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker
 

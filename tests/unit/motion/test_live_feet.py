@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.motion.feet import RELEASE, find_contacts
-from shared.motion.kinematics import bone_lengths
-from shared.motion.legs import two_bone_knee
-from shared.motion.live_feet import STRAY, FeetState, LiveFeet
-from shared.motion.skeleton import HUMANML3D, SKELETONS, Skeleton
+from marey.errors import InvalidInput
+from marey.motion.feet import RELEASE, find_contacts
+from marey.motion.kinematics import bone_lengths
+from marey.motion.legs import two_bone_knee
+from marey.motion.live_feet import STRAY, FeetState, LiveFeet
+from marey.motion.skeleton import HUMANML3D, SKELETONS, Skeleton
 from tests.support.motions import drift
 from tests.support.stepping import ANKLES, HIPS, KNEES, TOES, sliding, stepping
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from shared.motion import live_page as module
-from shared.motion.body import dress
-from shared.motion.live_page import live_page
-from shared.motion.pages import fill
-from shared.motion.skeleton import HUMANML3D
+from marey.motion import live_page as module
+from marey.motion.body import dress
+from marey.motion.live_page import live_page
+from marey.motion.pages import fill
+from marey.motion.skeleton import HUMANML3D
 
 ASSETS = Path(module.__file__).parent / "assets"
 

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.motion.bvh import read_bvh, write_bvh
-from shared.motion.clip import MotionClip
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.live_poses import LivePoses, PoseState
-from shared.motion.pose import solve_pose
-from shared.motion.rotations import IDENTITY, about, angle_between, from_rotvec
-from shared.motion.skeleton import HUMANML3D, SKELETONS
+from marey.errors import InvalidInput
+from marey.motion.bvh import read_bvh, write_bvh
+from marey.motion.clip import MotionClip
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.live_poses import LivePoses, PoseState
+from marey.motion.pose import solve_pose
+from marey.motion.rotations import IDENTITY, about, angle_between, from_rotvec
+from marey.motion.skeleton import HUMANML3D, SKELETONS
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker
 

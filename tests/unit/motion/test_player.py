@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.motion import player
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.pages import script_json
-from shared.motion.player import html_player
-from shared.motion.rotations import normalize
+from marey.errors import InvalidInput
+from marey.motion import player
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.pages import script_json
+from marey.motion.player import html_player
+from marey.motion.rotations import normalize
 from tests.support.walker import walker
 
 ASSETS = Path(player.__file__).parent / "assets"

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.motion.features import mirror_joints
-from shared.motion.kinematics import bone_lengths, forward_kinematics
-from shared.motion.pose import measure_offsets, solve_pose
-from shared.motion.rigid import fit_rotation
-from shared.motion.rotations import about, angle_between, from_rotvec, multiply, rotate, to_rotvec
-from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS
+from marey.errors import InvalidInput
+from marey.motion.features import mirror_joints
+from marey.motion.kinematics import bone_lengths, forward_kinematics
+from marey.motion.pose import measure_offsets, solve_pose
+from marey.motion.rigid import fit_rotation
+from marey.motion.rotations import about, angle_between, from_rotvec, multiply, rotate, to_rotvec
+from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS
 from tests.support.exported import tumbling
 from tests.support.motions import dancer, drift
 from tests.support.walker import walker

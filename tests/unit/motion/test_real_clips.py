@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.motion.bvh import BvhClip, format_bvh, parse_bvh
-from shared.motion.convert import clip_from_bvh, steady
-from shared.motion.features import HUMANML3D_263
-from shared.motion.feet import skate
-from shared.motion.finish import finish_motion
-from shared.motion.kinematics import bone_lengths, facing
-from shared.motion.pose import solve_pose
-from shared.motion.rotations import angle_between, normalize
-from shared.motion.skeleton import HUMANML3D
+from marey.motion.bvh import BvhClip, format_bvh, parse_bvh
+from marey.motion.convert import clip_from_bvh, steady
+from marey.motion.features import HUMANML3D_263
+from marey.motion.feet import skate
+from marey.motion.finish import finish_motion
+from marey.motion.kinematics import bone_lengths, facing
+from marey.motion.pose import solve_pose
+from marey.motion.rotations import angle_between, normalize
+from marey.motion.skeleton import HUMANML3D
+from marey.training.data.retarget import read_source, retarget
+from marey.training.data.rigs import BANDAI_NAMCO, ICLONE
 from tests.support.archives import first_files
-from workers.training.data.retarget import read_source, retarget
-from workers.training.data.rigs import BANDAI_NAMCO, ICLONE
 
 pytestmark = pytest.mark.data
 

@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.motion.bvh import BvhClip, write_bvh
-from shared.motion.clip import load_npz
-from shared.motion.convert import convert
-from shared.motion.feet import find_contacts
-from shared.motion.kinematics import facing
-from shared.motion.rigs import feet_and_facing
-from shared.motion.rotations import about, multiply, rotate
-from shared.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton, mirror_by_name
+from marey.motion.bvh import BvhClip, write_bvh
+from marey.motion.clip import load_npz
+from marey.motion.convert import convert
+from marey.motion.feet import find_contacts
+from marey.motion.kinematics import facing
+from marey.motion.rigs import feet_and_facing
+from marey.motion.rotations import about, multiply, rotate
+from marey.motion.skeleton import HUMANML3D, SNAPMOGEN, Skeleton, mirror_by_name
 from tests.support.walker import walker
 
 # Thigh, knee, ankle, toe, collar bone, upper arm, lower arm, hand of the left side

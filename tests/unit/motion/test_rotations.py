@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from shared.motion import rotations as r
+from marey.motion import rotations as r
 
 unit = st.floats(-1, 1, allow_nan=False, width=32)
 quaternions = arrays.arrays(np.float64, (6, 4), elements=unit).map(

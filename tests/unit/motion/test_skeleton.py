@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.errors import InvalidInput
-from shared.motion.kinematics import bone_lengths, facing, forward_kinematics
-from shared.motion.rotations import IDENTITY, about
-from shared.motion.skeleton import (
+from marey.errors import InvalidInput
+from marey.motion.kinematics import bone_lengths, facing, forward_kinematics
+from marey.motion.rotations import IDENTITY, about
+from marey.motion.skeleton import (
     HUMANML3D,
     KIT,
     SKELETONS,

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.motion.kinematics import bone_lengths, forward_kinematics
-from shared.motion.live_poses import LivePoses
-from shared.motion.rotations import about, from_rotvec
-from shared.motion.skeleton import HUMANML3D, KIT, SKELETONS, Skeleton
+from marey.motion.kinematics import bone_lengths, forward_kinematics
+from marey.motion.live_poses import LivePoses
+from marey.motion.rotations import about, from_rotvec
+from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS, Skeleton
 from tests.support.motions import drift
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 import torch
 
-from shared.nn.lanes import Lanes
+from marey.nn.lanes import Lanes
 
 
 @pytest.fixture(autouse=True)

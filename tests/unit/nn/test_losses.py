@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from shared.nn.losses import ranking_loss, token_losses
+from marey.nn.losses import ranking_loss, token_losses
 
 
 def test_token_loss_is_the_negative_log_likelihood() -> None:

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.nn.masking import cosine_schedule, easy_to_hard_mask, mask_counts, remaining_masks
+from marey.nn.masking import cosine_schedule, easy_to_hard_mask, mask_counts, remaining_masks
 
 
 def test_mask_counts_follow_the_cosine_of_a_clips_own_length() -> None:

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import nn
 
-from shared.nn.packed import GroupedLinear, PackedLinear, pack_linears
+from marey.nn.packed import GroupedLinear, PackedLinear, pack_linears
 from tests.support.processors import PACKED_TYPES, packs_bfloat16
 
 pytestmark = pytest.mark.skipif(not torch.backends.mkldnn.is_available(), reason="this torch has no oneDNN")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from shared.nn.quantizer import NO_TOKEN, ResidualQuantizer
+from marey.nn.quantizer import NO_TOKEN, ResidualQuantizer
 
 
 def quantizer(levels: int = 3, codes: int = 8, width: int = 4, **options: float) -> ResidualQuantizer:

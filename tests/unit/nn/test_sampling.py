@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from shared.nn.sampling import guide, sample_top_k, uniform
+from marey.nn.sampling import guide, sample_top_k, uniform
 
 
 def numbers(seeds: list[int], stream: int = 1, step: int = 1, count: int = 64) -> torch.Tensor:

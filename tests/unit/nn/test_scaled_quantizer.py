@@ -6,9 +6,9 @@ import pytest
 import torch
 from torch import nn
 
-from shared.nn.quantizer import ResidualQuantizer
-from shared.nn.scaled_quantizer import MIN_SCALE, Scale, ScaledQuantizer
-from workers.training.loop import _decay_groups
+from marey.nn.quantizer import ResidualQuantizer
+from marey.nn.scaled_quantizer import MIN_SCALE, Scale, ScaledQuantizer
+from marey.training.loop import _decay_groups
 
 
 def quantizer(scale: Scale = "elementwise", *, moved: bool = True) -> ScaledQuantizer:

@@ -8,9 +8,9 @@ import pytest
 import torch
 from torch import nn
 
-from shared.nn.ema import WeightAverage, update_average, warm_momentum
-from shared.nn.ragged import pad_length
-from shared.nn.transformer import Transformer, dropout, sinusoidal_positions
+from marey.nn.ema import WeightAverage, update_average, warm_momentum
+from marey.nn.ragged import pad_length
+from marey.nn.transformer import Transformer, dropout, sinusoidal_positions
 from tests.support.processors import PACKED_TYPES
 
 

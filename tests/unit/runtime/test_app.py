@@ -3,8 +3,8 @@ import sys
 
 import pytest
 
-from shared.runtime.app import DRAIN, TIME_LIMIT, VISIBILITY_TIMEOUT, create_app
-from shared.runtime.queue import redis_client
+from marey.runtime.app import DRAIN, TIME_LIMIT, VISIBILITY_TIMEOUT, create_app
+from marey.runtime.queue import redis_client
 
 
 def test_a_message_is_never_restored_while_its_task_may_still_run() -> None:
@@ -36,7 +36,7 @@ def test_every_client_has_timeouts(url: str) -> None:
 
 
 def test_the_task_has_the_name_the_relay_publishes() -> None:
-    import shared.runtime.tasks as tasks
+    import marey.runtime.tasks as tasks
 
     app = create_app("redis://localhost")
     app.loader.import_default_modules()
@@ -44,13 +44,14 @@ def test_the_task_has_the_name_the_relay_publishes() -> None:
 
 
 def test_a_worker_parent_imports_no_torch() -> None:
-    code = "import sys; import shared.runtime.worker, shared.runtime.tasks; sys.exit('torch' in sys.modules)"
+    code = "import sys; import marey.runtime.worker, marey.runtime.tasks; sys.exit('torch' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_the_scheduler_imports_neither_torch_nor_workers() -> None:
     code = (
-        "import sys; import services.scheduler.main; "
-        "sys.exit(any(name.split('.')[0] in ('torch', 'workers') for name in sys.modules))"
+        "import sys; import marey.scheduler.main; "
+        "files = [getattr(module, '__file__', None) or '' for module in list(sys.modules.values())]; "
+        "sys.exit('torch' in sys.modules or any('/workers/marey/' in file for file in files))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

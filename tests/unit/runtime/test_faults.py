@@ -4,8 +4,8 @@ import time
 import pytest
 import torch
 
-from shared.errors import InvalidInput, Unreachable
-from shared.runtime.faults import HandlerError, OutOfMemory, as_problem, is_device_lost, is_out_of_memory, patiently
+from marey.errors import InvalidInput, Unreachable
+from marey.runtime.faults import HandlerError, OutOfMemory, as_problem, is_device_lost, is_out_of_memory, patiently
 
 
 class Door:

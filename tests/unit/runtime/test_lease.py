@@ -5,10 +5,10 @@ from uuid import UUID, uuid4
 
 import pytest
 
-from shared.errors import Unreachable
-from shared.jobs import Claim, ClaimedItem, Stage
-from shared.jobs import Heartbeat as Answer
-from shared.runtime.lease import Heartbeat, HeldLease
+from marey.errors import Unreachable
+from marey.jobs import Claim, ClaimedItem, Stage
+from marey.jobs import Heartbeat as Answer
+from marey.runtime.lease import Heartbeat, HeldLease
 
 
 def make_claim(count: int) -> Claim:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import pytest
 import structlog
 
-from shared.characters import LINES, find_forbidden
-from shared.runtime.logs import configure_logging, logger
+from marey.characters import LINES, find_forbidden
+from marey.runtime.logs import configure_logging, logger
 
 
 @pytest.fixture(autouse=True)

@@ -9,13 +9,13 @@ import sys
 
 import pytest
 
-from services.api import app
-from services.http import process
-from shared.runtime import malloc
+from marey.api import app
+from marey.http import process
+from marey.runtime import malloc
 
 THREADS = """
 import ctypes, os, sys, tempfile, threading
-from shared.runtime.malloc import one_heap
+from marey.runtime.malloc import one_heap
 
 if sys.argv[1] == "one":
     one_heap()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from shared.errors import InvalidInput
-from shared.private_home import is_open, make_private, open_private
-from shared.runtime.status import WorkerStatus, status_file, write_status
+from marey.errors import InvalidInput
+from marey.private_home import is_open, make_private, open_private
+from marey.runtime.status import WorkerStatus, status_file, write_status
 
 
 def modes(home: Path) -> dict[str, str]:

@@ -5,7 +5,7 @@ import threading
 import time
 from pathlib import Path
 
-from shared.runtime.status import FRESH, TICK_LIMIT, Teller, WorkerStatus, forget_dead, probe, read_status, write_status
+from marey.runtime.status import FRESH, TICK_LIMIT, Teller, WorkerStatus, forget_dead, probe, read_status, write_status
 
 
 def test_a_living_worker_beats_and_ticks() -> None:
@@ -80,7 +80,7 @@ def test_a_process_that_stands_still_is_not_healthy_though_it_tells_of_itself(tm
 
 
 def test_the_probe_is_a_command(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "shared.runtime.status", "ready"]
+    command = [sys.executable, "-m", "marey.runtime.status", "ready"]
     environment = {**os.environ, "MAREY_HOME": str(tmp_path)}
     assert subprocess.run(command, env=environment, check=False).returncode == 1
     write_status(tmp_path, "one", WorkerStatus(7, True, 3.0, time.time()))
@@ -88,7 +88,7 @@ def test_the_probe_is_a_command(tmp_path: Path) -> None:
 
 
 def test_the_probe_says_which_setting_is_wrong() -> None:
-    command = [sys.executable, "-m", "shared.runtime.status"]
+    command = [sys.executable, "-m", "marey.runtime.status"]
     ran = subprocess.run(command, env={**os.environ, "MAREY_PORT": "abc"}, check=False, capture_output=True, text=True)
     assert ran.returncode == 1
     assert "MAREY_PORT" in ran.stderr

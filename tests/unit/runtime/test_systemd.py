@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from shared.runtime.systemd import notified, notify, watchdog_seconds
+from marey.runtime.systemd import notified, notify, watchdog_seconds
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from shared.runtime import worker
-from shared.runtime.status import TICK_LIMIT, WorkerStatus, write_status
+from marey.runtime import worker
+from marey.runtime.status import TICK_LIMIT, WorkerStatus, write_status
 
 
 def test_a_worker_that_hints_no_longer_reach_ends_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

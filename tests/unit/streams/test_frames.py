@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.motion.kinematics import forward_kinematics
-from shared.motion.rotations import angle_between, from_rotvec
-from shared.motion.skeleton import HUMANML3D
-from shared.streams.frames import HEADER, Frame, decode_frame, encode_frame, frame_bytes
+from marey.errors import InvalidInput
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import angle_between, from_rotvec
+from marey.motion.skeleton import HUMANML3D
+from marey.streams.frames import HEADER, Frame, decode_frame, encode_frame, frame_bytes
 
 FORMATS = Path(__file__).resolve().parents[3] / "docs" / "formats.md"
 

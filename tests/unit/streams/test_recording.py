@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.errors import InvalidFile
-from shared.streams.recording import Recording
+from marey.errors import InvalidFile
+from marey.streams.recording import Recording
 from tests.support.prepared import text_features
 
 

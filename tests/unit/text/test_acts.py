@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.text.acts import MOST, acts_of
-from shared.text.graph import SemanticGraph, build_graph
-from shared.text.roles import Frame
+from marey.text.acts import MOST, acts_of
+from marey.text.graph import SemanticGraph, build_graph
+from marey.text.roles import Frame
 
 
 def graph(marked: str) -> SemanticGraph:

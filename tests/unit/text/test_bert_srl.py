@@ -11,12 +11,12 @@ import pytest
 import torch
 from transformers import BertConfig, BertModel
 
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle, InvalidFile
-from shared.text.bert_srl import BertLabeller
-from shared.text.convert import convert_encoder, import_bert_srl, main
-from shared.text.roles import Frame
-from shared.text.wordpiece import WordPieces
+from marey.bundles import Bundle
+from marey.errors import InvalidBundle, InvalidFile
+from marey.text.bert_srl import BertLabeller
+from marey.text.convert import convert_encoder, import_bert_srl, main
+from marey.text.roles import Frame
+from marey.text.wordpiece import WordPieces
 
 LABELS = ["O", "B-V", "B-ARG0", "I-ARG0", "B-ARGM-DIR", "I-ARGM-DIR"]
 VOCABULARY = ["[PAD]", "[UNK]", "[CLS]", "[SEP]", "a", "person", "walk", "##s", "forward", "##.", "slowly"]
@@ -96,7 +96,7 @@ def reference_frame(archive: Path, bert: Path) -> Frame:
 
     paths = (p for p in itertools.product(range(len(LABELS)), repeat=len(ids)) if legal(p))
     best = max(paths, key=lambda p: float(probabilities[range(len(ids)), list(p)].sum()))
-    from shared.text.roles import spans_to_arguments
+    from marey.text.roles import spans_to_arguments
 
     tags = [LABELS[best[i]] for i in (1, 2, 3, 5)]
     return Frame(2, tuple(a for a in spans_to_arguments(tags) if 2 not in a.words))

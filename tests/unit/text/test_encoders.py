@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import torch
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidBundle, InvalidFile, NotFound
-from shared.settings import Settings
-from shared.text.encoders import Encoding, find_weights, weights_sha256
-from shared.text.loading import load_encoder
-from shared.text.minilm import MiniLM
-from shared.text.minilm_encoder import MiniLMEncoder
-from shared.text.pipeline import TextPipeline
+from marey.bundles import TextSpec
+from marey.errors import InvalidBundle, InvalidFile, NotFound
+from marey.settings import Settings
+from marey.text.encoders import Encoding, find_weights, weights_sha256
+from marey.text.loading import load_encoder
+from marey.text.minilm import MiniLM
+from marey.text.minilm_encoder import MiniLMEncoder
+from marey.text.pipeline import TextPipeline
 
 TEXT = "a person walks, and waves his left hand"
 LONG = " ".join(["a person walks forward and then turns left slowly"] * 20)
@@ -66,7 +66,7 @@ def test_minilm_int8_gives_the_same_bits_compiled_and_not(monkeypatch: pytest.Mo
     texts = [[101, 1037, 2711, 7365, 102], [101, 2711, 102], [101, 7365, 2830, 102], [101, 1037, 102]]
     folder = find_weights("minilm")
     compiled = MiniLM(folder, int8=True)
-    monkeypatch.setattr("shared.text.minilm.compiled", lambda module: module)
+    monkeypatch.setattr("marey.text.minilm.compiled", lambda module: module)
     plain = MiniLM(folder, int8=True)
     for ids in [*texts, *texts]:  # torch compiles a script again in its second call
         for one, other in zip(compiled.states(ids), plain.states(ids), strict=True):

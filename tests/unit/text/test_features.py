@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.errors import InvalidFile
-from shared.text.features import TextFeatures
-from shared.text.graph import build_graph
-from shared.text.roles import Argument, Frame
+from marey.errors import InvalidFile
+from marey.text.features import TextFeatures
+from marey.text.graph import build_graph
+from marey.text.roles import Argument, Frame
 
 
 def features() -> TextFeatures:

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from services.cli.commands import models as command
-from shared.errors import InvalidFile, NotFound, Unreachable
-from shared.settings import Settings
-from shared.text import encoders, fetching
-from shared.text.encoders import find_weights, weights_sha256
-from shared.text.fetching import MINILM, Wheel, fetch, need_weights
+from marey.cli.commands import models as command
+from marey.errors import InvalidFile, NotFound, Unreachable
+from marey.settings import Settings
+from marey.text import encoders, fetching
+from marey.text.encoders import find_weights, weights_sha256
+from marey.text.fetching import MINILM, Wheel, fetch, need_weights
 
 PACKAGE = "marey-test-weights"
 MEMBER = "marey_test_weights/model/model.safetensors"

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.text.graph import EDGE_TYPES, MA, OTHERS, SemanticGraph, build_graph, edge_type
-from shared.text.roles import Argument, Frame, spans_to_arguments
+from marey.text.graph import EDGE_TYPES, MA, OTHERS, SemanticGraph, build_graph, edge_type
+from marey.text.roles import Argument, Frame, spans_to_arguments
 
 TEXT = "a person walks forward and waves"
 FRAMES = (

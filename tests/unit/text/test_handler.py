@@ -9,13 +9,13 @@ from uuid import UUID, uuid4
 import numpy as np
 import pytest
 
-from services.text.handler import TextHandler, create_handler
-from shared.bundles import BundleWriter, TextSpec
-from shared.errors import InvalidBundle
-from shared.jobs import Claim, ClaimedItem, Stage
-from shared.runtime.handler import Batch, Failed, TextDone
-from shared.text.features import TextFeatures
-from shared.text.keys import feature_key, resolve
+from marey.bundles import BundleWriter, TextSpec
+from marey.errors import InvalidBundle
+from marey.jobs import Claim, ClaimedItem, Stage
+from marey.runtime.handler import Batch, Failed, TextDone
+from marey.text.features import TextFeatures
+from marey.text.keys import feature_key, resolve
+from marey.text_service.handler import TextHandler, create_handler
 
 
 def write_bundle(path: Path, text: TextSpec | None) -> str:

@@ -7,21 +7,21 @@ from pathlib import Path
 import pytest
 import torch
 
-from shared.bundles import Bundle
-from shared.errors import InvalidFile
-from shared.text.encoders import find_weights
-from shared.text.light import LightLabeller, WordStates
-from shared.text.light_network import LightConfig
-from shared.text.minilm import MiniLM
-from shared.text.roles import Argument, Frame
-from workers.training.labeller_adapter import AdaptedMiniLM, token_batch
-from workers.training.labeller_fit import FitConfig, encode, fit, roles_of, tag_set
-from workers.training.labeller_grammar import Example
-from workers.training.labeller_pack import pack
-from workers.training.labeller_pools import CaptionPool, frequent_roles, propbank_batches, with_roles
-from workers.training.labeller_propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
-from workers.training.labeller_recipe import Recipe
-from workers.training.labeller_weights import Weights
+from marey.bundles import Bundle
+from marey.errors import InvalidFile
+from marey.text.encoders import find_weights
+from marey.text.light import LightLabeller, WordStates
+from marey.text.light_network import LightConfig
+from marey.text.minilm import MiniLM
+from marey.text.roles import Argument, Frame
+from marey.training.labeller_adapter import AdaptedMiniLM, token_batch
+from marey.training.labeller_fit import FitConfig, encode, fit, roles_of, tag_set
+from marey.training.labeller_grammar import Example
+from marey.training.labeller_pack import pack
+from marey.training.labeller_pools import CaptionPool, frequent_roles, propbank_batches, with_roles
+from marey.training.labeller_propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
+from marey.training.labeller_recipe import Recipe
+from marey.training.labeller_weights import Weights
 
 WAVING = [
     ("Anna", "NNP", "-", "(ARG0*)", ""),

@@ -10,14 +10,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.bundles import Bundle, find_bundle
-from shared.errors import InvalidBundle
-from shared.text.encoders import find_weights
-from shared.text.light import LightLabeller, WordStates, segments
-from shared.text.light_network import LightConfig, LightNetwork, sentence_dropout
-from shared.text.loading import load_labeller
-from shared.text.minilm import MiniLM
-from shared.text.roles import Frame
+from marey.bundles import Bundle, find_bundle
+from marey.errors import InvalidBundle
+from marey.text.encoders import find_weights
+from marey.text.light import LightLabeller, WordStates, segments
+from marey.text.light_network import LightConfig, LightNetwork, sentence_dropout
+from marey.text.loading import load_labeller
+from marey.text.minilm import MiniLM
+from marey.text.roles import Frame
 
 
 @pytest.fixture(scope="module")
@@ -188,7 +188,7 @@ def test_the_copy_for_labelling_says_what_the_network_says(
     network: LightNetwork, length: int, script: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not script:
-        monkeypatch.setattr("shared.text.light_network.compiled", lambda module: module)
+        monkeypatch.setattr("marey.text.light_network.compiled", lambda module: module)
     states, surface = torch.randn(length, 2, 384), torch.randint(0, 3, (length, 3))
     copy = network.eval().for_inference()
     mask = torch.ones(1, length, dtype=torch.bool)

@@ -9,15 +9,15 @@ from collections.abc import Iterator
 import pytest
 from pydantic import SecretStr
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidInput
-from shared.settings import Settings
-from shared.text import openai_rewriter
-from shared.text.features import TextFeatures
-from shared.text.keys import as_served, feature_key
-from shared.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
-from shared.text.pipeline import TextPipeline
-from shared.text.rewriters import NotRewritten
+from marey.bundles import TextSpec
+from marey.errors import InvalidInput
+from marey.settings import Settings
+from marey.text import openai_rewriter
+from marey.text.features import TextFeatures
+from marey.text.keys import as_served, feature_key
+from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
+from marey.text.pipeline import TextPipeline
+from marey.text.rewriters import NotRewritten
 from tests.support.language_model import Answer, Asked, LanguageModel
 
 PROMPT = "plz make him stroll to the left"

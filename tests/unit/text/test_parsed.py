@@ -6,11 +6,11 @@ import json
 
 import pytest
 
-from services.cli.commands import text as command
-from shared.bundles import TextSpec
-from shared.text.parsed import NO_ACTION
-from shared.text.pipeline import TextPipeline
-from shared.text.words import EDGE_PUNCTUATION
+from marey.bundles import TextSpec
+from marey.cli.commands import text as command
+from marey.text.parsed import NO_ACTION
+from marey.text.pipeline import TextPipeline
+from marey.text.words import EDGE_PUNCTUATION
 
 
 @pytest.fixture(scope="module")

@@ -14,11 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidBundle, InvalidInput, NotFound
-from shared.text import pipeline as pipelines
-from shared.text.keys import feature_key, resolve
-from shared.text.pipeline import TextPipeline
+from marey.bundles import TextSpec
+from marey.errors import InvalidBundle, InvalidInput, NotFound
+from marey.text import pipeline as pipelines
+from marey.text.keys import feature_key, resolve
+from marey.text.pipeline import TextPipeline
 
 PROMPTS = ("a person walks forward", "someone waves the left hand, then bows.", "A MAN KICKS", "zombie")
 
@@ -135,8 +135,8 @@ def test_a_key_needs_hashes() -> None:
 
 def test_keys_and_limits_need_no_torch() -> None:
     code = (
-        "import sys; from shared.bundles import TextSpec; import shared.text.pipeline, shared.prompts; "
-        "from shared.text.keys import resolve; resolve(TextSpec()); "
+        "import sys; from marey.bundles import TextSpec; import marey.text.pipeline, marey.prompts; "
+        "from marey.text.keys import resolve; resolve(TextSpec()); "
         "print([m for m in ('torch', 'transformers', 'tokenizers') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -151,7 +151,7 @@ def test_another_labeller_than_the_bundle_names_is_refused() -> None:
 def test_a_labeller_that_is_not_there_is_named() -> None:
     with pytest.raises(NotFound, match="srl-bert") as caught:
         TextPipeline.load(TextSpec(labeller="bert-srl"))
-    assert "shared.text.convert" in str(caught.value.hint)
+    assert "marey.text.convert" in str(caught.value.hint)
 
 
 def test_one_bad_prompt_is_an_error_before_any_work(pipeline: TextPipeline) -> None:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.errors import InvalidInput
-from shared.prompts import MAX_WORDS, check_prompt
+from marey.errors import InvalidInput
+from marey.prompts import MAX_WORDS, check_prompt
 
 
 @pytest.mark.parametrize(

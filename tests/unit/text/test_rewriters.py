@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidBundle
-from shared.text.graph import build_graph
-from shared.text.guard import changed_meaning
-from shared.text.loading import load_rewriter
-from shared.text.pipeline import TextPipeline
-from shared.text.rewriters import PromptRewriter, RulesRewriter, expand_units
-from shared.text.roles import Frame
-from shared.text.spelling import Speller
-from shared.text.words import lemma, one_slip, third_person
+from marey.bundles import TextSpec
+from marey.errors import InvalidBundle
+from marey.text.graph import build_graph
+from marey.text.guard import changed_meaning
+from marey.text.loading import load_rewriter
+from marey.text.pipeline import TextPipeline
+from marey.text.rewriters import PromptRewriter, RulesRewriter, expand_units
+from marey.text.roles import Frame
+from marey.text.spelling import Speller
+from marey.text.words import lemma, one_slip, third_person
 
 
 @pytest.fixture(scope="module")

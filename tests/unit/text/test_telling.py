@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shared.text.clauses import DOING, LIMBS, SIDES, Clause
-from shared.text.telling import told
+from marey.text.clauses import DOING, LIMBS, SIDES, Clause
+from marey.text.telling import told
 
 
 def clause(marked: str) -> Clause:

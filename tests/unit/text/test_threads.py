@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from shared.bundles import TextSpec
-from shared.nn.threads import one_thread
-from shared.text.pipeline import TextPipeline
+from marey.bundles import TextSpec
+from marey.nn.threads import one_thread
+from marey.text.pipeline import TextPipeline
 
 
 @pytest.fixture(autouse=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shared.motion import rotations
-from shared.motion.kinematics import bone_lengths, forward_kinematics
-from shared.motion.skeleton import HUMANML3D
+from marey.motion import rotations
+from marey.motion.kinematics import bone_lengths, forward_kinematics
+from marey.motion.skeleton import HUMANML3D
+from marey.training.data.splice import join_clips, turned
 from tests.support.walker import walker
-from workers.training.data.splice import join_clips, turned
 
 FPS = 20.0
 

@@ -6,9 +6,9 @@ from dataclasses import fields
 
 import numpy as np
 
-from shared.bundles import TextSpec
-from shared.text.pipeline import TextPipeline
-from workers.training.texts import CHUNK, CaptionTexts
+from marey.bundles import TextSpec
+from marey.text.pipeline import TextPipeline
+from marey.training.texts import CHUNK, CaptionTexts
 
 CAPTIONS = (("a person walks forward", "Someone walks, then waves the left hand."), ("a person bows deeply",))
 

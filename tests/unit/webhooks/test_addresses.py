@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from shared.addresses import Allowed
-from shared.errors import InvalidInput, Refused
-from shared.webhooks.addresses import check_url, choose_address
+from marey.addresses import Allowed
+from marey.errors import InvalidInput, Refused
+from marey.webhooks.addresses import check_url, choose_address
 
 DEFAULT = Allowed.of(["public"])
 STUDIO = Allowed.of(["public", "10.1.0.0/16", "fd00:1::/32"])

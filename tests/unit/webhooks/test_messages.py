@@ -13,13 +13,13 @@ from cryptography.fernet import Fernet
 from pydantic import SecretStr
 from standardwebhooks.webhooks import Webhook, WebhookVerificationError
 
-from services.scheduler.sending import asked_to_wait
-from shared.errors import InvalidInput, Refused
-from shared.jobs import DueDelivery
-from shared.jobs.deliveries import DELAYS, HOLD, JITTER, delay_after
-from shared.settings import Settings
-from shared.webhooks.message import headers_of, message_of
-from shared.webhooks.vault import Vault, key_file, new_signing_secret
+from marey.errors import InvalidInput, Refused
+from marey.jobs import DueDelivery
+from marey.jobs.deliveries import DELAYS, HOLD, JITTER, delay_after
+from marey.scheduler.sending import asked_to_wait
+from marey.settings import Settings
+from marey.webhooks.message import headers_of, message_of
+from marey.webhooks.vault import Vault, key_file, new_signing_secret
 
 JOB = UUID(int=7)
 AT = datetime(2026, 11, 22, 3, 0, tzinfo=UTC)

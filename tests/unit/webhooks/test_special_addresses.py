@@ -6,10 +6,10 @@ from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_add
 
 import pytest
 
-from shared.addresses import Allowed, is_public
-from shared.errors import Refused
-from shared.special_addresses import SPECIAL_4, SPECIAL_6, purpose_of
-from shared.webhooks.addresses import choose_address
+from marey.addresses import Allowed, is_public
+from marey.errors import Refused
+from marey.special_addresses import SPECIAL_4, SPECIAL_6, purpose_of
+from marey.webhooks.addresses import choose_address
 
 REGISTRY = (
     "0.0.0.0/8", "10.0.0.0/8", "100.64.0.0/10", "127.0.0.0/8", "169.254.0.0/16", "172.16.0.0/12", "192.0.0.0/24",

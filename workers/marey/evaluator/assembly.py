@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 from torch import Tensor
 
-from shared.bundles import Bundle
-from shared.errors import InvalidInput
-from workers.evaluator.bundle import load_networks, write_bundle
-from workers.evaluator.card import card_of
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.model import TMR, MotionEncoder
-from workers.evaluator.reference import SPLITS, Reference, ReferenceClip, ReferenceSplit
-from workers.evaluator.sentences import open_encoder, spec_of
-from workers.evaluator.tmr import embed_motions
-from workers.training.assembly import gather
-from workers.training.data.prepared import PreparedData
-from workers.training.staging import Recipe
+from marey.bundles import Bundle
+from marey.errors import InvalidInput
+from marey.evaluator.bundle import load_networks, write_bundle
+from marey.evaluator.card import card_of
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.model import TMR, MotionEncoder
+from marey.evaluator.reference import SPLITS, Reference, ReferenceClip, ReferenceSplit
+from marey.evaluator.sentences import open_encoder, spec_of
+from marey.evaluator.tmr import embed_motions
+from marey.training.assembly import gather
+from marey.training.data.prepared import PreparedData
+from marey.training.staging import Recipe
 
 RECIPE = Recipe(
     read=EvaluatorConfig.from_dict,

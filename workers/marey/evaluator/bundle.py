@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.bundles import Bundle, BundleWriter, TextSpec
-from shared.motion.features import layout
-from shared.nn.bundling import NOT_STORED
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.model import MotionEncoder, SentenceEncoder
-from workers.evaluator.networks import KIND, open_networks
-from workers.evaluator.reference import Reference
+from marey.bundles import Bundle, BundleWriter, TextSpec
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.model import MotionEncoder, SentenceEncoder
+from marey.evaluator.networks import KIND, open_networks
+from marey.evaluator.reference import Reference
+from marey.motion.features import layout
+from marey.nn.bundling import NOT_STORED
 
 MODEL = "tmr"
 Statistics = tuple[NDArray[np.float32], NDArray[np.float32]]

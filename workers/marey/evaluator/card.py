@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from shared.bundles import TextSpec
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.reference import Reference
+from marey.bundles import TextSpec
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.reference import Reference
 
 TEXT = """# {name}: motions and captions in one space, to evaluate text-to-motion models
 
@@ -33,7 +33,7 @@ of their short public descriptions.
 `r1` to `r3`: R-precision in pools of 32 test clips, text to motion, where a motion of the text's own label is a hit;
 `distinct`: in pools where no label occurs twice. Median ranks are among all test clips, where only the pair is a hit,
 text to motion and back. Captions and pools are drawn 20 times. A label is acts, sides and style
-(`workers/evaluator/labels.py`).
+(`workers/marey/evaluator/labels.py`).
 
 ## The reference
 

@@ -1,6 +1,6 @@
 """Two evaluations of the same prompts, as a report tells it: what changed, and what is an alarm.
 
-Alarms go by prompt checks and R-precision (`shared.measures.comparing`); a distance of distributions raises none.
+Alarms go by prompt checks and R-precision (`marey.measures.comparing`); a distance of distributions raises none.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from shared.measures.comparing import compare
-from workers.evaluator.report import Baseline, Change, Metric, MotionScore, sentence_of
+from marey.evaluator.report import Baseline, Change, Metric, MotionScore, sentence_of
+from marey.measures.comparing import compare
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shared.configs import ModelConfig, named
-from shared.errors import InvalidInput
-from shared.motion.features import layout
-from workers.training.optimisation import StageConfig
+from marey.configs import ModelConfig, named
+from marey.errors import InvalidInput
+from marey.motion.features import layout
+from marey.training.optimisation import StageConfig
 
 
 @dataclass(frozen=True)

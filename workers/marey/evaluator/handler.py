@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from shared.bundles import Bundle, find_bundle
-from shared.errors import MareyError, NotFound, Unreachable
-from shared.jobs import EVALUATOR_QUEUE, ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Handler, Outcome, Scored
-from shared.runtime.scoring import ScoreInput
-from shared.settings import settings
-from workers.evaluator.loading import load_evaluator
-from workers.evaluator.measuring import check_measured, measure
-from workers.evaluator.port import Evaluator
-from workers.evaluator.reconstruction import find_reconstruction
-from workers.evaluator.reference import Reference
-from workers.evaluator.report import headline, to_html, to_json, to_markdown
-from workers.evaluator.reporting import report_of, summary_of
+from marey.bundles import Bundle, find_bundle
+from marey.errors import MareyError, NotFound, Unreachable
+from marey.evaluator.loading import load_evaluator
+from marey.evaluator.measuring import check_measured, measure
+from marey.evaluator.port import Evaluator
+from marey.evaluator.reconstruction import find_reconstruction
+from marey.evaluator.reference import Reference
+from marey.evaluator.report import headline, to_html, to_json, to_markdown
+from marey.evaluator.reporting import report_of, summary_of
+from marey.jobs import EVALUATOR_QUEUE, ClaimedItem
+from marey.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Handler, Outcome, Scored
+from marey.runtime.scoring import ScoreInput
+from marey.settings import settings
 
 
 @dataclass(frozen=True)

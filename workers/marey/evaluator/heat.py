@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 
-from shared.expected import JOIN
-from workers.evaluator.report import HeatCell
+from marey.evaluator.report import HeatCell
+from marey.expected import JOIN
 
 
 def heat_of(rows: Iterable[tuple[str | None, str, bool | None]]) -> tuple[HeatCell, ...]:

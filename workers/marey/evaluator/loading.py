@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shared.bundles import Bundle, find_bundle
-from shared.errors import InvalidBundle
-from workers.evaluator.port import Evaluator
+from marey.bundles import Bundle, find_bundle
+from marey.errors import InvalidBundle
+from marey.evaluator.port import Evaluator
 
 
 def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path | None = None) -> Evaluator:
@@ -25,12 +25,12 @@ def load_evaluator(bundle: Bundle | str, *, device: str = "auto", captions: Path
     verified = find_bundle(bundle) if isinstance(bundle, str) else bundle
     manifest = verified.manifest
     if manifest.kind == "evaluator" and manifest.model == "tmr":
-        from workers.evaluator.tmr import TMREvaluator
+        from marey.evaluator.tmr import TMREvaluator
 
         return TMREvaluator.load(verified, device=device)
     if manifest.kind == "evaluator" and manifest.model == "t2m":
-        from workers.evaluator.t2m import T2MEvaluator
-        from workers.evaluator.t2m_words import TaggedCaptions
+        from marey.evaluator.t2m import T2MEvaluator
+        from marey.evaluator.t2m_words import TaggedCaptions
 
         tagger = None if captions is None else TaggedCaptions.read(captions)
         return T2MEvaluator.load(verified, device=device, tagger=tagger)

@@ -10,7 +10,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from workers.evaluator.model import Gaussian
+from marey.evaluator.model import Gaussian
 
 
 def reconstruction(predicted: Tensor, target: Tensor, mask: Tensor) -> Tensor:

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from shared.nn.convolution import frame_mask
-from shared.nn.packed import pack_linears
-from shared.nn.transformer import Transformer, sinusoidal_positions
-from workers.evaluator.config import EvaluatorConfig, NetworkConfig
+from marey.evaluator.config import EvaluatorConfig, NetworkConfig
+from marey.nn.convolution import frame_mask
+from marey.nn.packed import pack_linears
+from marey.nn.transformer import Transformer, sinusoidal_positions
 
 DISTRIBUTION = 2
 """Learned tokens in front of a sequence: mean and log-variance."""

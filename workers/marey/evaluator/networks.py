@@ -8,9 +8,9 @@ from typing import Any, Generic, Protocol, TypeVar
 import torch
 from torch import nn
 
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle
-from shared.nn.bundling import fill
+from marey.bundles import Bundle
+from marey.errors import InvalidBundle
+from marey.nn.bundling import fill
 
 KIND = "evaluator"
 

@@ -1,6 +1,6 @@
 """What every evaluator does: motions and sentences into one space, where near means alike.
 
-Two adapters stand behind it: `workers.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `workers.evaluator.t2m` (the
+Two adapters stand behind it: `marey.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `marey.evaluator.t2m` (the
 public network of Guo et al. 2022). Both take what people have, strings and raw features: which text encoder or word
 vectors read the strings, and which mean and deviation normalise the features, is part of the evaluator. The statistics
 of the model that generated the motion are never the right ones.
@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from workers.evaluator.metrics.retrieval import Distance
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.retrieval import Distance
 
 Beat = Callable[[], None]
 """Called now and then by what takes long: whoever waits hears that it goes on."""

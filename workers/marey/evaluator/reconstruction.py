@@ -18,20 +18,20 @@ import torch
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from shared.bundles import Bundle
-from shared.bundles.reference import expected_of
-from shared.documents import read_json
-from shared.errors import InvalidFile, InvalidInput, NotFound
-from shared.jobs import BUNDLE_SOURCES
-from shared.motion.features import FeatureLayout, layout
-from shared.nn.motion_tokenizer import MotionTokenizer
-from workers.evaluator.heat import heat_of, style_of
-from workers.evaluator.measuring import Checked, check
-from workers.evaluator.port import Embeddings, Evaluator
-from workers.evaluator.reference import Reference, ReferenceSplit
-from workers.evaluator.report import HeatCell, Value
-from workers.evaluator.rows import Ruler, real_side
-from workers.training.data.prepared import PreparedData
+from marey.bundles import Bundle
+from marey.bundles.reference import expected_of
+from marey.documents import read_json
+from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.evaluator.heat import heat_of, style_of
+from marey.evaluator.measuring import Checked, check
+from marey.evaluator.port import Embeddings, Evaluator
+from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.report import HeatCell, Value
+from marey.evaluator.rows import Ruler, real_side
+from marey.jobs import BUNDLE_SOURCES
+from marey.motion.features import FeatureLayout, layout
+from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.training.data.prepared import PreparedData
 
 FOLDER = "reconstructions"
 BATCH = 32
@@ -51,7 +51,7 @@ class Reconstruction(BaseModel):
     generator: str
     evaluator: str
     clips: Mapping[str, int]
-    """By source of prompts (`shared.jobs.BUNDLE_SOURCES`)."""
+    """By source of prompts (`marey.jobs.BUNDLE_SOURCES`)."""
     error_mm: Mapping[str, float]
     """Mean joint error with the pelvis laid over the true one, by source."""
     values: Mapping[str, Mapping[str, Value]]

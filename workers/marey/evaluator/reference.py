@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from shared.bundles import Bundle, BundleWriter
-from shared.bundles.reference import FILE, PART, expected_of
-from shared.errors import InvalidBundle, NotFound
-from workers.evaluator.labels import label_ids, label_of
-from workers.evaluator.measuring import check
-from workers.training.checks.quality import Quality
-from workers.training.data.manifest import Clip
+from marey.bundles import Bundle, BundleWriter
+from marey.bundles.reference import FILE, PART, expected_of
+from marey.errors import InvalidBundle, NotFound
+from marey.evaluator.labels import label_ids, label_of
+from marey.evaluator.measuring import check
+from marey.training.checks.quality import Quality
+from marey.training.data.manifest import Clip
 
 SPLITS = ("val", "test", "compositional")
 """`test` judges; `val` is to choose by; `compositional` are pairs of act and style that training never saw."""
@@ -30,7 +30,7 @@ class ReferenceClip(BaseModel):
 
     id: str
     label: str
-    """See `workers.evaluator.labels`."""
+    """See `marey.evaluator.labels`."""
     acts: tuple[str, ...]
     sides: tuple[str, ...]
     """Of each act; what the kinematic checks of prompts expect."""
@@ -71,7 +71,7 @@ class ReferenceSplit:
     clips: tuple[ReferenceClip, ...]
     motion: NDArray[np.float32]  # (N, E), stored in half precision
     prompts: tuple[str, ...]
-    """The caption of each clip that evaluations generate from, as `shared.bundles.reference` chooses it."""
+    """The caption of each clip that evaluations generate from, as `marey.bundles.reference` chooses it."""
 
     @property
     def labels(self) -> NDArray[np.int64]:

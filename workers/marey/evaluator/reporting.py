@@ -11,17 +11,13 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.jobs import TEST_SPLIT, EarlierRun
-from shared.measures.comparing import OBEYED, RETRIEVED
-from shared.motion.clip import parse_npz
-from shared.runtime.scoring import ScoreInput
-from workers.evaluator.comparing import Earlier, alarms, changes
-from workers.evaluator.heat import heat_of, style_of
-from workers.evaluator.measuring import Measured, Motion
-from workers.evaluator.port import Beat, Evaluator, unheard
-from workers.evaluator.reconstruction import Reconstruction
-from workers.evaluator.reference import Reference as RealClips
-from workers.evaluator.report import (
+from marey.evaluator.comparing import Earlier, alarms, changes
+from marey.evaluator.heat import heat_of, style_of
+from marey.evaluator.measuring import Measured, Motion
+from marey.evaluator.port import Beat, Evaluator, unheard
+from marey.evaluator.reconstruction import Reconstruction
+from marey.evaluator.reference import Reference as RealClips
+from marey.evaluator.report import (
     Baseline,
     Exhibit,
     HeatCell,
@@ -35,9 +31,13 @@ from workers.evaluator.report import (
     TrendPoint,
     from_json,
 )
-from workers.evaluator.report.model import MOST_EXHIBITS, Against
-from workers.evaluator.rows import Ruler, generated_rows, reconstruction_row, sides_of, truth_row
-from workers.evaluator.scoring import REPEATS, Side, metrics_of, retrieved
+from marey.evaluator.report.model import MOST_EXHIBITS, Against
+from marey.evaluator.rows import Ruler, generated_rows, reconstruction_row, sides_of, truth_row
+from marey.evaluator.scoring import REPEATS, Side, metrics_of, retrieved
+from marey.jobs import TEST_SPLIT, EarlierRun
+from marey.measures.comparing import OBEYED, RETRIEVED
+from marey.motion.clip import parse_npz
+from marey.runtime.scoring import ScoreInput
 
 ANY = "any"
 TRENDS = (OBEYED, RETRIEVED, "fid", "kid", "skate", "jerk")

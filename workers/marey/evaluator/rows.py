@@ -8,14 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.jobs import COMPOSITIONAL, TEST_SPLIT
-from shared.measures.comparing import OBEYED, RETRIEVED
-from workers.evaluator.measuring import Measured, embed_prompts
-from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
-from workers.evaluator.reference import Reference, ReferenceSplit
-from workers.evaluator.report import Row, Value
-from workers.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
-from workers.evaluator.scoring import (
+from marey.evaluator.measuring import Measured, embed_prompts
+from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
+from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.report import Row, Value
+from marey.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
+from marey.evaluator.scoring import (
     POOLS,
     QUALITY,
     Side,
@@ -27,7 +25,9 @@ from workers.evaluator.scoring import (
     retrieval,
     several,
 )
-from workers.training.checks.quality import Quality
+from marey.jobs import COMPOSITIONAL, TEST_SPLIT
+from marey.measures.comparing import OBEYED, RETRIEVED
+from marey.training.checks.quality import Quality
 
 UNMEASURED = "nobody measured this generator's tokenizer on real motion (`marey train evaluator reconstruct`)"
 OLD_BUNDLE = "the evaluator's bundle was made before it carried what the joints of real clips say"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.evaluator.metrics.retrieval import ALL_TOP, Distance, all_ranks, r_precision
+from marey.evaluator.metrics.retrieval import ALL_TOP, Distance, all_ranks, r_precision
 
 POOL = 32
 TOP = (1, 2, 3)

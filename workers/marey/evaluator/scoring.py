@@ -12,22 +12,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidInput
-from shared.jobs import COMPOSITIONAL
-from shared.measures.comparing import OBEYED
-from workers.evaluator.measuring import Measured
-from workers.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
-from workers.evaluator.metrics.intervals import redraw, repeated
-from workers.evaluator.metrics.retrieval import (
+from marey.errors import InvalidInput
+from marey.evaluator.measuring import Measured
+from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
+from marey.evaluator.metrics.intervals import redraw, repeated
+from marey.evaluator.metrics.retrieval import (
     RPrecision,
     clip_score,
     label_ceiling,
     matching_score,
     r_precision,
 )
-from workers.evaluator.port import Beat, Embeddings, Evaluator, unheard
-from workers.evaluator.report import Metric, Value
-from workers.training.checks.quality import Quality
+from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
+from marey.evaluator.report import Metric, Value
+from marey.jobs import COMPOSITIONAL
+from marey.measures.comparing import OBEYED
+from marey.training.checks.quality import Quality
 
 REPEATS = 20
 POOLS = (32, 100)

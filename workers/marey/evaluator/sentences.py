@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from shared.bundles import TextSpec
-from shared.errors import InvalidBundle
-from shared.text.encoders import TextEncoder
-from shared.text.keys import NO_LABELLER
-from shared.text.loading import load_encoder
-from shared.text.pipeline import refuse_mismatch
+from marey.bundles import TextSpec
+from marey.errors import InvalidBundle
+from marey.text.encoders import TextEncoder
+from marey.text.keys import NO_LABELLER
+from marey.text.loading import load_encoder
+from marey.text.pipeline import refuse_mismatch
 
 
 def open_encoder(spec: TextSpec) -> TextEncoder:

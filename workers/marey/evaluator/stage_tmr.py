@@ -11,19 +11,19 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from shared.errors import InvalidFile, InvalidInput
-from shared.nn.convolution import frame_mask
-from shared.text.encoders import TextEncoder
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.labels import label_ids, label_of
-from workers.evaluator.losses import divergences, info_nce, latent_distance, reconstruction
-from workers.evaluator.model import TMR, Gaussian
-from workers.evaluator.scores import EmbeddedSplit, retrieval_scores
-from workers.evaluator.sentences import CaptionStates
-from workers.training.data.sampling import sampling_weights
-from workers.training.loop import StepContext
-from workers.training.motions import MotionData
-from workers.training.pairs import pieces_of
+from marey.errors import InvalidFile, InvalidInput
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.labels import label_ids, label_of
+from marey.evaluator.losses import divergences, info_nce, latent_distance, reconstruction
+from marey.evaluator.model import TMR, Gaussian
+from marey.evaluator.scores import EmbeddedSplit, retrieval_scores
+from marey.evaluator.sentences import CaptionStates
+from marey.nn.convolution import frame_mask
+from marey.text.encoders import TextEncoder
+from marey.training.data.sampling import sampling_weights
+from marey.training.loop import StepContext
+from marey.training.motions import MotionData
+from marey.training.pairs import pieces_of
 
 STATISTICS_CAPTIONS = 1024
 """Training captions that the statistics of text features are taken of: 19,000 tokens, their standard error is 1 %."""

@@ -15,14 +15,14 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle, InvalidInput
-from shared.nn.devices import choose_device
-from workers.evaluator.metrics.retrieval import Distance
-from workers.evaluator.networks import Loaded, open_networks
-from workers.evaluator.port import Embeddings, Motion, check_motions
-from workers.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
-from workers.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
+from marey.bundles import Bundle
+from marey.errors import InvalidBundle, InvalidInput
+from marey.evaluator.metrics.retrieval import Distance
+from marey.evaluator.networks import Loaded, open_networks
+from marey.evaluator.port import Embeddings, Motion, check_motions
+from marey.evaluator.t2m_model import FRAMES, MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_words import END, START, TAGS, UNKNOWN, Tagger, WordVectors
+from marey.nn.devices import choose_device
 
 MODEL = "t2m"
 WORDS_FILE, WORDS_PART = "words.json", "words"
@@ -30,7 +30,7 @@ BATCH = 32
 
 
 class T2MEvaluator(Loaded[T2MConfig, MotionEncoder, TextEncoder]):
-    """A loaded bundle, as `workers.evaluator.t2m_import` writes it. Not thread-safe."""
+    """A loaded bundle, as `marey.evaluator.t2m_import` writes it. Not thread-safe."""
 
     distance: Distance = "euclidean"
 

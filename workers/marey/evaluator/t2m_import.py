@@ -1,6 +1,6 @@
 """Importing the public T2M evaluator, once, offline: checkpoint, statistics and word vectors become a bundle.
 
-    python -m workers.evaluator.t2m_import CHECKPOINTS --glove GLOVE -o BUNDLE
+    python -m marey.evaluator.t2m_import CHECKPOINTS --glove GLOVE -o BUNDLE
 
 CHECKPOINTS is the public folder `checkpoints/t2m`, with `text_mot_match/model/finest.tar` and
 `Comp_v6_KLD005/meta/mean.npy` and `std.npy`; GLOVE the public folder `glove` with `our_vab_data.npy`,
@@ -10,7 +10,7 @@ The checkpoint is read with `weights_only=True`, which refuses anything but tens
 of words are read by an unpickler that knows no classes and so can make strings, numbers, lists and dictionaries alone.
 What is loaded for an evaluation later is the bundle: safetensors and JSON, with hashes.
 
-Never run on the public files: see `workers.evaluator.t2m`.
+Never run on the public files: see `marey.evaluator.t2m`.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from shared.arrays import read_npy
-from shared.bundles import Bundle, BundleWriter, DataSource
-from shared.characters import escape
-from shared.errors import InvalidFile, MareyError
-from shared.motion.features import layout
-from shared.nn.bundling import stored
-from workers.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
-from workers.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
-from workers.evaluator.t2m_words import END, START, UNKNOWN
+from marey.arrays import read_npy
+from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.characters import escape
+from marey.errors import InvalidFile, MareyError
+from marey.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
+from marey.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
+from marey.evaluator.t2m_words import END, START, UNKNOWN
+from marey.motion.features import layout
+from marey.nn.bundling import stored
 
 LICENCE = "LicenseRef-AMASS-NC"
 """The code is MIT; the weights are published without terms of their own, and come of HumanML3D, made of AMASS."""
@@ -154,7 +154,7 @@ def _read_plain(stream: IO[bytes]) -> Any:
 CARD = """# The public T2M evaluator, imported
 
 Guo et al. 2022, "Generating Diverse and Natural 3D Human Motions from Text": `text_mot_match` with GloVe `our_vab` and
-the statistics `Comp_v6_KLD005`, converted by `python -m workers.evaluator.t2m_import`. Trained on HumanML3D. Before
+the statistics `Comp_v6_KLD005`, converted by `python -m marey.evaluator.t2m_import`. Trained on HumanML3D. Before
 its numbers are believed, its ground-truth row should be compared with the published one: R@1 .511, matching score
 2.974.
 """
@@ -162,7 +162,7 @@ its numbers are believed, its ground-truth row should be compared with the publi
 
 def main(arguments: list[str] | None = None) -> int:
     """The command line of this module; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m workers.evaluator.t2m_import", description="See the module.")
+    parser = argparse.ArgumentParser(prog="python -m marey.evaluator.t2m_import", description="See the module.")
     parser.add_argument("checkpoints", type=Path)
     parser.add_argument("--glove", type=Path, required=True)
     parser.add_argument("-o", "--output", type=Path, required=True)

@@ -8,18 +8,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from shared.bundles import Bundle
-from shared.errors import InvalidBundle
-from shared.nn.devices import choose_device
-from shared.prompts import check_prompt
-from shared.text.encoders import TextEncoder
-from workers.evaluator.bundle import load_networks
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.metrics.retrieval import Distance
-from workers.evaluator.model import MotionEncoder, SentenceEncoder
-from workers.evaluator.networks import Loaded
-from workers.evaluator.port import Embeddings, Motion, check_motions
-from workers.evaluator.sentences import check_encoder, open_encoder, padded, token_states
+from marey.bundles import Bundle
+from marey.errors import InvalidBundle
+from marey.evaluator.bundle import load_networks
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.metrics.retrieval import Distance
+from marey.evaluator.model import MotionEncoder, SentenceEncoder
+from marey.evaluator.networks import Loaded
+from marey.evaluator.port import Embeddings, Motion, check_motions
+from marey.evaluator.sentences import check_encoder, open_encoder, padded, token_states
+from marey.nn.devices import choose_device
+from marey.prompts import check_prompt
+from marey.text.encoders import TextEncoder
 
 BATCH = 64
 

@@ -7,16 +7,16 @@ from importlib.metadata import version
 
 import torch
 
-from shared.jobs import COMPOSITIONAL, TEST_SPLIT
-from workers.evaluator.port import Evaluator
-from workers.evaluator.reconstruction import Rebuilt
-from workers.evaluator.reference import Reference as RealClips
-from workers.evaluator.report import Reference, Repeats, Report
-from workers.evaluator.report.model import RECONSTRUCTION
-from workers.evaluator.reporting import bundle_of
-from workers.evaluator.rows import Ruler, reconstruction_row, truth_row
-from workers.evaluator.scoring import REPEATS, metrics_of
-from workers.training.data.prepared import PreparedData
+from marey.evaluator.port import Evaluator
+from marey.evaluator.reconstruction import Rebuilt
+from marey.evaluator.reference import Reference as RealClips
+from marey.evaluator.report import Reference, Repeats, Report
+from marey.evaluator.report.model import RECONSTRUCTION
+from marey.evaluator.reporting import bundle_of
+from marey.evaluator.rows import Ruler, reconstruction_row, truth_row
+from marey.evaluator.scoring import REPEATS, metrics_of
+from marey.jobs import COMPOSITIONAL, TEST_SPLIT
+from marey.training.data.prepared import PreparedData
 
 
 def tokenizer_report(

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import torch
 
-from shared.nn.devices import choose_device
-from workers.evaluator.assembly import RECIPE
-from workers.evaluator.config import EvaluatorConfig
-from workers.evaluator.sentences import open_encoder
-from workers.evaluator.stage_tmr import TMRStage
-from workers.training.loop import start_process_group
-from workers.training.motions import MotionData
-from workers.training.staging import TrainOptions, finish, use_threads
-from workers.training.texts import CaptionTexts
+from marey.evaluator.assembly import RECIPE
+from marey.evaluator.config import EvaluatorConfig
+from marey.evaluator.sentences import open_encoder
+from marey.evaluator.stage_tmr import TMRStage
+from marey.nn.devices import choose_device
+from marey.training.loop import start_process_group
+from marey.training.motions import MotionData
+from marey.training.staging import TrainOptions, finish, use_threads
+from marey.training.texts import CaptionTexts
 
 
 def train_stage(name: str, options: TrainOptions[EvaluatorConfig]) -> dict[str, float]:

@@ -8,12 +8,12 @@ from typing import Any
 
 import torch
 
-from shared.items import OUTPUT_FPS
-from shared.motion.bvh_write import format_bvh
-from shared.motion.clip import MotionClip
-from shared.motion.finish import finish_motion
-from shared.runtime.handler import Export, ExportedFile
-from workers.generating.port import Generated, Generator, Request, S
+from marey.generating.port import Generated, Generator, Request, S
+from marey.items import OUTPUT_FPS
+from marey.motion.bvh_write import format_bvh
+from marey.motion.clip import MotionClip
+from marey.motion.finish import finish_motion
+from marey.runtime.handler import Export, ExportedFile
 
 MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
 

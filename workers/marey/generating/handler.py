@@ -9,14 +9,14 @@ from functools import partial
 from typing import Generic
 from uuid import UUID
 
-from shared.errors import MareyError
-from shared.jobs import ClaimedItem
-from shared.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
-from shared.settings import Settings as Configuration
-from shared.streams.recording import Recording
-from shared.text.features import TextFeatures
-from workers.generating.export import export_clip, finish, split_settings
-from workers.generating.port import Generated, Generator, Request, S
+from marey.errors import MareyError
+from marey.generating.export import export_clip, finish, split_settings
+from marey.generating.port import Generated, Generator, Request, S
+from marey.jobs import ClaimedItem
+from marey.runtime.handler import Batch, BatchControl, Done, Export, Failed, Outcome
+from marey.settings import Settings as Configuration
+from marey.streams.recording import Recording
+from marey.text.features import TextFeatures
 
 
 class GeneratorHandler(Generic[S]):

@@ -10,13 +10,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import Bundle, find_bundle
-from shared.errors import InvalidInput
-from shared.items import MAX_SEED
-from shared.motion.features import FeatureLayout
-from shared.nn.devices import choose_device, fast_bf16
-from shared.streams.recording import Recording
-from shared.text.features import TextFeatures
+from marey.bundles import Bundle, find_bundle
+from marey.errors import InvalidInput
+from marey.items import MAX_SEED
+from marey.motion.features import FeatureLayout
+from marey.nn.devices import choose_device, fast_bf16
+from marey.streams.recording import Recording
+from marey.text.features import TextFeatures
 
 
 @dataclass(frozen=True)

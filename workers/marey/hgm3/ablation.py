@@ -1,6 +1,6 @@
 """What hard token mining and the hierarchy of conditions are worth, on several training seeds.
 
-    python -m workers.hgm3.ablation data/prepared models/hgm3-starter --steps 1500 --seeds 3 -o report
+    python -m marey.hgm3.ablation data/prepared models/hgm3-starter --steps 1500 --seeds 3 -o report
 
 Everything but the masked transformer is the bundle's: it is trained from nothing, once with hard and once with random
 masks a seed, with as many steps each; every result is then decoded hierarchically, flat, and with at least one token a
@@ -18,18 +18,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from shared.bundles import find_bundle
-from shared.errors import InvalidBundle, MareyError
-from shared.text.pipeline import TextPipeline
-from workers.hgm3.assembly import assemble, take_apart
-from workers.hgm3.config import HGM3Config
-from workers.hgm3.generate import Generator, Settings
-from workers.hgm3.train import train_stage
-from workers.training.ablation import judge, table
-from workers.training.budget import Budget
-from workers.training.checks.prompts import evaluation_prompts
-from workers.training.motions import TOKENS
-from workers.training.staging import TrainOptions
+from marey.bundles import find_bundle
+from marey.errors import InvalidBundle, MareyError
+from marey.hgm3.assembly import assemble, take_apart
+from marey.hgm3.config import HGM3Config
+from marey.hgm3.generate import Generator, Settings
+from marey.hgm3.train import train_stage
+from marey.text.pipeline import TextPipeline
+from marey.training.ablation import judge, table
+from marey.training.budget import Budget
+from marey.training.checks.prompts import evaluation_prompts
+from marey.training.motions import TOKENS
+from marey.training.staging import TrainOptions
 
 DECODINGS = {
     "hierarchical": Settings(motion_steps=2, action_steps=5),
@@ -55,9 +55,7 @@ def train_variant(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train, judge, and write `results.json` and `results.md`."""
-    parser = argparse.ArgumentParser(
-        prog="python -m workers.hgm3.ablation", description="Masks and decoding, by seeds."
-    )
+    parser = argparse.ArgumentParser(prog="python -m marey.hgm3.ablation", description="Masks and decoding, by seeds.")
     parser.add_argument("data", type=Path, help="a prepared folder, with its texts")
     parser.add_argument("bundle", help="name or path: gives every part but the masked transformer")
     parser.add_argument("--steps", type=int, default=1500)

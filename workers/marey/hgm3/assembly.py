@@ -7,12 +7,12 @@ from pathlib import Path
 
 from torch import Tensor
 
-from shared.bundles import Bundle
-from shared.nn.bundling import write_generator
-from workers.hgm3.bundle import MODEL, load_networks
-from workers.hgm3.config import HGM3Config
-from workers.training.assembly import gather, scatter
-from workers.training.staging import Recipe
+from marey.bundles import Bundle
+from marey.hgm3.bundle import MODEL, load_networks
+from marey.hgm3.config import HGM3Config
+from marey.nn.bundling import write_generator
+from marey.training.assembly import gather, scatter
+from marey.training.staging import Recipe
 
 RECIPE = Recipe(
     read=HGM3Config.from_dict,

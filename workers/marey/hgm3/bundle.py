@@ -8,13 +8,13 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from shared.bundles import Bundle, TextSpec
-from shared.errors import InvalidBundle
-from shared.nn.bundling import fill, random_parts, standing, write_generator
-from shared.nn.motion_tokenizer import biased_std
-from workers.hgm3.config import HGM3Config, named_config
-from workers.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
-from workers.hgm3.tokenizer import Tokenizer
+from marey.bundles import Bundle, TextSpec
+from marey.errors import InvalidBundle
+from marey.hgm3.config import HGM3Config, named_config
+from marey.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
+from marey.hgm3.tokenizer import Tokenizer
+from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.motion_tokenizer import biased_std
 
 MODEL = "hgm3"
 

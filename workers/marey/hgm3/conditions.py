@@ -13,9 +13,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.errors import InvalidInput
-from shared.text.features import TextFeatures
-from workers.hgm3.config import ConditionConfig
+from marey.errors import InvalidInput
+from marey.hgm3.config import ConditionConfig
+from marey.text.features import TextFeatures
 
 EDGE_TYPES = 12
 MOTION, ACTION, SPECIFIC = 0, 1, 2

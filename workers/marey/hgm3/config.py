@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from shared.configs import ModelConfig, named
-from workers.training.optimisation import StageConfig
+from marey.configs import ModelConfig, named
+from marey.training.optimisation import StageConfig
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from workers.hgm3.conditions import LEVELS, GraphBatch
-from workers.hgm3.config import ConditionConfig
-from workers.training.sentences import SentenceData, sentence_fields, text_statistics
-from workers.training.texts import CaptionTexts
+from marey.hgm3.conditions import LEVELS, GraphBatch
+from marey.hgm3.config import ConditionConfig
+from marey.training.sentences import SentenceData, sentence_fields, text_statistics
+from marey.training.texts import CaptionTexts
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from shared.nn.convolution import frame_mask
-from shared.nn.masking import remaining_masks
-from shared.nn.sampling import sample_top_k, uniform
-from workers.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from workers.hgm3.config import InferenceConfig
-from workers.hgm3.model import MaskedTransformer, ResidualTransformer
+from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from marey.hgm3.config import InferenceConfig
+from marey.hgm3.model import MaskedTransformer, ResidualTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.masking import remaining_masks
+from marey.nn.sampling import sample_top_k, uniform
 
 BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
-"""What random numbers are drawn for; see `shared.nn.sampling.uniform`."""
+"""What random numbers are drawn for; see `marey.nn.sampling.uniform`."""
 
 KeepRows = Callable[[], Tensor | None]
 """Called after each pass: bool (B,) rows to go on with, or None for all."""

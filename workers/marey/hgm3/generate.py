@@ -13,16 +13,16 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.bundles import Bundle
-from shared.errors import InvalidInput
-from shared.motion.features import FeatureLayout, layout
-from shared.nn.lanes import Lanes
-from shared.nn.sampling import uniform
-from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
-from workers.hgm3.bundle import Networks, load_networks
-from workers.hgm3.conditions import graph_batch
-from workers.hgm3.config import HGM3Config, InferenceConfig
-from workers.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from marey.bundles import Bundle
+from marey.errors import InvalidInput
+from marey.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.hgm3.bundle import Networks, load_networks
+from marey.hgm3.conditions import graph_batch
+from marey.hgm3.config import HGM3Config, InferenceConfig
+from marey.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from marey.motion.features import FeatureLayout, layout
+from marey.nn.lanes import Lanes
+from marey.nn.sampling import uniform
 
 BUCKET = 8
 """Tokens; an item is padded to a multiple of this, never to its batch's longest."""

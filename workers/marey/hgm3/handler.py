@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from shared.settings import settings as configuration
-from workers.generating.handler import GeneratorHandler
-from workers.hgm3.bundle import MODEL
-from workers.hgm3.generate import MAX_ROWS, Generator, Settings
+from marey.generating.handler import GeneratorHandler
+from marey.hgm3.bundle import MODEL
+from marey.hgm3.generate import MAX_ROWS, Generator, Settings
+from marey.settings import settings as configuration
 
 
 def create_handler() -> GeneratorHandler[Settings]:

@@ -21,13 +21,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.lanes import ONE_LANE, Lanes
-from shared.nn.packed import packed_gelu
-from shared.nn.ragged import pad_length
-from shared.nn.sampling import guide
-from shared.nn.transformer import Transformer, initialize, sinusoidal_positions
-from workers.hgm3.conditions import Condition, TextEncoder, TextNormalizer
-from workers.hgm3.config import HGM3Config, TransformerConfig
+from marey.hgm3.conditions import Condition, TextEncoder, TextNormalizer
+from marey.hgm3.config import HGM3Config, TransformerConfig
+from marey.nn.lanes import ONE_LANE, Lanes
+from marey.nn.packed import packed_gelu
+from marey.nn.ragged import pad_length
+from marey.nn.sampling import guide
+from marey.nn.transformer import Transformer, initialize, sinusoidal_positions
 
 
 class SequenceModel(nn.Module):

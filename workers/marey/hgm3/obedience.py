@@ -1,18 +1,18 @@
-"""Does a bundle of HGM³ do what the prompts say? See `workers.training.obedience`."""
+"""Does a bundle of HGM³ do what the prompts say? See `marey.training.obedience`."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 
-from shared.errors import MareyError
-from workers.hgm3.generate import Generator
-from workers.training.obedience import parser_of, publish, report_of
+from marey.errors import MareyError
+from marey.hgm3.generate import Generator
+from marey.training.obedience import parser_of, publish, report_of
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Judge one bundle."""
-    chosen = parser_of("workers.hgm3.obedience").parse_args(arguments)
+    chosen = parser_of("marey.hgm3.obedience").parse_args(arguments)
     report = report_of(Generator.load(chosen.bundle, threads=chosen.threads), chosen)
     publish(report.to_json(), report.markdown(), chosen.output)
 

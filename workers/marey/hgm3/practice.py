@@ -1,6 +1,6 @@
 """More to learn from: what a finished bundle makes of training captions, where the checker says that it obeyed (ours).
 
-    python -m workers.hgm3.practice models/hgm3-starter DATA --run RUN
+    python -m marey.hgm3.practice models/hgm3-starter DATA --run RUN
 
 Asked for mostly are sequences, which captures show and the model obeys least; who fails may try again. What is kept
 lies in the run folder, where the masked stage finds it: one round of Gulcehre et al. 2023, "Reinforced Self-Training
@@ -19,17 +19,17 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from shared.errors import MareyError
-from shared.text.pipeline import TextPipeline
-from workers.generating.export import finish
-from workers.generating.port import Request
-from workers.hgm3.generate import Generator
-from workers.training.checks.judge import Expectation, judge
-from workers.training.checks.rates import expectations
-from workers.training.data.manifest import Clip
-from workers.training.data.prepared import PreparedData
-from workers.training.drawn import Drawn
-from workers.training.obedience import pipeline_of
+from marey.errors import MareyError
+from marey.generating.export import finish
+from marey.generating.port import Request
+from marey.hgm3.generate import Generator
+from marey.text.pipeline import TextPipeline
+from marey.training.checks.judge import Expectation, judge
+from marey.training.checks.rates import expectations
+from marey.training.data.manifest import Clip
+from marey.training.data.prepared import PreparedData
+from marey.training.drawn import Drawn
+from marey.training.obedience import pipeline_of
 
 ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
 """Shares of the captions by how many acts they ask for."""
@@ -109,7 +109,7 @@ def _chosen(clips: Sequence[Clip], count: int, rng: np.random.Generator) -> list
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Draw with a bundle, and leave what obeyed in a run folder."""
-    parser = argparse.ArgumentParser(prog="python -m workers.hgm3.practice", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m marey.hgm3.practice", description=__doc__)
     parser.add_argument("bundle", help="name or path; the run must have its tokenizer (`marey train hgm3 unpack`)")
     parser.add_argument("data", type=Path, help="prepared folder")
     parser.add_argument("--run", type=Path, required=True, help="run folder")

@@ -11,18 +11,18 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from shared.nn.convolution import frame_mask
-from shared.nn.ema import update_average, warm_momentum
-from shared.nn.losses import ranking_loss, token_losses
-from shared.nn.masking import easy_to_hard_mask, mask_counts
-from workers.hgm3.conditions import LEVELS, GraphBatch
-from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.model import LossPredictor, MaskedTransformer
-from workers.training.data.manifest import Clip
-from workers.training.loop import StepContext
-from workers.training.motions import TokenData
-from workers.training.pairs import Pairs, pieces_of
+from marey.hgm3.conditions import LEVELS, GraphBatch
+from marey.hgm3.config import HGM3Config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.model import LossPredictor, MaskedTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.ema import update_average, warm_momentum
+from marey.nn.losses import ranking_loss, token_losses
+from marey.nn.masking import easy_to_hard_mask, mask_counts
+from marey.training.data.manifest import Clip
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs, pieces_of
 
 
 @dataclass(frozen=True)

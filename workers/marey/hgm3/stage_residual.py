@@ -10,15 +10,15 @@ import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from shared.nn.convolution import frame_mask
-from shared.nn.losses import token_losses
-from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.model import LengthEstimator, ResidualTransformer
-from workers.training.data.manifest import Clip
-from workers.training.loop import StepContext
-from workers.training.motions import TokenData
-from workers.training.pairs import Pairs, pieces_of
+from marey.hgm3.config import HGM3Config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.model import LengthEstimator, ResidualTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.losses import token_losses
+from marey.training.data.manifest import Clip
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs, pieces_of
 
 
 class ResidualStage:

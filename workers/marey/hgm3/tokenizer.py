@@ -10,10 +10,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.convolution import ResidualBlock, frame_mask, masked
-from shared.nn.motion_tokenizer import MotionTokenizer
-from shared.nn.quantizer import Quantized, ResidualQuantizer
-from workers.hgm3.config import HGM3Config, TokenizerConfig
+from marey.hgm3.config import HGM3Config, TokenizerConfig
+from marey.nn.convolution import ResidualBlock, frame_mask, masked
+from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.nn.quantizer import Quantized, ResidualQuantizer
 
 
 class Residuals(nn.Module):

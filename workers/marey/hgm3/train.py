@@ -6,19 +6,19 @@ import dataclasses
 
 import torch
 
-from shared.nn.devices import choose_device
-from workers.hgm3.assembly import RECIPE
-from workers.hgm3.config import HGM3Config
-from workers.hgm3.data import CaptionData
-from workers.hgm3.stage_masked import MaskedStage
-from workers.hgm3.stage_residual import LengthStage, ResidualStage
-from workers.hgm3.tokenizer import Tokenizer
-from workers.training.drawn import load_drawn
-from workers.training.loop import start_process_group
-from workers.training.motions import MotionData, load_tokens
-from workers.training.staging import TrainOptions, finish, train_all, use_threads
-from workers.training.texts import CaptionTexts
-from workers.training.tokenizing import TokenizerStage
+from marey.hgm3.assembly import RECIPE
+from marey.hgm3.config import HGM3Config
+from marey.hgm3.data import CaptionData
+from marey.hgm3.stage_masked import MaskedStage
+from marey.hgm3.stage_residual import LengthStage, ResidualStage
+from marey.hgm3.tokenizer import Tokenizer
+from marey.nn.devices import choose_device
+from marey.training.drawn import load_drawn
+from marey.training.loop import start_process_group
+from marey.training.motions import MotionData, load_tokens
+from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
 
 
 def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float]:

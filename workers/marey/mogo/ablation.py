@@ -1,7 +1,7 @@
 """What MOGO's own parts are worth: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane.
 
-    python -m workers.mogo.ablation tokenizer data/prepared models/mogo-starter --steps 1500 -o report
-    python -m workers.mogo.ablation transformer data/prepared models/mogo-starter --steps 600 --batch 8 -o report
+    python -m marey.mogo.ablation tokenizer data/prepared models/mogo-starter --steps 1500 -o report
+    python -m marey.mogo.ablation transformer data/prepared models/mogo-starter --steps 600 --batch 8 -o report
 
 Each variant is trained from nothing with as many steps as the others, on the same seeds; what it is not about is the
 bundle's. `tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer`
@@ -24,19 +24,19 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from shared.bundles import find_bundle
-from shared.errors import MareyError
-from shared.nn.scaled_quantizer import Scale
-from workers.mogo.assembly import RECIPE, assemble, take_apart
-from workers.mogo.config import MOGOConfig
-from workers.mogo.generate import Generator
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.train import train_stage, transformer_stage
-from workers.training.ablation import judge, table
-from workers.training.budget import Budget
-from workers.training.checks.prompts import evaluation_prompts
-from workers.training.obedience import pipeline_of
-from workers.training.staging import TrainOptions, finish, use_threads
+from marey.bundles import find_bundle
+from marey.errors import MareyError
+from marey.mogo.assembly import RECIPE, assemble, take_apart
+from marey.mogo.config import MOGOConfig
+from marey.mogo.generate import Generator
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.train import train_stage, transformer_stage
+from marey.nn.scaled_quantizer import Scale
+from marey.training.ablation import judge, table
+from marey.training.budget import Budget
+from marey.training.checks.prompts import evaluation_prompts
+from marey.training.obedience import pipeline_of
+from marey.training.staging import TrainOptions, finish, use_threads
 
 
 class LevelToken(RQHCTransformer):
@@ -128,7 +128,7 @@ def train_transformer(bundle: str, variant: Variant, options: TrainOptions[MOGOC
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train, measure, and write `results.json` and `results.md`."""
-    parser = argparse.ArgumentParser(prog="python -m workers.mogo.ablation", description="Scales; levels and depth.")
+    parser = argparse.ArgumentParser(prog="python -m marey.mogo.ablation", description="Scales; levels and depth.")
     parser.add_argument("about", choices=["tokenizer", "transformer"])
     parser.add_argument("data", type=Path, help="a prepared folder, for transformers with its texts")
     parser.add_argument("bundle", help="name or path: gives the configuration, and the tokenizer of all transformers")

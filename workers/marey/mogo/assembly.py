@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shared.bundles import Bundle
-from shared.nn.bundling import write_generator
-from workers.mogo.bundle import MODEL, load_networks
-from workers.mogo.config import MOGOConfig
-from workers.training.assembly import gather, scatter
-from workers.training.staging import Recipe
+from marey.bundles import Bundle
+from marey.mogo.bundle import MODEL, load_networks
+from marey.mogo.config import MOGOConfig
+from marey.nn.bundling import write_generator
+from marey.training.assembly import gather, scatter
+from marey.training.staging import Recipe
 
 RECIPE = Recipe(
     read=MOGOConfig.from_dict,

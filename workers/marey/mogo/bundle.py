@@ -6,12 +6,12 @@ from pathlib import Path
 
 import torch
 
-from shared.bundles import Bundle, TextSpec
-from shared.errors import InvalidBundle
-from shared.nn.bundling import fill, random_parts, standing, write_generator
-from workers.mogo.config import MOGOConfig, named_config
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.tokenizer import Tokenizer
+from marey.bundles import Bundle, TextSpec
+from marey.errors import InvalidBundle
+from marey.mogo.config import MOGOConfig, named_config
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.tokenizer import Tokenizer
+from marey.nn.bundling import fill, random_parts, standing, write_generator
 
 MODEL = "mogo"
 

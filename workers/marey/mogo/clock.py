@@ -9,7 +9,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from shared.nn.transformer import sinusoidal_positions
+from marey.nn.transformer import sinusoidal_positions
 
 UNTOLD = -1
 """In place of frames where nobody knows, or where it is not to be told."""

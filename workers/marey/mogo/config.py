@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shared.configs import ModelConfig, named
-from shared.errors import InvalidInput
-from shared.nn.scaled_quantizer import Scale
-from workers.training.optimisation import StageConfig
+from marey.configs import ModelConfig, named
+from marey.errors import InvalidInput
+from marey.nn.scaled_quantizer import Scale
+from marey.training.optimisation import StageConfig
 
 
 @dataclass(frozen=True)

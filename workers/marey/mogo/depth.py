@@ -6,8 +6,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.transformer import Block
-from workers.mogo.config import DepthConfig
+from marey.mogo.config import DepthConfig
+from marey.nn.transformer import Block
 
 
 class DepthHead(nn.Module):

@@ -1,6 +1,6 @@
 """Which prompts does a bundle of MOGO obey best while it streams? `/live` offers these as examples.
 
-    python -m workers.mogo.examples models/mogo-starter
+    python -m marey.mogo.examples models/mogo-starter
 
 Candidates are short prompts of one act from the evaluation sets. Each begins sessions and each is steered to, out of
 another act; the checker judges both from the joints of the live frames. Of each act the best prompt becomes an example,
@@ -18,16 +18,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from shared.bundles import find_bundle
-from shared.errors import MareyError
-from shared.text.features import TextFeatures
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
-from workers.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
-from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
-from workers.training.obedience import pipeline_of
+from marey.bundles import find_bundle
+from marey.errors import MareyError
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
+from marey.text.features import TextFeatures
+from marey.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.training.obedience import pipeline_of
 
-OUTPUT = Path(__file__).parents[2] / "services" / "api" / "live" / "examples.json"
+OUTPUT = Path(__file__).parents[3] / "services" / "marey" / "api" / "live" / "examples.json"
 SETS = ("evaluation", "development")
 CANDIDATES = 3
 """Prompts of each act."""
@@ -109,7 +109,7 @@ def choose(prompts: Sequence[EvaluationPrompt], obeyed: dict[str, list[bool]]) -
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure one bundle and keep its examples beside those of other bundles."""
-    parser = argparse.ArgumentParser(prog="python -m workers.mogo.examples")
+    parser = argparse.ArgumentParser(prog="python -m marey.mogo.examples")
     parser.add_argument("bundle")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="sessions that begin with each prompt")
     parser.add_argument("--threads", type=int, default=0)

@@ -10,18 +10,18 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import Bundle
-from shared.errors import InvalidInput
-from shared.motion.features import FeatureLayout, layout
-from shared.text.features import TextFeatures
-from workers.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
-from workers.mogo.bundle import load_networks
-from workers.mogo.config import InferenceConfig, MOGOConfig
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.packed_model import PackedModel, sessions_of_product
-from workers.mogo.state import NEVER
-from workers.mogo.streaming import Streams
-from workers.mogo.tokenizer import Tokenizer
+from marey.bundles import Bundle
+from marey.errors import InvalidInput
+from marey.generating.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.mogo.bundle import load_networks
+from marey.mogo.config import InferenceConfig, MOGOConfig
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.packed_model import PackedModel, sessions_of_product
+from marey.mogo.state import NEVER
+from marey.mogo.streaming import Streams
+from marey.mogo.tokenizer import Tokenizer
+from marey.motion.features import FeatureLayout, layout
+from marey.text.features import TextFeatures
 
 MAX_SESSIONS = 32
 """Motions drawn side by side."""

@@ -1,11 +1,11 @@
-"""The work of the queue `mogo`: whole motions. Live sessions are not claimed, see `workers/mogo/streaming.py`."""
+"""The work of the queue `mogo`: whole motions. Live sessions are not claimed, see `workers/marey/mogo/streaming.py`."""
 
 from __future__ import annotations
 
-from shared.settings import settings as configuration
-from workers.generating.handler import GeneratorHandler
-from workers.mogo.bundle import MODEL
-from workers.mogo.generate import MAX_SESSIONS, Generator, Settings
+from marey.generating.handler import GeneratorHandler
+from marey.mogo.bundle import MODEL
+from marey.mogo.generate import MAX_SESSIONS, Generator, Settings
+from marey.settings import settings as configuration
 
 
 def create_handler() -> GeneratorHandler[Settings]:

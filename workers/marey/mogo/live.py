@@ -1,7 +1,7 @@
 """Live sessions of one bundle: prompts in, finished frames out; all sessions move on together, one frame a step.
 
 A session goes through three kinds of state, each with a row for every session: keys and values of the transformer
-(`Streams`), the past of the causal decoder, and root, poses and feet of the body (`shared.motion.live`). What a session
+(`Streams`), the past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). What a session
 must keep elsewhere, to go on after its worker died, are its tokens, its prompts and where their acts began.
 """
 
@@ -14,24 +14,24 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from shared.bundles import choose_bundle
-from shared.errors import InvalidBundle, InvalidInput
-from shared.motion.features import HeadingLayout
-from shared.motion.live import LiveMotion, LiveState
-from shared.nn.packed import is_small
-from shared.runtime.live.port import LiveFrame, Show
-from shared.settings import settings as configuration
-from shared.streams.acts import Begun
-from shared.streams.frames import Frame
-from shared.text.features import TextFeatures
-from shared.text.graph import Node, SemanticGraph
-from shared.text.keys import as_served
-from shared.text.pipeline import TextPipeline
-from workers.generating.port import Request
-from workers.mogo.bundle import MODEL
-from workers.mogo.generate import Generator, Settings
-from workers.mogo.streaming import Streams
-from workers.mogo.tokenizer import DecoderState
+from marey.bundles import choose_bundle
+from marey.errors import InvalidBundle, InvalidInput
+from marey.generating.port import Request
+from marey.mogo.bundle import MODEL
+from marey.mogo.generate import Generator, Settings
+from marey.mogo.streaming import Streams
+from marey.mogo.tokenizer import DecoderState
+from marey.motion.features import HeadingLayout
+from marey.motion.live import LiveMotion, LiveState
+from marey.nn.packed import is_small
+from marey.runtime.live.port import LiveFrame, Show
+from marey.settings import settings as configuration
+from marey.streams.acts import Begun
+from marey.streams.frames import Frame
+from marey.text.features import TextFeatures
+from marey.text.graph import Node, SemanticGraph
+from marey.text.keys import as_served
+from marey.text.pipeline import TextPipeline
 
 WARM_CALLS = 3
 """Compiled code watches two calls and is made ready in the third."""

@@ -8,9 +8,9 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from workers.mogo.config import TokenizerConfig
-from workers.mogo.model import NOT_ASKED, RQHCTransformer
-from workers.mogo.tokenizer import Tokenizer
+from marey.mogo.config import TokenizerConfig
+from marey.mogo.model import NOT_ASKED, RQHCTransformer
+from marey.mogo.tokenizer import Tokenizer
 
 
 def scale_penalty(model: Tokenizer, config: TokenizerConfig) -> Tensor:

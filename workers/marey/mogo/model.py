@@ -22,12 +22,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.convolution import frame_mask
-from shared.nn.transformer import dropout, initialize, sinusoidal_positions
-from workers.mogo.attention import LookBack, Reach, RelativeAttention, Slots
-from workers.mogo.clock import Clock
-from workers.mogo.config import MOGOConfig, TransformerConfig
-from workers.mogo.depth import DepthHead
+from marey.mogo.attention import LookBack, Reach, RelativeAttention, Slots
+from marey.mogo.clock import Clock
+from marey.mogo.config import MOGOConfig, TransformerConfig
+from marey.mogo.depth import DepthHead
+from marey.nn.convolution import frame_mask
+from marey.nn.transformer import dropout, initialize, sinusoidal_positions
 
 NOT_ASKED = -1
 """Target that counts in no loss."""

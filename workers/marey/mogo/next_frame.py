@@ -1,7 +1,7 @@
 """The next frame of all sessions: what runs on the device, and never waits for the host.
 
 Nothing here reads a tensor's value into Python, chooses a shape by one, or moves where the state lies: on a GPU the
-whole of it is recorded once and replayed (`workers.mogo.replay`).
+whole of it is recorded once and replayed (`marey.mogo.replay`).
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from shared.nn.sampling import guide, sample_top_k, uniform
-from workers.mogo.attention import HIDDEN, Slots
-from workers.mogo.clock import UNTOLD
-from workers.mogo.config import InferenceConfig
-from workers.mogo.depth import DepthFrame
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.state import StreamState
+from marey.mogo.attention import HIDDEN, Slots
+from marey.mogo.clock import UNTOLD
+from marey.mogo.config import InferenceConfig
+from marey.mogo.depth import DepthFrame
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.state import StreamState
+from marey.nn.sampling import guide, sample_top_k, uniform
 
 TOKEN_STREAM, END_STREAM = 4, 5
 """What random numbers are drawn for; 1 to 3 are HGM³'s."""

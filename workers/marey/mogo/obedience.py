@@ -1,9 +1,9 @@
 """Does a bundle of MOGO do what the prompts say, in whole motions and while it streams?
 
-    python -m workers.mogo.obedience models/mogo-starter --seeds 3 -o report
-    python -m workers.mogo.obedience models/mogo-starter --seeds 3 --steers 100 --walks 8 -o report
+    python -m marey.mogo.obedience models/mogo-starter --seeds 3 -o report
+    python -m marey.mogo.obedience models/mogo-starter --seeds 3 --steers 100 --walks 8 -o report
 
-Whole motions are judged as any model's (`workers.training.obedience`). `--steers` are live sessions: 4 s of one
+Whole motions are judged as any model's (`marey.training.obedience`). `--steers` are live sessions: 4 s of one
 evaluation prompt, then another that asks for another act. It is obeyed within 2 s when a stretch that begins in these
 2 s and ends 6 s after the steer does what was asked. `--walks` are sessions of one walking prompt whose frames 1,900 to
 2,000 must still walk. Joints come from the live frames, by forward kinematics, as a client's do.
@@ -19,16 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from shared.errors import MareyError
-from shared.motion.kinematics import Array, forward_kinematics
-from shared.streams.frames import Frame
-from shared.text.features import TextFeatures
-from workers.mogo.generate import Generator
-from workers.mogo.live import LiveRoom
-from workers.training.checks.judge import Verdict, judge
-from workers.training.checks.prompts import EvaluationPrompt, evaluation_prompts
-from workers.training.checks.rates import Rate
-from workers.training.obedience import parser_of, pipeline_of, publish, report_of
+from marey.errors import MareyError
+from marey.mogo.generate import Generator
+from marey.mogo.live import LiveRoom
+from marey.motion.kinematics import Array, forward_kinematics
+from marey.streams.frames import Frame
+from marey.text.features import TextFeatures
+from marey.training.checks.judge import Verdict, judge
+from marey.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.training.checks.rates import Rate
+from marey.training.obedience import parser_of, pipeline_of, publish, report_of
 
 SESSIONS = 16
 BEFORE, AFTER, WITHIN = 4.0, 6.0, 2.0  # seconds
@@ -124,7 +124,7 @@ def _markdown(title: str, found: Sequence[Streamed]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Judge one bundle."""
-    parser = parser_of("workers.mogo.obedience")
+    parser = parser_of("marey.mogo.obedience")
     parser.add_argument("--steers", type=int, default=0, metavar="N", help="live sessions that are steered")
     parser.add_argument("--walks", type=int, default=0, metavar="N", help="live sessions of 2,000 frames")
     chosen = parser.parse_args(arguments)

@@ -8,10 +8,10 @@ import copy
 import torch
 import torch.nn.functional as F
 
-from shared.nn.compiled import Module, compiled
-from shared.nn.packed import is_small, lower_linears, pack_linears
-from workers.mogo.depth import DepthStep
-from workers.mogo.model import RQHCTransformer, TrunkStep
+from marey.mogo.depth import DepthStep
+from marey.mogo.model import RQHCTransformer, TrunkStep
+from marey.nn.compiled import Module, compiled
+from marey.nn.packed import is_small, lower_linears, pack_linears
 
 MOST_GROUPED = 8
 """Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""

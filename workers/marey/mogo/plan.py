@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from workers.mogo.state import NEVER
+from marey.mogo.state import NEVER
 
 EARLIEST, STOPS = 0.75, 1.7
 """Shares of its usual frames after which an act may end, and at which its clock stops: even long ones are over then."""

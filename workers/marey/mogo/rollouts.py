@@ -15,12 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.streaming import Streams
-from workers.mogo.tokenizer import Tokenizer
-from workers.training.motions import fingerprint
-from workers.training.sentences import SentenceData
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.streaming import Streams
+from marey.mogo.tokenizer import Tokenizer
+from marey.training.motions import fingerprint
+from marey.training.sentences import SentenceData
 
 SESSIONS = 32
 LEAST, MOST = 12, 130

@@ -1,9 +1,9 @@
 """What the RQHC-Transformer is trained on: acts from beginning to end, crops, and acts whose prompt changes (ours).
 
 A sample has one act, or two with a seam: a prompt of several acts is drawn as one steer after another
-(`shared.text.acts`), and END says that an act is done. Crops teach what a stream sees behind its window: the prompt far
+(`marey.text.acts`), and END says that an act is done. Crops teach what a stream sees behind its window: the prompt far
 away, motion in full swing. Seams teach steering: between the acts of joined clips, and at any moment
-(`workers.mogo.steers`).
+(`marey.mogo.steers`).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.mogo.steers import Steers
-from workers.training.data.manifest import Clip
-from workers.training.motions import TokenData
-from workers.training.pairs import pieces_of
-from workers.training.sentences import SentenceData
+from marey.mogo.steers import Steers
+from marey.training.data.manifest import Clip
+from marey.training.motions import TokenData
+from marey.training.pairs import pieces_of
+from marey.training.sentences import SentenceData
 
 MIN_FRAMES = 16
 BEFORE_SEAM = 4

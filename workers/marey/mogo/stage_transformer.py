@@ -10,16 +10,16 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from workers.mogo.config import MOGOConfig
-from workers.mogo.losses import LevelSums, ahead_loss, level_sums
-from workers.mogo.model import RQHCTransformer, next_targets
-from workers.mogo.samples import MIN_FRAMES, Sample, Samples
-from workers.mogo.steers import Steers
-from workers.training.data.manifest import Clip
-from workers.training.loop import StepContext
-from workers.training.motions import TokenData
-from workers.training.pairs import Pairs
-from workers.training.sentences import SentenceData, text_statistics
+from marey.mogo.config import MOGOConfig
+from marey.mogo.losses import LevelSums, ahead_loss, level_sums
+from marey.mogo.model import RQHCTransformer, next_targets
+from marey.mogo.samples import MIN_FRAMES, Sample, Samples
+from marey.mogo.steers import Steers
+from marey.training.data.manifest import Clip
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs
+from marey.training.sentences import SentenceData, text_statistics
 
 
 class TransformerStage:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
-from workers.mogo.packed_model import PackedModel
+from marey.mogo.packed_model import PackedModel
 
 NEVER = 2**62
 """More frames than any session makes."""

@@ -1,6 +1,6 @@
 """Motion whose prompt changes at any moment, for training (ours): a captured clip, or what the model makes itself
-(`workers.mogo.rollouts`), is left wherever it is, and another clip is entered at its beginning, with an inertialized
-transition (`workers.training.data.splice`).
+(`marey.mogo.rollouts`), is left wherever it is, and another clip is entered at its beginning, with an inertialized
+transition (`marey.training.data.splice`).
 
 Splices of the prepared folder leave an act when it is done, as sequences do. Who steers does not wait for that.
 """
@@ -16,14 +16,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.errors import InvalidInput
-from shared.motion.features import HeadingLayout
-from workers.mogo.config import MOGOConfig
-from workers.mogo.rollouts import Rollouts
-from workers.mogo.tokenizer import Tokenizer
-from workers.training.data.prepared import PreparedData
-from workers.training.data.splice import join_clips, seam_costs, seam_features
-from workers.training.motions import MotionData, fingerprint, made_once
+from marey.errors import InvalidInput
+from marey.mogo.config import MOGOConfig
+from marey.mogo.rollouts import Rollouts
+from marey.mogo.tokenizer import Tokenizer
+from marey.motion.features import HeadingLayout
+from marey.training.data.prepared import PreparedData
+from marey.training.data.splice import join_clips, seam_costs, seam_features
+from marey.training.motions import MotionData, fingerprint, made_once
 
 FILE = "steers.safetensors"
 LEAST_LEFT, MOST_LEFT, LEAST_ENTERED = 8, 110, 12

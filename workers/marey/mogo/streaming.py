@@ -4,7 +4,7 @@
 session's cache has 1 + W slots for each layer and lane: slot 0 keeps position 0 (the prompt) for good, frame p stands
 in slot 1 + (p - 1) mod W, so that an endless motion needs no more memory and no copy. A lane is a level, twice where
 guidance wants a second branch. The attention always reads all slots: tokens depend neither on how long the sessions
-beside one are, nor on how many there are (`shared.nn.sampling.uniform`).
+beside one are, nor on how many there are (`marey.nn.sampling.uniform`).
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from collections.abc import Callable, Mapping, Sequence
 import torch
 from torch import Tensor
 
-from shared.errors import InvalidInput
-from shared.streams.acts import Begun
-from workers.mogo.attention import RelativeAttention
-from workers.mogo.config import InferenceConfig
-from workers.mogo.next_frame import NextFrame
-from workers.mogo.packed_model import PackedModel
-from workers.mogo.plan import PLAN, Plan
-from workers.mogo.replay import Replayed
-from workers.mogo.state import NEVER, StreamState
+from marey.errors import InvalidInput
+from marey.mogo.attention import RelativeAttention
+from marey.mogo.config import InferenceConfig
+from marey.mogo.next_frame import NextFrame
+from marey.mogo.packed_model import PackedModel
+from marey.mogo.plan import PLAN, Plan
+from marey.mogo.replay import Replayed
+from marey.mogo.state import NEVER, StreamState
+from marey.streams.acts import Begun
 
 
 class Streams:

@@ -15,11 +15,11 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from shared.nn.convolution import ResidualBlock, frame_mask, masked
-from shared.nn.motion_tokenizer import MotionTokenizer
-from shared.nn.quantizer import Quantized
-from shared.nn.scaled_quantizer import ScaledQuantizer
-from workers.mogo.config import MOGOConfig, TokenizerConfig
+from marey.mogo.config import MOGOConfig, TokenizerConfig
+from marey.nn.convolution import ResidualBlock, frame_mask, masked
+from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.nn.quantizer import Quantized
+from marey.nn.scaled_quantizer import ScaledQuantizer
 
 
 @dataclass(frozen=True)

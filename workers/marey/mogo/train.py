@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from shared.nn.devices import choose_device
-from workers.mogo.assembly import RECIPE
-from workers.mogo.config import MOGOConfig
-from workers.mogo.losses import scale_penalty
-from workers.mogo.model import RQHCTransformer
-from workers.mogo.rollouts import Rollouts
-from workers.mogo.samples import MIN_FRAMES
-from workers.mogo.stage_transformer import TransformerStage
-from workers.mogo.steers import Steers, load_steers
-from workers.mogo.tokenizer import Tokenizer
-from workers.training.loop import start_process_group
-from workers.training.motions import MotionData, load_tokens
-from workers.training.pairs import Pairs
-from workers.training.sentences import SentenceData
-from workers.training.staging import TrainOptions, finish, train_all, use_threads
-from workers.training.texts import CaptionTexts
-from workers.training.tokenizing import TokenizerStage
+from marey.mogo.assembly import RECIPE
+from marey.mogo.config import MOGOConfig
+from marey.mogo.losses import scale_penalty
+from marey.mogo.model import RQHCTransformer
+from marey.mogo.rollouts import Rollouts
+from marey.mogo.samples import MIN_FRAMES
+from marey.mogo.stage_transformer import TransformerStage
+from marey.mogo.steers import Steers, load_steers
+from marey.mogo.tokenizer import Tokenizer
+from marey.nn.devices import choose_device
+from marey.training.loop import start_process_group
+from marey.training.motions import MotionData, load_tokens
+from marey.training.pairs import Pairs
+from marey.training.sentences import SentenceData
+from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
 
 
 def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from statistics import mean, stdev
 
-from shared.text.features import TextFeatures
-from workers.generating.port import Generator, S
-from workers.training.checks.prompts import evaluation_prompts
-from workers.training.checks.rates import mean_quality
-from workers.training.obedience import measure
+from marey.generating.port import Generator, S
+from marey.text.features import TextFeatures
+from marey.training.checks.prompts import evaluation_prompts
+from marey.training.checks.rates import mean_quality
+from marey.training.obedience import measure
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:

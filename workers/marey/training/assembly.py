@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 
 from torch import Tensor
 
-from shared.bundles import Bundle, DataSource, TextSpec
-from shared.errors import InvalidInput
-from workers.training.data.prepared import PreparedData
-from workers.training.parts import Part, save_part
-from workers.training.staging import ModelConfig, Recipe
-from workers.training.texts import CaptionTexts
+from marey.bundles import Bundle, DataSource, TextSpec
+from marey.errors import InvalidInput
+from marey.training.data.prepared import PreparedData
+from marey.training.parts import Part, save_part
+from marey.training.staging import ModelConfig, Recipe
+from marey.training.texts import CaptionTexts
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 
 C = TypeVar("C", bound=ModelConfig)
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 
 @dataclass(frozen=True)

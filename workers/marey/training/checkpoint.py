@@ -13,9 +13,9 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from shared.documents import read_json
-from shared.errors import InvalidFile, NotFound
-from shared.nn.ema import WeightAverage
+from marey.documents import read_json
+from marey.errors import InvalidFile, NotFound
+from marey.nn.ema import WeightAverage
 
 FORMAT = 1
 

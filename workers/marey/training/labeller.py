@@ -1,6 +1,6 @@
 """Train, cross-validate and pack the `light` role labeller.
 
-    python -m workers.training.labeller --gold srl-kit-dev.json new_test_data.json \\
+    python -m marey.training.labeller --gold srl-kit-dev.json new_test_data.json \\
         --propbank propbank-release --words UD_English-EWT -o models/srl-light
 
 MiniLM's updates and the head learn PropBank first (25 minutes on one CPU core), then the captions (three
@@ -19,25 +19,25 @@ from pathlib import Path
 
 import torch
 
-from shared.errors import InvalidInput, MareyError
-from shared.text.fetching import need_weights
-from shared.text.light import WordStates
-from shared.text.light_network import LightConfig
-from workers.training.labeller_data import distinct, fold_of, read_gold
-from workers.training.labeller_fit import PROPBANK_FIT, FitConfig, fit, roles_of, tag_set
-from workers.training.labeller_grammar import Example
-from workers.training.labeller_pack import pack
-from workers.training.labeller_pools import (
+from marey.errors import InvalidInput, MareyError
+from marey.text.fetching import need_weights
+from marey.text.light import WordStates
+from marey.text.light_network import LightConfig
+from marey.training.labeller_data import distinct, fold_of, read_gold
+from marey.training.labeller_fit import PROPBANK_FIT, FitConfig, fit, roles_of, tag_set
+from marey.training.labeller_grammar import Example
+from marey.training.labeller_pack import pack
+from marey.training.labeller_pools import (
     CaptionPool,
     frequent_roles,
     propbank_batches,
     split,
     with_roles,
 )
-from workers.training.labeller_propbank import read_propbank
-from workers.training.labeller_recipe import Recipe, Validation
-from workers.training.labeller_score import Scores
-from workers.training.labeller_weights import Weights
+from marey.training.labeller_propbank import read_propbank
+from marey.training.labeller_recipe import Recipe, Validation
+from marey.training.labeller_score import Scores
+from marey.training.labeller_weights import Weights
 
 
 def cross_validate(gold: Sequence[Example], more: Sequence[Example], recipe: Recipe, folds: int) -> Validation:
@@ -111,7 +111,7 @@ def _progress(step: int, loss: float) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command line of this module; returns the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m workers.training.labeller", description="Train the role labeller.")
+    parser = argparse.ArgumentParser(prog="python -m marey.training.labeller", description="Train the role labeller.")
     parser.add_argument(
         "--gold", type=Path, required=True, nargs="+", metavar="FILE",
         help="srl-kit-dev.json, which scores are given of; then more of its kind",

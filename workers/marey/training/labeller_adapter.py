@@ -12,7 +12,7 @@ import torch.nn.functional as F
 from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariableType]
 from torch import Tensor, nn
 
-from shared.text.minilm import EPS, HEADS, LAYERS, WIDTH
+from marey.text.minilm import EPS, HEADS, LAYERS, WIDTH
 
 PROJECTIONS = ("attention.self.query", "attention.self.key", "attention.self.value")  # of one input
 MATRICES = (*PROJECTIONS, "attention.output.dense", "intermediate.dense", "output.dense")

@@ -5,20 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from workers.training.labeller_recipe import Validation
+    from marey.training.labeller_recipe import Validation
 
 TEXT = """# srl-light: semantic roles of motion captions
 
 A small tagger on the states of MiniLM (int8): it finds the predicates of a caption and, for each, its arguments with
-their PropBank roles. Marey's semantic graphs are made of them. The network is `shared/text/light_network.py`; the part
-`minilm` holds updates of rank 16, which are added to MiniLM's matrices when the labeller is loaded, and scales of
-features for int8 (Xiao et al. 2022).
+their PropBank roles. Marey's semantic graphs are made of them. The network is `shared/marey/text/light_network.py`;
+the part `minilm` holds updates of rank 16, which are added to MiniLM's matrices when the labeller is loaded, and scales
+of features for int8 (Xiao et al. 2022).
 
 ## Data and terms
 
 - First, MiniLM's updates and the head learn PropBank: verbs with their roles in 12,114 sentences of at most 30 words of
   the English Web Treebank. Roles: github.com/propbank/propbank-release; words: UD_English-EWT (Universal Dependencies);
-  both CC BY-SA 4.0, changed as `workers/training/labeller_propbank.py` says. A thousand stay in the
+  both CC BY-SA 4.0, changed as `workers/marey/training/labeller_propbank.py` says. A thousand stay in the
   second training, which is on the gold, its variants and the silver:
 - Gold: 1,536 captions of KIT Motion-Language (938 distinct) with the output of AllenNLP's
   `structured-prediction-srl-bert.2020.12.15` (Shi & Lin 2019), from jpthu17/GraphMotion (Jin et al. 2023), Apache-2.0:
@@ -28,7 +28,7 @@ features for int8 (Xiao et al. 2022).
   the verb "left" (where it is the side) and captions in which the parser found no verb ("A person is
   waving."). The "gold" is a parser's output, and who agrees with it makes its mistakes.
 - Augmentation keeps the labels: words and phrases exchanged between captions, clauses joined, typos, punctuation.
-- Silver: sentences of a small grammar (`workers/training/labeller_grammar.py`) for what the captions hardly have:
+- Silver: sentences of a small grammar (`workers/marey/training/labeller_grammar.py`) for what the captions hardly have:
   bows, waves, raised hands, punches, slashes, dances, styles, imperatives. It was written with the whole gold in
   sight, so the numbers below are a little kind to it.
 
@@ -51,7 +51,7 @@ of them. Credit: the PropBank project (Palmer et al. 2005; Pradhan et al. 2022),
 
     git clone https://github.com/propbank/propbank-release
     git clone https://github.com/UniversalDependencies/UD_English-EWT
-    python -m workers.training.labeller --gold srl-kit-dev.json GraphMotion/datasets/kit-ml/new_test_data.json \\
+    python -m marey.training.labeller --gold srl-kit-dev.json GraphMotion/datasets/kit-ml/new_test_data.json \\
         --propbank propbank-release --words UD_English-EWT -o models/srl-light
 """
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shared.documents import read_json
-from shared.errors import InvalidFile
-from shared.text.roles import Argument, Frame
-from workers.training.labeller_grammar import SUBJECTS, Example
+from marey.documents import read_json
+from marey.errors import InvalidFile
+from marey.text.roles import Argument, Frame
+from marey.training.labeller_grammar import SUBJECTS, Example
 
 _AUXILIARIES = (
     "is are was were be been being am has have had having will would can could shall should may might must do does did"

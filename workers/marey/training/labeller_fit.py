@@ -11,12 +11,12 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from shared.text.bio import transition_scores
-from shared.text.light import WordStates, surface_features
-from shared.text.light_network import LightConfig, LightNetwork
-from workers.training.labeller_adapter import AdaptedMiniLM, TokenBatch, token_batch
-from workers.training.labeller_grammar import Example
-from workers.training.labeller_weights import Weights
+from marey.text.bio import transition_scores
+from marey.text.light import WordStates, surface_features
+from marey.text.light_network import LightConfig, LightNetwork
+from marey.training.labeller_adapter import AdaptedMiniLM, TokenBatch, token_batch
+from marey.training.labeller_grammar import Example
+from marey.training.labeller_weights import Weights
 
 SMOOTHING_SENTENCES = 150
 

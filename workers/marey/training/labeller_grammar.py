@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
-from shared.text.roles import Argument, Frame
+from marey.text.roles import Argument, Frame
 
 Words = tuple[str, ...]
 

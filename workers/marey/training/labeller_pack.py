@@ -8,15 +8,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shared.bundles import Bundle, BundleWriter, DataSource
-from shared.text.encoders import weights_sha256
-from shared.text.light import UPDATES
-from workers.training.labeller_card import card
-from workers.training.labeller_fit import PROPBANK_FIT
+from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.text.encoders import weights_sha256
+from marey.text.light import UPDATES
+from marey.training.labeller_card import card
+from marey.training.labeller_fit import PROPBANK_FIT
 
 if TYPE_CHECKING:
-    from workers.training.labeller_recipe import Recipe, Validation
-    from workers.training.labeller_weights import Weights
+    from marey.training.labeller_recipe import Recipe, Validation
+    from marey.training.labeller_weights import Weights
 
 CAPTIONS = DataSource(
     name="AllenNLP SRL-BERT labels of KIT-ML captions",
@@ -55,7 +55,7 @@ def pack(output: Path, weights: Weights, gold: Sequence[Path], recipe: Recipe, r
             licence="CC-BY-SA-4.0" if recipe.first else "Apache-2.0",
             metrics=result.metrics() if result else {},
             training={
-                "command": "python -m workers.training.labeller",
+                "command": "python -m marey.training.labeller",
                 "seed": recipe.seed,
                 **asdict(recipe.config),
                 **asdict(recipe.pool),

@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from shared.text.light import WordStates
-from shared.text.roles import Frame
-from workers.training.labeller_data import Augmenter
-from workers.training.labeller_fit import Encoded, encode
-from workers.training.labeller_grammar import Example, sentence
+from marey.text.light import WordStates
+from marey.text.roles import Frame
+from marey.training.labeller_data import Augmenter
+from marey.training.labeller_fit import Encoded, encode
+from marey.training.labeller_grammar import Example, sentence
 
 CHUNKS = 16  # batches that are drawn together, so that sentences of like length share one: little padding
 

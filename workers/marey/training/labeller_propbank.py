@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from shared.errors import InvalidFile
-from shared.text.roles import Argument, Frame
-from workers.training.labeller_grammar import Example
+from marey.errors import InvalidFile
+from marey.text.roles import Argument, Frame
+from marey.training.labeller_grammar import Example
 
 SKELETONS = "data/google/ewt"
 WORDS = "not-to-release/sources"

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from shared.text.light import WordStates
-from shared.text.light_network import LightConfig
-from shared.text.roles import Frame
-from workers.training.labeller_data import corrected
-from workers.training.labeller_fit import FitConfig, fit
-from workers.training.labeller_grammar import Example
-from workers.training.labeller_pools import CaptionPool, caption_batches
-from workers.training.labeller_score import Scores, confusions
-from workers.training.labeller_weights import Weights
+from marey.text.light import WordStates
+from marey.text.light_network import LightConfig
+from marey.text.roles import Frame
+from marey.training.labeller_data import corrected
+from marey.training.labeller_fit import FitConfig, fit
+from marey.training.labeller_grammar import Example
+from marey.training.labeller_pools import CaptionPool, caption_batches
+from marey.training.labeller_score import Scores, confusions
+from marey.training.labeller_weights import Weights
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from shared.text.roles import Frame
+from marey.text.roles import Frame
 
 Item = tuple[object, ...]
 

@@ -10,10 +10,10 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from shared.documents import parse_json
-from shared.errors import InvalidFile
-from shared.text.light import LightLabeller, WordStates, light_config
-from shared.text.light_network import LightConfig, LightNetwork
+from marey.documents import parse_json
+from marey.errors import InvalidFile
+from marey.text.light import LightLabeller, WordStates, light_config
+from marey.text.light_network import LightConfig, LightNetwork
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,13 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
-from shared.errors import InvalidInput, MareyError
-from shared.nn import distributed
-from shared.nn.devices import fast_bf16
-from shared.nn.ema import WeightAverage
-from workers.training.budget import Budget, learning_rate
-from workers.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
-from workers.training.optimisation import StageConfig
+from marey.errors import InvalidInput, MareyError
+from marey.nn import distributed
+from marey.nn.devices import fast_bf16
+from marey.nn.ema import WeightAverage
+from marey.training.budget import Budget, learning_rate
+from marey.training.checkpoint import TrainingState, load_checkpoint, save_checkpoint
+from marey.training.optimisation import StageConfig
 
 log = structlog.get_logger()
 

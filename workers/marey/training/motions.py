@@ -15,11 +15,11 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from shared.errors import InvalidFile
-from shared.nn import distributed
-from shared.nn.motion_tokenizer import MotionTokenizer
-from workers.training.data.manifest import Clip
-from workers.training.data.prepared import PreparedData
+from marey.errors import InvalidFile
+from marey.nn import distributed
+from marey.nn.motion_tokenizer import MotionTokenizer
+from marey.training.data.manifest import Clip
+from marey.training.data.prepared import PreparedData
 
 TOKENS = "tokens.safetensors"
 

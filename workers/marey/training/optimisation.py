@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from shared.configs import ModelConfig
-from shared.errors import InvalidInput
+from marey.configs import ModelConfig
+from marey.errors import InvalidInput
 
 C = TypeVar("C", bound=ModelConfig)
 

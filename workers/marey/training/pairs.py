@@ -9,10 +9,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from workers.training.data.manifest import Clip
-from workers.training.data.sampling import sampling_weights
-from workers.training.motions import TokenData
-from workers.training.sentences import SentenceData
+from marey.training.data.manifest import Clip
+from marey.training.data.sampling import sampling_weights
+from marey.training.motions import TokenData
+from marey.training.sentences import SentenceData
 
 
 class Pairs:

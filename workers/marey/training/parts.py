@@ -11,8 +11,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from shared.documents import read_json
-from shared.errors import InvalidFile, NotFound
+from marey.documents import read_json
+from marey.errors import InvalidFile, NotFound
 
 
 @dataclass(frozen=True)

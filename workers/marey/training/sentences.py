@@ -11,8 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shared.errors import InvalidFile
-from workers.training.texts import CaptionTexts
+from marey.errors import InvalidFile
+from marey.training.texts import CaptionTexts
 
 
 @dataclass(frozen=True)

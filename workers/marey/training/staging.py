@@ -16,11 +16,11 @@ from typing import Any, Generic, Protocol, TypeVar
 import torch
 from torch import nn
 
-from shared.errors import InvalidInput
-from shared.nn import distributed
-from workers.training.budget import Budget
-from workers.training.loop import RunOptions, Stage, train
-from workers.training.parts import Part, load_part, save_part
+from marey.errors import InvalidInput
+from marey.nn import distributed
+from marey.training.budget import Budget
+from marey.training.loop import RunOptions, Stage, train
+from marey.training.parts import Part, load_part, save_part
 
 
 class ModelConfig(Protocol):

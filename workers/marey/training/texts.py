@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from shared.arrays import check_array, read_npz, text_of
-from shared.bundles import TextSpec
-from shared.documents import parse_json
-from shared.errors import InvalidFile, NotFound
-from shared.hashing import sha256_of
-from shared.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
-from shared.text.pipeline import TextPipeline
-from workers.training.data.manifest import CLIPS, TEXTS
-from workers.training.data.prepared import PreparedData
+from marey.arrays import check_array, read_npz, text_of
+from marey.bundles import TextSpec
+from marey.documents import parse_json
+from marey.errors import InvalidFile, NotFound
+from marey.hashing import sha256_of
+from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
+from marey.text.pipeline import TextPipeline
+from marey.training.data.manifest import CLIPS, TEXTS
+from marey.training.data.prepared import PreparedData
 
 CHUNK = 256
 MAX_BYTES = 8 * 2**30

@@ -11,15 +11,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from shared.nn.convolution import frame_mask
-from shared.nn.motion_tokenizer import MotionTokenizer, biased_std
-from shared.nn.quantizer import Quantized
-from workers.training.data.manifest import Clip
-from workers.training.data.sampling import sampling_weights
-from workers.training.joints import heading_joints, world_joints
-from workers.training.loop import StepContext
-from workers.training.motions import MotionData, dataset_of
-from workers.training.optimisation import StageConfig
+from marey.nn.convolution import frame_mask
+from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
+from marey.nn.quantizer import Quantized
+from marey.training.data.manifest import Clip
+from marey.training.data.sampling import sampling_weights
+from marey.training.joints import heading_joints, world_joints
+from marey.training.loop import StepContext
+from marey.training.motions import MotionData, dataset_of
+from marey.training.optimisation import StageConfig
 
 
 class TokenizerWeights(Protocol):

@@ -263,7 +263,7 @@ TABLES = (
     """,
 )
 
-# The table `TRANSITIONS` of shared/jobs/states.py. A CHECK sees the new row alone, so a trigger does it.
+# The table `TRANSITIONS` of shared/marey/jobs/states.py. A CHECK sees the new row alone, so a trigger does it.
 ITEM_TRANSITION = """
     CREATE FUNCTION item_transition() RETURNS trigger LANGUAGE plpgsql AS $$
     BEGIN

@@ -56,7 +56,7 @@ CHUNK = """
     );
 """
 
-# The table `STREAM_TRANSITIONS` of shared/jobs/states.py.
+# The table `STREAM_TRANSITIONS` of shared/marey/jobs/states.py.
 TRANSITION = """
     CREATE FUNCTION stream_transition() RETURNS trigger LANGUAGE plpgsql AS $$
     BEGIN

@@ -111,7 +111,7 @@ REPORT = """
     CREATE INDEX ix_evaluation_report_asset_id ON evaluation_report (asset_id);
 """
 
-# The table `EVALUATION_TRANSITIONS` of shared/jobs/states.py.
+# The table `EVALUATION_TRANSITIONS` of shared/marey/jobs/states.py.
 TRANSITION = """
     CREATE FUNCTION evaluation_transition() RETURNS trigger LANGUAGE plpgsql AS $$
     BEGIN

@@ -10,7 +10,7 @@ from importlib import resources
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse
 
-from services.http.pages import page_response
+from marey.http.pages import page_response
 
 router = APIRouter()
 
@@ -40,7 +40,7 @@ class _File:
 
 @cache
 def _file(name: str) -> _File:
-    content = (resources.files("services.api.docs") / "assets" / name).read_bytes()
+    content = (resources.files("marey.api.docs") / "assets" / name).read_bytes()
     return _File(content, f'"{hashlib.sha256(content).hexdigest()[:32]}"', TYPES[name.rpartition(".")[2]])
 
 

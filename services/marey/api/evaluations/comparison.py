@@ -7,12 +7,12 @@ from uuid import UUID
 
 from pydantic import Field
 
-from services.api.context import Context
-from services.http.schemas import View
-from shared import jobs
-from shared.errors import NotFound
-from shared.measures.comparing import MetricChange, compare
-from shared.measures.scores import MotionScore, read_scores
+from marey import jobs
+from marey.api.context import Context
+from marey.errors import NotFound
+from marey.http.schemas import View
+from marey.measures.comparing import MetricChange, compare
+from marey.measures.scores import MotionScore, read_scores
 
 
 class ComparedView(View):

@@ -7,18 +7,18 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Request, Response
 
-from services.api.audit import note
-from services.api.auth import Operator, Reader, Submitter
-from services.api.context import Connection, Shared, deadline
-from services.api.evaluations import service
-from services.api.evaluations.comparison import ComparisonView, compare_runs
-from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
-from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.http.bodies import kept_body
-from services.http.problems import RESPONSES
-from services.http.schemas import Cursor, IdempotencyKey, Limit, PageView
-from shared import jobs
-from shared.errors import NotFound
+from marey import jobs
+from marey.api.audit import note
+from marey.api.auth import Operator, Reader, Submitter
+from marey.api.context import Connection, Shared, deadline
+from marey.api.evaluations import service
+from marey.api.evaluations.comparison import ComparisonView, compare_runs
+from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
+from marey.api.files import FILE_RESPONSES, AskedPart, file_response
+from marey.errors import NotFound
+from marey.http.bodies import kept_body
+from marey.http.problems import RESPONSES
+from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
 
 router = APIRouter(prefix="/v1/evaluations", tags=["evaluations"], responses=RESPONSES)
 

@@ -9,19 +9,19 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.files import FileView
-from services.http.fields import EXPECTED, PROMPT, SAMPLING
-from services.http.schemas import MAX_NAME, Comment, FreeText, Name, View
-from shared.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
-from shared.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
-from shared.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
-from shared.jobs.states import JobState
+from marey.api.files import FileView
+from marey.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
+from marey.http.fields import EXPECTED, PROMPT, SAMPLING
+from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
+from marey.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
+from marey.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
+from marey.jobs.states import JobState
 
 BUNDLE = rf"^{MODEL.pattern}$"
 
 
 class EvaluationPromptBody(BaseModel):
-    """One prompt. For the documentation: `shared.evaluation_prompts` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.evaluation_prompts` is what checks it, and says more."""
 
     model_config = ConfigDict(extra="forbid")
 

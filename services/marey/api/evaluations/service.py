@@ -8,17 +8,17 @@ from typing import Any, BinaryIO
 
 import sqlalchemy as sa
 
-from services.api.audit import note
-from services.api.context import Context
-from services.api.documents import Document
-from services.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
-from services.api.jobs.service import Fields, read_fields, request_sha256
-from shared import jobs
-from shared.errors import InvalidInput, NotFound
-from shared.evaluating import Plan, plan_evaluation
-from shared.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
-from shared.items import CHECKS, InvalidItems, Problem
-from shared.settings import Settings
+from marey import jobs
+from marey.api.audit import note
+from marey.api.context import Context
+from marey.api.documents import Document
+from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
+from marey.api.jobs.service import Fields, read_fields, request_sha256
+from marey.errors import InvalidInput, NotFound
+from marey.evaluating import Plan, plan_evaluation
+from marey.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
+from marey.items import CHECKS, InvalidItems, Problem
+from marey.settings import Settings
 
 OWN_PROMPTS = "prompts"
 """What prompts are called that came without a name."""

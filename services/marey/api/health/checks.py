@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from services.api.readiness import Check
-from shared.errors import Unreachable
-from shared.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
-from shared.runtime.queue import check_queue
-from shared.settings import Settings
-from shared.storage import AssetStore
+from marey.api.readiness import Check
+from marey.errors import Unreachable
+from marey.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
+from marey.runtime.queue import check_queue
+from marey.settings import Settings
+from marey.storage import AssetStore
 
 
 def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> dict[str, Check]:

@@ -11,8 +11,8 @@ import sqlalchemy as sa
 from prometheus_client import Gauge, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shared import metrics
-from shared.jobs import (
+from marey import metrics
+from marey.jobs import (
     SEARCH,
     Outbox,
     QueueDepth,
@@ -23,7 +23,7 @@ from shared.jobs import (
     queue_depths,
     transaction,
 )
-from shared.metrics import MAX_TENANTS, OTHER_TENANTS
+from marey.metrics import MAX_TENANTS, OTHER_TENANTS
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 """Any other is counted as `other`: a client may make up as many as it likes."""

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from services.api.auth import Watcher
-from services.api.context import Shared
-from services.api.health.metrics import render
-from services.http.schemas import View
+from marey.api.auth import Watcher
+from marey.api.context import Shared
+from marey.api.health.metrics import render
+from marey.http.schemas import View
 
 router = APIRouter(tags=["health"])
 

@@ -6,8 +6,8 @@ from datetime import datetime
 
 from pydantic import Field
 
-from services.http.schemas import View
-from shared.jobs import Estimate, JobState, QueuePlace, Speed
+from marey.http.schemas import View
+from marey.jobs import Estimate, JobState, QueuePlace, Speed
 
 
 class SpeedView(View):

@@ -10,12 +10,12 @@ from uuid import UUID
 from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from starlette.types import Receive, Scope, Send
 
-from services.api.jobs.schemas import EventView
-from services.api.tailer import Tailer
-from services.http.places import Places
-from services.http.problems import problem_response
-from shared.errors import Busy, InvalidInput
-from shared.jobs import ApiKey, EventRow
+from marey.api.jobs.schemas import EventView
+from marey.api.tailer import Tailer
+from marey.errors import Busy, InvalidInput
+from marey.http.places import Places
+from marey.http.problems import problem_response
+from marey.jobs import ApiKey, EventRow
 
 PING_SECONDS = 15.0
 RETRY_MILLISECONDS = 1000

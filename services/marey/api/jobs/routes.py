@@ -8,13 +8,14 @@ from uuid import UUID
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from services.api.audit import note
-from services.api.auth import Operator, Reader, Submitter
-from services.api.context import Connection, Context, Shared, deadline
-from services.api.jobs import service
-from services.api.jobs.estimates import EstimateView, QueueView
-from services.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
-from services.api.jobs.schemas import (
+from marey import jobs, metrics, tracing
+from marey.api.audit import note
+from marey.api.auth import Operator, Reader, Submitter
+from marey.api.context import Connection, Context, Shared, deadline
+from marey.api.jobs import service
+from marey.api.jobs.estimates import EstimateView, QueueView
+from marey.api.jobs.events import MAX_SEQ, EventStream, last_event_id, stream_events
+from marey.api.jobs.schemas import (
     MAX_PRIORITY,
     CheckedView,
     ErasureView,
@@ -26,16 +27,15 @@ from services.api.jobs.schemas import (
     NewItemBody,
     NewJobBody,
 )
-from services.api.motions.routes import Found
-from services.api.motions.schemas import MotionView
-from services.http import schemas
-from services.http.bodies import kept_body
-from services.http.problems import RESPONSES, QuotaBody
-from services.http.schemas import Cursor, IdempotencyKey, Limit, PageView
-from shared import jobs, metrics, tracing
-from shared.errors import InvalidInput
-from shared.jobs.states import ENDED
-from shared.runtime.logs import logger
+from marey.api.motions.routes import Found
+from marey.api.motions.schemas import MotionView
+from marey.errors import InvalidInput
+from marey.http import schemas
+from marey.http.bodies import kept_body
+from marey.http.problems import RESPONSES, QuotaBody
+from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
+from marey.jobs.states import ENDED
+from marey.runtime.logs import logger
 
 log = logger(__name__)
 

@@ -8,19 +8,19 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.jobs.estimates import EstimateView
-from services.api.motions.schemas import MotionView
-from services.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
-from services.http.problems import QuotaBody
-from services.http.schemas import Comment, Name, View
-from shared.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
-from shared.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
+from marey.api.jobs.estimates import EstimateView
+from marey.api.motions.schemas import MotionView
+from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
+from marey.http.problems import QuotaBody
+from marey.http.schemas import Comment, Name, View
+from marey.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from marey.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
 MAX_PRIORITY = 1000
 
 
 class NewItemBody(BaseModel):
-    """One prompt. For the documentation: `shared.items.read_item` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.items.read_item` is what checks it, and says more."""
 
     model_config = ConfigDict(extra="forbid")
 

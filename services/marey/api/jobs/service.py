@@ -10,13 +10,13 @@ from typing import Any, BinaryIO, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from services.api.catalogue import Catalogue
-from services.api.documents import MAX_VALUE, Document
-from services.api.jobs.schemas import JobFields
-from shared.errors import InvalidInput, MareyError, TooLarge
-from shared.items import InvalidItems, Problem, read_items, read_json
-from shared.jobs import NewItem
-from shared.offers import Offer, new_items
+from marey.api.catalogue import Catalogue
+from marey.api.documents import MAX_VALUE, Document
+from marey.api.jobs.schemas import JobFields
+from marey.errors import InvalidInput, MareyError, TooLarge
+from marey.items import InvalidItems, Problem, read_items, read_json
+from marey.jobs import NewItem
+from marey.offers import Offer, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100

@@ -9,11 +9,11 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from services.api.catalogue import Catalogue
-from services.api.streams.schemas import MODEL
-from services.http.pages import page_response
-from shared.errors import MareyError
-from shared.motion.live_page import live_page
+from marey.api.catalogue import Catalogue
+from marey.api.streams.schemas import MODEL
+from marey.errors import MareyError
+from marey.http.pages import page_response
+from marey.motion.live_page import live_page
 
 router = APIRouter()
 
@@ -22,13 +22,13 @@ MOST_EXAMPLES = 6
 
 @cache
 def _measured() -> dict[str, list[dict[str, Any]]]:
-    return json.loads((resources.files("services.api.live") / "examples.json").read_text(encoding="utf-8"))
+    return json.loads((resources.files("marey.api.live") / "examples.json").read_text(encoding="utf-8"))
 
 
 def examples(catalogue: Catalogue) -> tuple[str, ...]:
     """Prompts that this server's model was measured to obey while it streams; none for a bundle without measurements.
 
-    `python -m workers.mogo.examples` measures them.
+    `python -m marey.mogo.examples` measures them.
     """
     try:
         reference = catalogue.offer(MODEL).bundle.reference

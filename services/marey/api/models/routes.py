@@ -6,12 +6,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path
 
-from services.api.auth import Reader
-from services.api.context import Shared
-from services.api.models.schemas import ModelsView, ModelView
-from services.http.problems import RESPONSES
-from shared.bundles import named_by
-from shared.offers import offers
+from marey.api.auth import Reader
+from marey.api.context import Shared
+from marey.api.models.schemas import ModelsView, ModelView
+from marey.bundles import named_by
+from marey.http.problems import RESPONSES
+from marey.offers import offers
 
 router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from services.http.schemas import View
-from shared.bundles import BrokenBundle
-from shared.offers import Offer, Offers
+from marey.bundles import BrokenBundle
+from marey.http.schemas import View
+from marey.offers import Offer, Offers
 
 
 class DataView(View):

@@ -9,11 +9,12 @@ from uuid import UUID
 from fastapi import APIRouter, Depends, Path, Query, Response
 from pydantic import Field
 
-from services.api.audit import note
-from services.api.auth import Reader, Submitter
-from services.api.context import Connection, Shared, deadline
-from services.api.files import FILE_RESPONSES, AskedPart, file_response
-from services.api.motions.schemas import (
+from marey import jobs
+from marey.api.audit import note
+from marey.api.auth import Reader, Submitter
+from marey.api.context import Connection, Shared, deadline
+from marey.api.files import FILE_RESPONSES, AskedPart, file_response
+from marey.api.motions.schemas import (
     MotionDetailView,
     MotionView,
     NewRerollBody,
@@ -22,12 +23,11 @@ from services.api.motions.schemas import (
     RerollView,
     ReviewFilter,
 )
-from services.api.motions.service import file_stem, made_again
-from services.http.problems import RESPONSES
-from services.http.schemas import Cursor, FreeText, Limit, PageView
-from shared import jobs
-from shared.errors import NotFound
-from shared.items import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
+from marey.api.motions.service import file_stem, made_again
+from marey.errors import NotFound
+from marey.http.problems import RESPONSES
+from marey.http.schemas import Cursor, FreeText, Limit, PageView
+from marey.items import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 

@@ -9,9 +9,9 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.files import FileView
-from services.http.schemas import Comment, View
-from shared.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
+from marey.api.files import FileView
+from marey.http.schemas import Comment, View
+from marey.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
 
 
 class ReviewFilter(StrEnum):

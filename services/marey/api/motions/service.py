@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
-from services.api.catalogue import Catalogue
-from shared.errors import Conflict, MareyError
-from shared.items import Item
-from shared.jobs import ItemRow, MotionRow, NewItem
-from shared.offers import new_items
+from marey.api.catalogue import Catalogue
+from marey.errors import Conflict, MareyError
+from marey.items import Item
+from marey.jobs import ItemRow, MotionRow, NewItem
+from marey.offers import new_items
 
 WORDS = 48
 """Characters of the prompt in the name of a file."""

@@ -9,12 +9,12 @@ from uuid import UUID
 from fastapi import APIRouter, Query
 from pydantic import Field
 
-from services.api.auth import Reader
-from services.api.context import Connection
-from services.http.problems import RESPONSES
-from services.http.schemas import View
-from shared import jobs
-from shared.jobs.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
+from marey import jobs
+from marey.api.auth import Reader
+from marey.api.context import Connection
+from marey.http.problems import RESPONSES
+from marey.http.schemas import View
+from marey.jobs.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
 
 router = APIRouter(prefix="/v1/resolve", tags=["references"], responses=RESPONSES)
 

@@ -6,18 +6,18 @@ from uuid import UUID
 
 from fastapi import APIRouter, Request, Response
 
-from services.api.audit import note
-from services.api.auth import Operator, Reader, Submitter
-from services.api.context import Connection, Shared
-from services.api.evaluations.routes import body_of
-from services.api.evaluations.schemas import EvaluationDetailView, EvaluationView
-from services.api.evaluations.service import detail
-from services.api.schedules import service
-from services.api.schedules.schemas import NewScheduleBody, SchedulePatch, ScheduleView
-from services.http.bodies import kept_body
-from services.http.problems import RESPONSES
-from services.http.schemas import Cursor, Limit, PageView
-from shared import jobs
+from marey import jobs
+from marey.api.audit import note
+from marey.api.auth import Operator, Reader, Submitter
+from marey.api.context import Connection, Shared
+from marey.api.evaluations.routes import body_of
+from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationView
+from marey.api.evaluations.service import detail
+from marey.api.schedules import service
+from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch, ScheduleView
+from marey.http.bodies import kept_body
+from marey.http.problems import RESPONSES
+from marey.http.schemas import Cursor, Limit, PageView
 
 router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONSES)
 

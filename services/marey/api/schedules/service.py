@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import BinaryIO
 from uuid import UUID
 
-from services.api.audit import note
-from services.api.context import Context
-from services.api.evaluations.schemas import AskedFields
-from services.api.evaluations.service import prompts_document, read_asked, stored
-from services.api.jobs.service import read_fields
-from services.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
-from shared import jobs
-from shared.errors import InvalidInput
+from marey import jobs
+from marey.api.audit import note
+from marey.api.context import Context
+from marey.api.evaluations.schemas import AskedFields
+from marey.api.evaluations.service import prompts_document, read_asked, stored
+from marey.api.jobs.service import read_fields
+from marey.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
+from marey.errors import InvalidInput
 
 HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
 

@@ -11,14 +11,14 @@ from fastapi import WebSocket
 from starlette.datastructures import QueryParams
 from starlette.websockets import WebSocketDisconnect
 
-from services.api.auth import admit, authenticated, check_scope
-from services.api.context import Context
-from services.api.streams import service
-from services.api.streams.session import Session, Visit
-from services.api.streams.wire import Wire
-from services.http.problems import public_error
-from shared.errors import InvalidInput, MareyError, NotFound
-from shared.jobs import get_stream, told_prompts, transaction
+from marey.api.auth import admit, authenticated, check_scope
+from marey.api.context import Context
+from marey.api.streams import service
+from marey.api.streams.session import Session, Visit
+from marey.api.streams.wire import Wire
+from marey.errors import InvalidInput, MareyError, NotFound
+from marey.http.problems import public_error
+from marey.jobs import get_stream, told_prompts, transaction
 
 PROTOCOL = "marey.stream.v1"
 KEY_PREFIX = "marey.key."

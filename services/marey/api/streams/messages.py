@@ -6,15 +6,15 @@ import time
 from functools import partial
 from uuid import UUID
 
-from services.api.auth import check_scope
-from services.api.context import Context
-from services.api.stream_hub import Hub
-from services.api.streams import service
-from services.api.streams.wire import Wire
-from shared.errors import Busy, MareyError, TooLarge
-from shared.jobs import ApiKey
-from shared.prompts import check_prompt
-from shared.streams.control import Control
+from marey.api.auth import check_scope
+from marey.api.context import Context
+from marey.api.stream_hub import Hub
+from marey.api.streams import service
+from marey.api.streams.wire import Wire
+from marey.errors import Busy, MareyError, TooLarge
+from marey.jobs import ApiKey
+from marey.prompts import check_prompt
+from marey.streams.control import Control
 
 MAX_BYTES = 8 * 1024
 """Of a message; a prompt has at most 2,000 characters."""

@@ -7,14 +7,14 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Response, WebSocket
 
-from services.api.auth import Reader, Submitter
-from services.api.context import Connection, Shared
-from services.api.streams import service
-from services.api.streams.door import let_in
-from services.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
-from services.http.problems import RESPONSES
-from services.http.schemas import Cursor, Limit, PageView
-from shared import jobs
+from marey import jobs
+from marey.api.auth import Reader, Submitter
+from marey.api.context import Connection, Shared
+from marey.api.streams import service
+from marey.api.streams.door import let_in
+from marey.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
+from marey.http.problems import RESPONSES
+from marey.http.schemas import Cursor, Limit, PageView
 
 router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)
 

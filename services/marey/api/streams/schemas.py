@@ -11,15 +11,15 @@ from uuid import UUID
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.api.jobs.schemas import ErrorView
-from services.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
-from services.http.problems import ProblemBody
-from services.http.schemas import View
-from shared.bundles import Bundle
-from shared.items import MAX_SEED
-from shared.jobs import StreamPrompt, StreamRow, StreamState
-from shared.motion.features import layout
-from shared.motion.skeleton import Skeleton
+from marey.api.jobs.schemas import ErrorView
+from marey.bundles import Bundle
+from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
+from marey.http.problems import ProblemBody
+from marey.http.schemas import View
+from marey.items import MAX_SEED
+from marey.jobs import StreamPrompt, StreamRow, StreamState
+from marey.motion.features import layout
+from marey.motion.skeleton import Skeleton
 
 MODEL = "mogo"
 """The model that makes motion frame by frame."""

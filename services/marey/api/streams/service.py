@@ -9,15 +9,15 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
-from services.api.audit import note
-from services.api.catalogue import Catalogue
-from services.api.context import Context
-from services.api.stream_hub import Hub
-from services.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
-from shared.bundles import named_by
-from shared.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
-from shared.items import MAX_SEED, Item, read_item
-from shared.jobs import (
+from marey.api.audit import note
+from marey.api.catalogue import Catalogue
+from marey.api.context import Context
+from marey.api.stream_hub import Hub
+from marey.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
+from marey.bundles import named_by
+from marey.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
+from marey.items import MAX_SEED, Item, read_item
+from marey.jobs import (
     ApiKey,
     NewStream,
     StreamRow,
@@ -27,10 +27,10 @@ from shared.jobs import (
     told_prompts,
     transaction,
 )
-from shared.jobs.states import OPEN_STREAMS
-from shared.offers import Offer
-from shared.streams.bell import Bell
-from shared.streams.control import Control, ControlQueue
+from marey.jobs.states import OPEN_STREAMS
+from marey.offers import Offer
+from marey.streams.bell import Bell
+from marey.streams.control import Control, ControlQueue
 
 log = structlog.get_logger(__name__)
 

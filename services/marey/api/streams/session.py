@@ -15,19 +15,19 @@ import anyio
 from anyio.abc import TaskGroup
 from starlette.websockets import WebSocketDisconnect
 
-from services.api.context import Context
-from services.api.stream_hub import Hub
-from services.api.streams.messages import Messages
-from services.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
-from services.api.streams.service import is_over
-from services.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
-from services.api.streams.wire import Wire
-from shared.errors import MareyError, Unreachable
-from shared.jobs import ApiKey, StreamPrompt, StreamRow, StreamState, check_key, get_stream, told_prompts, transaction
-from shared.streams.control import ControlQueue
-from shared.streams.frames import HEADER, LAST
-from shared.streams.redis import FrameStream, Gap, StoredFrame
-from shared.streams.watch import TOUCH_SECONDS, Watch
+from marey.api.context import Context
+from marey.api.stream_hub import Hub
+from marey.api.streams.messages import Messages
+from marey.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
+from marey.api.streams.service import is_over
+from marey.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
+from marey.api.streams.wire import Wire
+from marey.errors import MareyError, Unreachable
+from marey.jobs import ApiKey, StreamPrompt, StreamRow, StreamState, check_key, get_stream, told_prompts, transaction
+from marey.streams.control import ControlQueue
+from marey.streams.frames import HEADER, LAST
+from marey.streams.redis import FrameStream, Gap, StoredFrame
+from marey.streams.watch import TOUCH_SECONDS, Watch
 
 BATCH = 20
 """Frames of one read: a second."""

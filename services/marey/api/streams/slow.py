@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from services.api.stream_hub import Hub
-from shared.streams.control import Control, ControlQueue
+from marey.api.stream_hub import Hub
+from marey.streams.control import Control, ControlQueue
 
 BEHIND_FRAMES = 40
 """Two seconds."""

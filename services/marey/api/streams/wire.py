@@ -6,9 +6,9 @@ import structlog
 from anyio import Lock
 from fastapi import WebSocket
 
-from services.api.streams.schemas import ErrorMessage, SocketMessage
-from services.http.problems import problem_body, public_error
-from shared.errors import MareyError
+from marey.api.streams.schemas import ErrorMessage, SocketMessage
+from marey.errors import MareyError
+from marey.http.problems import problem_body, public_error
 
 log = structlog.get_logger(__name__)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from services.api.auth import Parser
-from services.api.context import Shared
-from services.http.problems import RESPONSES
-from services.text.routes import GraphsView, ParseBody
+from marey.api.auth import Parser
+from marey.api.context import Shared
+from marey.http.problems import RESPONSES
+from marey.text_service.routes import GraphsView, ParseBody
 
 router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
 

@@ -7,10 +7,12 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Response
 
-from services.api.audit import note
-from services.api.auth import Operator, Reader
-from services.api.context import Connection, Shared
-from services.api.webhooks.schemas import (
+from marey import jobs
+from marey.addresses import Allowed
+from marey.api.audit import note
+from marey.api.auth import Operator, Reader
+from marey.api.context import Connection, Shared
+from marey.api.webhooks.schemas import (
     DeliveryDetailView,
     DeliveryView,
     MadeWebhookView,
@@ -18,12 +20,10 @@ from services.api.webhooks.schemas import (
     WebhookPatch,
     WebhookView,
 )
-from services.http.problems import RESPONSES
-from services.http.schemas import Cursor, Limit, PageView
-from shared import jobs
-from shared.addresses import Allowed
-from shared.webhooks.addresses import check_url
-from shared.webhooks.vault import Vault, new_signing_secret
+from marey.http.problems import RESPONSES
+from marey.http.schemas import Cursor, Limit, PageView
+from marey.webhooks.addresses import check_url
+from marey.webhooks.vault import Vault, new_signing_secret
 
 router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES)
 

@@ -8,9 +8,9 @@ from uuid import UUID
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from services.http.schemas import FreeText, Name, View
-from shared.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
-from shared.webhooks.addresses import MAX_URL
+from marey.http.schemas import FreeText, Name, View
+from marey.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
+from marey.webhooks.addresses import MAX_URL
 
 URL = "Where messages are sent: https, at an address that MAREY_WEBHOOK_ALLOW permits."
 PAUSED = "While it is paused its messages wait."

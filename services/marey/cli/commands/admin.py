@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console
-from services.cli.commands import backup, keys, tenants
-from services.cli.commands.keys import find_key
-from services.cli.database import connection, engine_of, operator, settings_here
-from services.cli.references import FORMS
+from marey.cli import console
+from marey.cli.commands import backup, keys, tenants
+from marey.cli.commands.keys import find_key
+from marey.cli.database import connection, engine_of, operator, settings_here
+from marey.cli.references import FORMS
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from shared.jobs import AuditRow
+    from marey.jobs import AuditRow
 
 app = typer.Typer(help="For the operator of a server, beside its database.", no_args_is_help=True)
 app.add_typer(tenants.app, name="tenants")
@@ -33,8 +33,8 @@ AUDIT_COLUMNS = ("at", "tenant", "actor", "key", "verb", "target", "data")
 def migrate() -> None:
     """Bring the database to the newest revision, and make the bucket of an S3 store where there is none."""
     config = settings_here()
-    from shared.jobs import upgrade
-    from shared.storage import open_store
+    from marey.jobs import upgrade
+    from marey.storage import open_store
 
     upgrade(engine_of(config))
     console.say("the database is at the newest revision")
@@ -48,8 +48,8 @@ def migrate() -> None:
 def gc(as_json: console.Json = False) -> None:
     """Remove stored files that nothing refers to."""
     config = settings_here()
-    from shared.jobs import DEFAULT_TENANT, audit, collect_garbage, transaction
-    from shared.storage import open_store
+    from marey.jobs import DEFAULT_TENANT, audit, collect_garbage, transaction
+    from marey.storage import open_store
 
     engine = engine_of(config)
     report = collect_garbage(engine, open_store(config))
@@ -91,7 +91,7 @@ def doctor(as_json: console.Json = False) -> None:
 
     What is installed, home and disk, server, database, clock, workers, scheduler, queue, store, models, texts, device.
     """
-    from services.cli.checkup import check_all
+    from marey.cli.checkup import check_all
 
     bad = False
     for check in check_all():
@@ -109,7 +109,7 @@ def doctor(as_json: console.Json = False) -> None:
 
 def _audited(conn: sa.Connection, size: int, **which: Any) -> Iterator[AuditRow]:
     """The rows, newest first, `size` at a time."""
-    from shared.jobs import list_audit
+    from marey.jobs import list_audit
 
     cursor: str | None = None
     while True:

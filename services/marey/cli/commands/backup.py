@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from services.cli import console
-from services.cli.database import engine_of, operator, settings_here
+from marey.cli import console
+from marey.cli.database import engine_of, operator, settings_here
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from services.cli.backup import Manifest
+    from marey.cli.backup import Manifest
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the backup.")]
 Tenant = Annotated[str, typer.Option("--tenant", help="Whose jobs.")]
@@ -22,8 +22,8 @@ Tenant = Annotated[str, typer.Option("--tenant", help="Whose jobs.")]
 def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
     """Back up every job that has ended, with its motions and files, into a new folder."""
     config = settings_here()
-    from services.cli.backup import export_tenant
-    from shared.storage import open_store
+    from marey.cli.backup import export_tenant
+    from marey.storage import open_store
 
     engine = engine_of(config)
     manifest, running = export_tenant(engine, open_store(config), tenant, folder)
@@ -36,8 +36,8 @@ def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = F
 def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
     """Check a backup, every hash of it, then bring back the jobs that are not there."""
     config = settings_here()
-    from services.cli.backup import import_tenant
-    from shared.storage import open_store
+    from marey.cli.backup import import_tenant
+    from marey.storage import open_store
 
     engine = engine_of(config)
     manifest, written = import_tenant(engine, open_store(config), tenant, folder)
@@ -46,7 +46,7 @@ def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = 
 
 
 def _note(engine: sa.Engine, tenant: str, verb: str, manifest: Manifest, jobs: int) -> None:
-    from shared.jobs import audit, transaction
+    from marey.jobs import audit, transaction
 
     with transaction(engine) as conn:
         audit(conn, tenant, operator(), verb, tenant, jobs=jobs, files=manifest.files)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from services.cli import console, options
-from shared.errors import InvalidInput
+from marey.cli import console, options
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from shared.motion.clip import MotionClip
+    from marey.motion.clip import MotionClip
 
 
 class Unit(StrEnum):
@@ -48,10 +48,10 @@ def convert(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Convert a motion between BVH and npz, with another rate, unit or axis if wanted."""
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from shared.motion.convert import convert as convert_file
+        from marey.motion.convert import convert as convert_file
     except ImportError as error:
         raise needs_extra("motion", error) from error
     notes = convert_file(
@@ -79,11 +79,11 @@ def render(
     from_up: FromUp = Up.Y,
 ) -> None:
     """Draw motions: a contact sheet as PNG, or a page with a 3D player."""
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from shared.motion.player import html_player
-        from shared.motion.render import contact_sheet
+        from marey.motion.player import html_player
+        from marey.motion.render import contact_sheet
     except ImportError as error:
         raise needs_extra("motion", error) from error
     clips = [_read(source, from_unit, from_up) for source in sources]
@@ -99,9 +99,9 @@ def render(
 
 
 def _read(source: Path, unit: Unit, up: Up) -> MotionClip:
-    from shared.motion.bvh import read_bvh
-    from shared.motion.clip import load_npz
-    from shared.motion.convert import clip_from_bvh, steady
+    from marey.motion.bvh import read_bvh
+    from marey.motion.clip import load_npz
+    from marey.motion.convert import clip_from_bvh, steady
 
     ending = source.suffix.lower()
     if ending == ".npz":

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from services.cli import console
-from shared.errors import InvalidInput
+from marey.cli import console
+from marey.errors import InvalidInput
 
 app = typer.Typer(help="Training data from capture archives.", no_args_is_help=True)
 
@@ -39,7 +39,7 @@ def pack(
     processes: Processes = 2,
 ) -> None:
     """Only retarget archives: small files to carry to the machine that prepares and trains."""
-    from services.cli.roles import data
+    from marey.cli.roles import data
 
     sources = data.CaptureSources(_named(pairs), splits, captions, processes)
     with _progress() as progress:
@@ -57,7 +57,7 @@ def prepare(
     processes: Processes = 2,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
-    from services.cli.roles import data
+    from marey.cli.roles import data
 
     sources = data.CaptureSources(_named(pairs), splits, captions, processes)
     with _progress() as progress:
@@ -86,7 +86,7 @@ def inspect(
     as_json: console.Json = False,
 ) -> None:
     """Check a prepared folder's hashes and show what it holds."""
-    from services.cli.roles import data
+    from marey.cli.roles import data
 
     found = data.inspect_data(folder, clip)
     if as_json:
@@ -114,7 +114,7 @@ def text(
     ] = None,
 ) -> None:
     """Parse and encode the captions, once for all training runs."""
-    from services.cli.roles import data
+    from marey.cli.roles import data
 
     with console.bar() as bar:
         task = bar.add_task("captions", total=None)

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from services.cli import console, evaluating, options
-from services.cli.commands import schedules
-from services.cli.evaluating import Asked
-from services.cli.references import FORMS, find, find_all, of_view
-from shared.errors import InvalidInput, NotFound
+from marey.cli import console, evaluating, options
+from marey.cli.commands import schedules
+from marey.cli.evaluating import Asked
+from marey.cli.references import FORMS, find, find_all, of_view
+from marey.errors import InvalidInput, NotFound
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
 app.add_typer(schedules.app, name="schedule")
@@ -58,7 +58,7 @@ def run(
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     waits = wait or fail_on_regression
     with Client.here() as client:
@@ -82,7 +82,7 @@ def wait_for(
     as_json: console.Json = False,
 ) -> None:
     """Wait until a run is over; exits 6 if it failed or was cancelled."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         _follow(
@@ -104,7 +104,7 @@ def list_runs(
 @app.command()
 def show(run: Run, as_json: console.Json = False) -> None:
     """Show a run: what is measured, how it stands and why, and its numbers."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         run = find(client, "evaluation", run).id
@@ -138,7 +138,7 @@ def report(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Fetch the report of a run that is done."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     kind = "md" if output is None else output.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
@@ -158,7 +158,7 @@ def report(
             with client.stream(url) as response:
                 console.result(response.read().decode().rstrip("\n"))
             return
-        from services.cli.fetching import Download, check_folder, download_all
+        from marey.cli.fetching import Download, check_folder, download_all
 
         check_folder(output.parent)
         download = Download(url, file["sha256"], file["size"], output)
@@ -176,7 +176,7 @@ def compare(
     as_json: console.Json = False,
 ) -> None:
     """Compare two runs of the same prompts and evaluator, motion against motion, by paired bootstrap."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         earlier, later = (find(client, "evaluation", each).id for each in (before, after))
@@ -191,7 +191,7 @@ def compare(
 @app.command()
 def cancel(runs: Runs, as_json: console.Json = False) -> None:
     """Cancel runs and the jobs that work for them; what was made stays."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for each in find_all(client, "evaluation", runs):

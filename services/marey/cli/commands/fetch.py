@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console, options
-from services.cli.names import check_template
-from services.cli.references import FORMS, find_all
-from shared.errors import Conflict, MareyError
+from marey.cli import console, options
+from marey.cli.names import check_template
+from marey.cli.references import FORMS, find_all
+from marey.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from services.cli.client import Client
-    from services.cli.fetching import Download
+    from marey.cli.client import Client
+    from marey.cli.fetching import Download
 
     Planned = list[tuple[dict[str, Any], list[Download]]]
 
@@ -47,7 +47,7 @@ def fetch(
 
     Of several jobs, each has its folder.
     """
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     check_template(name_template)
     with Client.here() as client:
@@ -104,8 +104,8 @@ def fetch_job(
         only: items with a motion of which this was said.
         prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from services.cli.fetching import check_folder, make_folders, plan
-    from services.cli.manifest import check_manifest, remove_left, write_manifest
+    from marey.cli.fetching import check_folder, make_folders, plan
+    from marey.cli.manifest import check_manifest, remove_left, write_manifest
 
     wanted = [f.value for f in formats] if formats else None
     said = None if only is None else only.value
@@ -131,7 +131,7 @@ def fetch_job(
 
 
 def _download(client: Client, downloads: Sequence[Download], done: set[Path], *, overwrite: bool) -> None:
-    from services.cli.fetching import download_all
+    from marey.cli.fetching import download_all
 
     with console.bar() as bar:
         task = bar.add_task("fetching", total=len(downloads))
@@ -145,7 +145,7 @@ def _download(client: Client, downloads: Sequence[Download], done: set[Path], *,
 
 def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, overwrite: bool) -> None:
     """The manifest of a fetch that broke off. What ended it will be told, so not what fails here."""
-    from services.cli.manifest import write_manifest
+    from marey.cli.manifest import write_manifest
 
     whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
     with suppress(MareyError):
@@ -158,7 +158,7 @@ def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, ov
 
 
 def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
-    from services.cli.manifest import row_of
+    from marey.cli.manifest import row_of
 
     return [
         row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli import console, options, rows
-from services.cli.commands.submit import read_prompts
-from services.cli.extras import needs_extra
-from services.cli.names import FileNames, Naming, check_template, slug
-from shared.errors import Conflict, InvalidBundle, InvalidInput, MareyError
-from shared.items import MAX_SEED, Item, Problem
+from marey.cli import console, options, rows
+from marey.cli.commands.submit import read_prompts
+from marey.cli.extras import needs_extra
+from marey.cli.names import FileNames, Naming, check_template, slug
+from marey.errors import Conflict, InvalidBundle, InvalidInput, MareyError
+from marey.items import MAX_SEED, Item, Problem
 
 if TYPE_CHECKING:
-    from services.cli.roles.oneshot import Wanted
-    from shared.bundles import Bundle
-    from shared.motion.clip import MotionClip
-    from shared.settings import Settings
+    from marey.bundles import Bundle
+    from marey.cli.roles.oneshot import Wanted
+    from marey.motion.clip import MotionClip
+    from marey.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Make motions here and now, without a server or a queue."""
-    from services.cli.fetching import check_folder, make_folders
-    from services.cli.roles.oneshot import OneShot
+    from marey.cli.fetching import check_folder, make_folders
+    from marey.cli.roles.oneshot import OneShot
 
     check_template(name_template)
     defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
@@ -98,8 +98,8 @@ def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None
         InvalidInput, NotFound, InvalidBundle: there is no such bundle, or the rows name several models.
     """
     try:
-        from shared.bundles import choose_bundle
-        from shared.settings import settings
+        from marey.bundles import choose_bundle
+        from marey.settings import settings
     except ImportError as error:
         if reader.total:
             raise reader.error() from None
@@ -123,8 +123,8 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
     Raises:
         InvalidBundle: not a bundle of a model that runs here.
     """
-    from services.cli.roles.serving import GENERATORS
-    from shared.bundles.limits import check_seconds, check_settings
+    from marey.bundles.limits import check_seconds, check_settings
+    from marey.cli.roles.serving import GENERATORS
 
     if bundle.manifest.model not in GENERATORS:
         raise InvalidBundle(
@@ -165,7 +165,7 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
     Raises:
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
     """
-    from services.cli.roles.oneshot import Wanted
+    from marey.cli.roles.oneshot import Wanted
 
     names = FileNames(template)
 
@@ -192,8 +192,8 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
 
 
 def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, overwrite: bool) -> dict[str, Any]:
-    from shared.motion.bvh import format_bvh
-    from shared.motion.files import write_atomically
+    from marey.motion.bvh import format_bvh
+    from marey.motion.files import write_atomically
 
     contents = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
     paths = plan.paths

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from services.cli import console
-from services.cli.references import FORMS, find, find_all, listed, named, of_view
-from shared.errors import InvalidInput
+from marey.cli import console
+from marey.cli.references import FORMS, find, find_all, listed, named, of_view
+from marey.errors import InvalidInput
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
@@ -48,7 +48,7 @@ def list_jobs(
     as_json: console.Json = False,
 ) -> None:
     """List jobs, newest first."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.pages("/v1/jobs", state=state.value if state else None, limit=console.page_size(limit))
@@ -58,7 +58,7 @@ def list_jobs(
 @app.command()
 def show(job: Job, as_json: console.Json = False) -> None:
     """Show a job, and why its items failed."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         job = find(client, "job", job).id
@@ -155,7 +155,7 @@ def comment(
 @app.command()
 def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = find_all(client, "job", jobs)
@@ -172,7 +172,7 @@ def erase(
     as_json: console.Json = False,
 ) -> None:
     """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         wanted = find_all(client, "job", jobs)
@@ -188,8 +188,8 @@ def erase(
 
 
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
-    from services.cli.client import Client
-    from services.cli.watching import check_ended, watch_job
+    from marey.cli.client import Client
+    from marey.cli.watching import check_ended, watch_job
 
     with Client.here() as client:
         ended = watch_job(client, find(client, "job", job).id, timeout=timeout, quiet=quiet)
@@ -199,7 +199,7 @@ def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> Non
 
 
 def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for job in find_all(client, "job", jobs):
@@ -211,7 +211,7 @@ def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
 
 
 def _change(job: str, patch: dict[str, Any], as_json: bool, reason: str | None = None) -> None:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.patch(f"/v1/jobs/{find(client, 'job', job).id}", patch, reason=reason)

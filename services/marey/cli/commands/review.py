@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console
-from services.cli.commands.motions import Review, review_of
-from services.cli.references import FORMS, find
-from shared.errors import Conflict, InvalidInput, NotFound
+from marey.cli import console
+from marey.cli.commands.motions import Review, review_of
+from marey.cli.references import FORMS, find
+from marey.errors import Conflict, InvalidInput, NotFound
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from services.cli.client import Client
-    from services.cli.drawing import Drawers
+    from marey.cli.client import Client
+    from marey.cli.drawing import Drawers
 
 ENDINGS = (".html", ".htm", ".png")
 PER_PAGE = 400
@@ -55,12 +55,12 @@ def review(
 
     A .png of up to 24 motions shows a row of each; one of more shows tiles.
     """
-    from services.cli.client import Client
-    from services.cli.drawing import Drawers
-    from services.cli.extras import needs_extra
+    from marey.cli.client import Client
+    from marey.cli.drawing import Drawers
+    from marey.cli.extras import needs_extra
 
     try:
-        import shared.motion.gallery  # noqa: F401
+        import marey.motion.gallery  # noqa: F401
     except ImportError as error:
         raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
@@ -171,10 +171,10 @@ def _sheet(
     drawers: Drawers,
     done: Callable[[], None],
 ) -> None:
-    from services.cli.drawing import THEME, Drawing
-    from shared.motion.overview import overview
-    from shared.motion.paper import theme_named
-    from shared.motion.render import COLUMNS, save_png, stack_rows
+    from marey.cli.drawing import THEME, Drawing
+    from marey.motion.overview import overview
+    from marey.motion.paper import theme_named
+    from marey.motion.render import COLUMNS, save_png, stack_rows
 
     columns = COLUMNS if len(motions) <= ROWS else None
     captions = [f"{_facts(motion)}  ·  {motion['prompt']}" for motion in motions]
@@ -201,8 +201,8 @@ def _page(
     earlier: str | None,
     later: str | None,
 ) -> None:
-    from shared.motion.clip import load_npz
-    from shared.motion.gallery import Card, html_gallery
+    from marey.motion.clip import load_npz
+    from marey.motion.gallery import Card, html_gallery
 
     cards = [
         Card(motion["id"], load_npz(file), motion["prompt"], _facts(motion), motion["tags"], _said(motion))
@@ -213,7 +213,7 @@ def _page(
 
 def _fetch(client: Client, motions: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
     """The motions' npz, fetched eight at a time into a folder."""
-    from services.cli.fetching import Download, download_all
+    from marey.cli.fetching import Download, download_all
 
     downloads = [_download(motion, folder, Download) for motion in motions]
     download_all(client, downloads, overwrite=False, done=lambda _: None)

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from services.cli import console, evaluating
-from services.cli.evaluating import Asked
-from services.cli.options import ExtraColumns
-from services.cli.references import FORMS, find, find_all, listed, named, of_view
+from marey.cli import console, evaluating
+from marey.cli.evaluating import Asked
+from marey.cli.options import ExtraColumns
+from marey.cli.references import FORMS, find, find_all, listed, named, of_view
 
 COLUMNS = ("id", "name", "cron", "time_zone", "next", "bundle", "source", "last_state", "last_regressed")
 
@@ -55,7 +55,7 @@ def add(
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client, asked.in_source():
         if baseline is not None:
@@ -71,7 +71,7 @@ def add(
 @app.command("list")
 def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List schedules, newest first: when they are due, and how their last runs ended."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.pages("/v1/schedules", limit=console.PAGE)
@@ -93,7 +93,7 @@ def resume(schedules: Ids, as_json: console.Json = False) -> None:
 @app.command()
 def run(schedule: Id, as_json: console.Json = False) -> None:
     """Run a schedule's evaluation now, beside its times; prints the run's id."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         made = client.post_once(f"/v1/schedules/{find(client, 'schedule', schedule).id}/run", None)
@@ -111,7 +111,7 @@ def history(
     as_json: console.Json = False,
 ) -> None:
     """List the runs of a schedule, newest first."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         wanted = find(client, "schedule", schedule).id
@@ -121,7 +121,7 @@ def history(
 @app.command()
 def delete(schedules: Ids, yes: console.Yes = False) -> None:
     """Delete schedules; their runs stay."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = find_all(client, "schedule", schedules)
@@ -132,7 +132,7 @@ def delete(schedules: Ids, yes: console.Yes = False) -> None:
 
 
 def _change(schedules: list[str], as_json: bool, **changes: object) -> None:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for each in find_all(client, "schedule", schedules):

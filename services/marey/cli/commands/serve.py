@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from shared.errors import InvalidInput
-from shared.private_home import UMASK
+from marey.errors import InvalidInput
+from marey.private_home import UMASK
 
 
 def serve(
@@ -28,13 +28,13 @@ def serve(
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
     os.umask(UMASK)
-    from services.cli.extras import needs_extra
-    from services.cli.ports import try_port
-    from services.cli.roles.serving import default_roles, parse_roles
+    from marey.cli.extras import needs_extra
+    from marey.cli.ports import try_port
+    from marey.cli.roles.serving import default_roles, parse_roles
 
     try:
-        from services.cli.supervisor import Supervisor
-        from shared.settings import Settings, settings
+        from marey.cli.supervisor import Supervisor
+        from marey.settings import Settings, settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
     changes: dict[str, object] = {}
@@ -64,19 +64,19 @@ def worker(
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
     os.umask(UMASK)
-    from services.cli.extras import needs_extra
-    from services.cli.roles.serving import SHOWS, parse_roles, role_of
+    from marey.cli.extras import needs_extra
+    from marey.cli.roles.serving import SHOWS, parse_roles, role_of
 
     queues = parse_roles(model.replace(",", "+"))[0]
     shown = [queue for queue in queues if queue in SHOWS]
     try:
-        from services.cli.children import Child, keep_all, marey, metrics_port
-        from shared.runtime.worker import worker_main
-        from shared.settings import settings
+        from marey.cli.children import Child, keep_all, marey, metrics_port
+        from marey.runtime.worker import worker_main
+        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
     if only is Part.LIVE:
-        from shared.runtime.live.main import live_main
+        from marey.runtime.live.main import live_main
 
         if len(shown) != 1:
             raise InvalidInput(
@@ -95,11 +95,11 @@ def worker(
 def scheduler() -> None:
     """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
     os.umask(UMASK)
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from services.scheduler.main import scheduler_main
-        from shared.settings import settings
+        from marey.scheduler.main import scheduler_main
+        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     raise typer.Exit(scheduler_main(settings()))
@@ -108,10 +108,10 @@ def scheduler() -> None:
 def api() -> None:
     """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
     os.umask(UMASK)
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from services.api.app import serve as serve_api
+        from marey.api.app import serve as serve_api
     except ImportError as error:
         raise needs_extra("server", error) from error
     serve_api()

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console, options
-from shared.errors import InvalidInput, MareyError, NotFound
+from marey.cli import console, options
+from marey.errors import InvalidInput, MareyError, NotFound
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
-    from services.cli.live.frames import Recording
-    from services.cli.live.steering import Interrupts
+    from marey.cli.client import Client
+    from marey.cli.live.frames import Recording
+    from marey.cli.live.steering import Interrupts
 
 COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
 
@@ -59,15 +59,15 @@ def stream(
     The BVH is whole at every moment, however the program ends, and row n is frame n: missing frames are made of their
     neighbours, by slerp and lerp. The clip that --fetch brings has all frames.
     """
-    from services.cli.live.steering import Interrupts
+    from marey.cli.live.steering import Interrupts
 
     body = _body(prompt, seconds=seconds, seed=seed, model=model, name=name)
     recording = _recording(output, overwrite=overwrite)
     if fetch is not None:
-        from services.cli.fetching import check_folder
+        from marey.cli.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything begins
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         with Interrupts() as interrupts:
@@ -85,7 +85,7 @@ def stream(
 
 def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]:
     """The request, checked as far as one can without the server."""
-    from shared.items import read_items
+    from marey.items import read_items
 
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
         raise InvalidInput(f"{seconds:g} seconds cannot be", where="--seconds")
@@ -98,7 +98,7 @@ def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]
 def _recording(path: Path | None, *, overwrite: bool) -> Recording | None:
     if path is None:
         return None
-    from services.cli.live.frames import Recording
+    from marey.cli.live.frames import Recording
 
     return Recording(path, overwrite=overwrite)
 
@@ -108,8 +108,8 @@ def _follow(
     as_json: bool,
 ) -> tuple[dict[str, Any], MareyError | None]:  # fmt: skip
     """The line of the stream, and what went wrong; what came until then stays."""
-    from services.cli.live.follow import Follower
-    from services.cli.live.link import Link
+    from marey.cli.live.follow import Follower
+    from marey.cli.live.link import Link
 
     begun = client.post_once("/v1/streams", body)
     with Link(client.server, begun["id"], slow=slow.value) as link:
@@ -136,8 +136,8 @@ def _filled(result: dict[str, Any]) -> str:
 
 
 def _fetch(client: Client, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
-    from services.cli.commands.fetch import write_job
-    from services.cli.watching import check_ended, watch_job
+    from marey.cli.commands.fetch import write_job
+    from marey.cli.watching import check_ended, watch_job
 
     if result["job"] is None:
         raise NotFound("there is no clip to fetch: nothing of it was recorded", where=f"stream {result['stream']}")

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console, options, rows
-from services.cli.names import check_template
-from shared.errors import InvalidInput, MareyError
-from shared.items import InvalidItems
+from marey.cli import console, options, rows
+from marey.cli.names import check_template
+from marey.errors import InvalidInput, MareyError
+from marey.items import InvalidItems
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from services.cli.lines import Lines
+    from marey.cli.lines import Lines
 
 
 def submit(
@@ -49,12 +49,12 @@ def submit(
     as_json: console.Json = False,
 ) -> None:
     """Put prompts into the queue of a server; prints the job's id."""
-    from services.cli.client import Client
-    from services.cli.lines import Lines
+    from marey.cli.client import Client
+    from marey.cli.lines import Lines
 
     check_template(name_template)
     if fetch is not None:
-        from services.cli.fetching import check_folder
+        from marey.cli.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = rows.defaults_of(
@@ -89,7 +89,7 @@ def submit(
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
     """List the problems of the rows, with those that only the server can find; submit nothing."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     try:
         if len(lines):
@@ -153,8 +153,8 @@ def read_prompts(
 def _follow(
     client, job: str, folder: Path | None, formats, template: str, timeout: float | None, as_json: bool
 ) -> None:
-    from services.cli.commands.fetch import write_job
-    from services.cli.watching import check_ended, watch_job
+    from marey.cli.commands.fetch import write_job
+    from marey.cli.watching import check_ended, watch_job
 
     ended = watch_job(client, job, timeout=timeout)
     if folder is not None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console, options
-from services.cli.commands.submit import read_prompts
-from services.cli.rows import right_items
-from shared.private_home import UMASK
+from marey.cli import console, options
+from marey.cli.commands.submit import read_prompts
+from marey.cli.rows import right_items
+from marey.private_home import UMASK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +30,7 @@ def parse(
     as_json: console.Json = False,
 ) -> None:
     """Show the graph a prompt becomes. Needs no server."""
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     texts = [item.prompt for item in right_items(read_prompts(prompts, file, input_format))]
     try:
@@ -51,20 +51,20 @@ def serve(
 ) -> None:
     """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is the secret that both share."""
     os.umask(UMASK)
-    from services.cli.extras import needs_extra
+    from marey.cli.extras import needs_extra
 
     try:
-        from services.text.server import serve_text
+        from marey.text_service.server import serve_text
     except ImportError as error:
         raise needs_extra("worker", error) from error
     serve_text(path)
 
 
 def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
-    from shared.bundles import choose_bundle
-    from shared.errors import InvalidInput
-    from shared.text.keys import as_served
-    from shared.text.pipeline import TextPipeline
+    from marey.bundles import choose_bundle
+    from marey.errors import InvalidInput
+    from marey.text.keys import as_served
+    from marey.text.pipeline import TextPipeline
 
     spec = choose_bundle(model, verify=False).manifest.text
     if spec is None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from services.cli import console
+from marey.cli import console
 
 app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
 hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
@@ -44,7 +44,7 @@ Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat
 
 
 def _run(model: Model, stage: str, as_json: bool, **chosen: Any) -> None:
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     metrics = training.train_stage(model, stage, **chosen)
     if as_json:
@@ -135,7 +135,7 @@ def hgm3_bundle(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the bundle from the parts of a run."""
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     chosen = None if mask is None else mask.value
     made = training.assemble_bundle(
@@ -149,7 +149,7 @@ def mogo_bundle(
     data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
 ) -> None:
     """Write the bundle from the parts of a run."""
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     console.result(training.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
 
@@ -159,7 +159,7 @@ def evaluator_bundle(
     data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
 ) -> None:
     """Write the bundle from the part of a run, with captions and embeddings of the real test clips."""
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     console.result(
         training.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite)
@@ -174,7 +174,7 @@ def evaluator_reference(
     overwrite: Overwrite = False,
 ) -> None:
     """Write a bundle's networks again with captions, embeddings and measures of these data's test clips."""
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     console.result(training.renew_reference(bundle, data, output, overwrite=overwrite))
 
@@ -191,7 +191,7 @@ def evaluator_reconstruct(
 
     The row is kept beside the evaluator's bundle, for exactly these two bundles.
     """
-    from services.cli.roles import tokenizers
+    from marey.cli.roles import tokenizers
 
     with console.bar() as bar:
         task = bar.add_task("clips", total=None)
@@ -214,13 +214,13 @@ UNPACK = "Write the parts of a bundle into a run, to train on from them with `--
 
 @hgm3.command("unpack", help=UNPACK)
 def hgm3_unpack(bundle: Packed, run: Run) -> None:
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     console.result(training.take_bundle_apart("hgm3", bundle, run))
 
 
 @mogo.command("unpack", help=UNPACK)
 def mogo_unpack(bundle: Packed, run: Run) -> None:
-    from services.cli.roles import training
+    from marey.cli.roles import training
 
     console.result(training.take_bundle_apart("mogo", bundle, run))

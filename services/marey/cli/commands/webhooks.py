@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from services.cli import console
-from services.cli.references import FORMS, find, find_all, listed, named, of_view
-from shared.errors import ItemsFailed, TimedOut
+from marey.cli import console
+from marey.cli.references import FORMS, find, find_all, listed, named, of_view
+from marey.errors import ItemsFailed, TimedOut
 
 if TYPE_CHECKING:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
 app = typer.Typer(
     help="Signed messages to your own server when jobs, streams and evaluations end.", no_args_is_help=True
@@ -47,7 +47,7 @@ def add(
 ) -> None:
     """Be told of what happens from now on; prints the webhook's id and its signing secret, this once."""
     body = {"url": url, **({"events": events} if events else {}), **({"name": name} if name else {})}
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         made = client.post_once("/v1/webhooks", body)
@@ -61,7 +61,7 @@ def add(
 @app.command("list")
 def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List webhooks, newest first."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.pages("/v1/webhooks", limit=console.PAGE)
@@ -71,7 +71,7 @@ def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = Fal
 @app.command()
 def show(webhook: Id, as_json: console.Json = False) -> None:
     """Show a webhook."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = client.get(f"/v1/webhooks/{find(client, 'webhook', webhook).id}")
@@ -103,7 +103,7 @@ def rotate(
     as_json: console.Json = False,
 ) -> None:
     """Sign with another secret; prints it, this once. Until the overlap ends messages carry both signatures."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         webhook = find(client, "webhook", webhook).id
@@ -118,7 +118,7 @@ def rotate(
 @app.command()
 def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     """Remove webhooks, with their deliveries and log."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         found = find_all(client, "webhook", webhooks)
@@ -140,7 +140,7 @@ def deliveries(
     as_json: console.Json = False,
 ) -> None:
     """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         webhook = find(client, "webhook", webhook).id
@@ -166,7 +166,7 @@ def replay(
     """Deliver once more, under the same ids and with all tries."""
     if bool(events) == failed:
         raise typer.BadParameter("give ids of events, or --failed")
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         webhook = find(client, "webhook", webhook).id
@@ -189,7 +189,7 @@ def send_test(
     as_json: console.Json = False,
 ) -> None:
     """Send a message of the type `webhook.test`, once; prints its id."""
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         webhook = find(client, "webhook", webhook).id
@@ -236,7 +236,7 @@ def _show_tries(found: dict[str, Any], as_json: bool) -> None:
 
 
 def _change(webhooks: list[str], as_json: bool, *, paused: bool) -> None:
-    from services.cli.client import Client
+    from marey.cli.client import Client
 
     with Client.here() as client:
         for each in find_all(client, "webhook", webhooks):

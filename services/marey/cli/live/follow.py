@@ -6,13 +6,13 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from services.cli import console
-from services.cli.live.frames import Recording, head_of
-from services.cli.live.link import Link, Message
-from services.cli.live.pace import Pace
-from services.cli.live.screen import Screen
-from services.cli.live.steering import HELP, Interrupts, Lines, message_of
-from shared.errors import InvalidInput, ItemsFailed, MareyError
+from marey.cli import console
+from marey.cli.live.frames import Recording, head_of
+from marey.cli.live.link import Link, Message
+from marey.cli.live.pace import Pace
+from marey.cli.live.screen import Screen
+from marey.cli.live.steering import HELP, Interrupts, Lines, message_of
+from marey.errors import InvalidInput, ItemsFailed, MareyError
 
 if TYPE_CHECKING:
     from rich.text import Text

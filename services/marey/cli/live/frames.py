@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli.extras import needs_extra
-from shared.errors import InvalidInput
+from marey.cli.extras import needs_extra
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from shared.motion.bvh_live import LiveBVH
+    from marey.motion.bvh_live import LiveBVH
 
 HEAD = struct.Struct("<2sBBIHH")
-"""The first 12 bytes of a frame, as `shared/streams/frames.py` has them; that one wants numpy, which a client that
+"""The first 12 bytes of a frame, as `marey.streams.frames` has them; that one wants numpy, which a client that
 writes no file does without."""
 
 
@@ -55,7 +55,7 @@ class Recording:
             hint = "--fetch brings the other formats when the stream is over."
             raise InvalidInput("only a .bvh can grow while it is made", where=str(path), hint=hint)
         try:
-            from shared.motion.bvh_live import check_place
+            from marey.motion.bvh_live import check_place
         except ImportError as error:
             raise needs_extra("motion", error) from error
         check_place(path, overwrite=overwrite)
@@ -78,7 +78,7 @@ class Recording:
         Raises:
             MareyError: the frame, the skeleton or the file cannot be used.
         """
-        from shared.streams.frames import decode_frame
+        from marey.streams.frames import decode_frame
 
         if self._file is None:
             self._file = self._open(stream)
@@ -93,8 +93,8 @@ class Recording:
     def _open(self, stream: dict[str, Any]) -> LiveBVH:
         import numpy as np
 
-        from shared.motion.bvh_live import LiveBVH
-        from shared.motion.skeleton import skeleton_of
+        from marey.motion.bvh_live import LiveBVH
+        from marey.motion.skeleton import skeleton_of
 
         try:
             tree = stream["skeleton"]

@@ -13,12 +13,12 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidUpgrad
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from services.cli.client import TYPE_PREFIX
-from services.cli.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
-from services.cli.place import Server, ca_file
-from services.cli.watching import PATIENCE
-from shared.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
-from shared.tls import trusting_context
+from marey.cli.client import TYPE_PREFIX
+from marey.cli.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
+from marey.cli.place import Server, ca_file
+from marey.cli.watching import PATIENCE
+from marey.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.tls import trusting_context
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection

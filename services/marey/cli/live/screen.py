@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from services.cli import console
-from shared.characters import escape
+from marey.characters import escape
+from marey.cli import console
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli.extras import needs_extra
-from shared.errors import InvalidInput, NotFound
+from marey.cli.extras import needs_extra
+from marey.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from workers.training.data.pack import JointsPack
+    from marey.training.data.pack import JointsPack
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
         NotFound, InvalidFile, TooLarge: from reading.
     """
     try:
-        from workers.training.data.pack import JointsPack
-        from workers.training.data.prepare import pack_bandai_namco, pack_cmu
+        from marey.training.data.pack import JointsPack
+        from marey.training.data.prepare import pack_bandai_namco, pack_cmu
     except ImportError as error:
         raise needs_extra("worker", error) from error
     options = {"processes": sources.processes}
@@ -80,7 +80,7 @@ def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str,
         Conflict: the folder is in use.
     """
     packs = read_captures(sources, progress)
-    from workers.training.data.build import build
+    from marey.training.data.build import build
 
     manifest = build(packs, output, progress=partial(progress, "building"))
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
@@ -93,8 +93,8 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
         NotFound, InvalidFile: no such folder or clip, or a changed file.
     """
     try:
-        from workers.training.data.inspect import summarize
-        from workers.training.data.prepared import PreparedData
+        from marey.training.data.inspect import summarize
+        from marey.training.data.prepared import PreparedData
     except ImportError as error:
         raise needs_extra("worker", error) from error
     data = PreparedData.open(folder)
@@ -109,10 +109,10 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
 def encode_captions(folder: Path, model: str | None, progress: Callable[[int, int], None]) -> int:
     """Write `texts.npz` of a prepared folder; how many captions it holds."""
     try:
-        from shared.bundles import TextSpec, choose_bundle
-        from shared.text.pipeline import TextPipeline
-        from workers.training.data.prepared import PreparedData
-        from workers.training.texts import CaptionTexts
+        from marey.bundles import TextSpec, choose_bundle
+        from marey.text.pipeline import TextPipeline
+        from marey.training.data.prepared import PreparedData
+        from marey.training.texts import CaptionTexts
     except ImportError as error:
         raise needs_extra("worker", error) from error
     spec = TextSpec() if model is None else choose_bundle(model).manifest.text

@@ -10,15 +10,15 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli.extras import needs_extra
-from services.cli.roles.serving import GENERATORS, threads_of
-from shared.errors import InvalidInput
+from marey.cli.extras import needs_extra
+from marey.cli.roles.serving import GENERATORS, threads_of
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from shared.bundles import Bundle
-    from shared.motion.clip import MotionClip
-    from shared.settings import Settings
-    from workers.generating.port import Generator
+    from marey.bundles import Bundle
+    from marey.generating.port import Generator
+    from marey.motion.clip import MotionClip
+    from marey.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class OneShot:
             NotFound, InvalidBundle: weights are missing or damaged.
         """
         try:
-            from shared.text.keys import as_served
-            from shared.text.pipeline import TextPipeline
+            from marey.text.keys import as_served
+            from marey.text.pipeline import TextPipeline
 
             kind = import_module(GENERATORS[bundle.manifest.model]).Generator
         except ImportError as error:
@@ -60,8 +60,8 @@ class OneShot:
         Raises:
             InvalidInput: a length this bundle cannot make; before anything is made.
         """
-        from workers.generating.export import finish, split_settings
-        from workers.generating.port import Request
+        from marey.generating.export import finish, split_settings
+        from marey.generating.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
         fps = self._generator.limits.fps
@@ -88,6 +88,6 @@ class OneShot:
 
 def make_random_bundle(path: Path) -> None:
     """A tiny HGM³ with random weights: it exercises everything and generates nonsense."""
-    from workers.hgm3.bundle import random_bundle
+    from marey.hgm3.bundle import random_bundle
 
     random_bundle(path)

@@ -8,31 +8,31 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from shared.errors import InvalidInput
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from shared.runtime.handler import Role
-    from shared.settings import Settings
+    from marey.runtime.handler import Role
+    from marey.settings import Settings
 
 HANDLERS = {
-    "hgm3": "workers.hgm3.handler:create_handler",
-    "mogo": "workers.mogo.handler:create_handler",
-    "text": "services.text.handler:create_handler",
-    "evaluator": "workers.evaluator.handler:create_handler",
+    "hgm3": "marey.hgm3.handler:create_handler",
+    "mogo": "marey.mogo.handler:create_handler",
+    "text": "marey.text_service.handler:create_handler",
+    "evaluator": "marey.evaluator.handler:create_handler",
 }
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
 TEXT = "text"
 """The queue of prompts, which computes on no device."""
-SHOWS = {"mogo": "workers.mogo.live:create_show"}
+SHOWS = {"mogo": "marey.mogo.live:create_show"}
 """What the live loop of each model that streams serves."""
-GENERATORS = {"hgm3": "workers.hgm3.generate", "mogo": "workers.mogo.generate"}
+GENERATORS = {"hgm3": "marey.hgm3.generate", "mogo": "marey.mogo.generate"}
 """Where each model's `Generator` is."""
 
 
 def default_roles(config: Settings) -> str:
     """One child for every model that has a bundle here, for prompts, and for evaluations where there is an evaluator:
     two would fight for the cores."""
-    from shared.bundles import list_bundles
+    from marey.bundles import list_bundles
 
     here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
     judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
@@ -62,8 +62,8 @@ def role_of(queues: Sequence[str], config: Settings) -> Role:
     Raises:
         NotFound, InvalidBundle: there is no bundle for its model, or a broken one.
     """
-    from shared.bundles import choose_bundle
-    from shared.runtime.handler import Role
+    from marey.bundles import choose_bundle
+    from marey.runtime.handler import Role
 
     preload = {q: choose_bundle(q, config=config).reference for q in queues if q in GENERATORS}
     return Role("+".join(queues), {queue: HANDLERS[queue] for queue in queues}, preload)
@@ -78,7 +78,7 @@ def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:
     if not device.startswith("cuda") or all(queue == TEXT for role in roles for queue in role):
         return
     asked = subprocess.run(
-        [sys.executable, "-m", "shared.nn.devices", device], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "marey.nn.devices", device], capture_output=True, text=True, check=False
     )
     if asked.returncode != 0:
         said = (asked.stderr.strip().splitlines() or ["it cannot be used"])[-1]

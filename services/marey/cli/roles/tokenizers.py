@@ -6,11 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from services.cli.extras import needs_extra
-from shared.errors import InvalidInput
+from marey.cli.extras import needs_extra
+from marey.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from shared.nn.motion_tokenizer import MotionTokenizer
+    from marey.nn.motion_tokenizer import MotionTokenizer
 
 
 def reconstruct(
@@ -30,12 +30,12 @@ def reconstruct(
         InvalidInput: they do not belong together, or the report's file has another ending.
     """
     try:
-        from shared.bundles import find_bundle
-        from workers.evaluator import report, tokenizers
-        from workers.evaluator.loading import load_evaluator
-        from workers.evaluator.reconstruction import reconstruct
-        from workers.evaluator.reference import Reference
-        from workers.training.data.prepared import PreparedData
+        from marey.bundles import find_bundle
+        from marey.evaluator import report, tokenizers
+        from marey.evaluator.loading import load_evaluator
+        from marey.evaluator.reconstruction import reconstruct
+        from marey.evaluator.reference import Reference
+        from marey.training.data.prepared import PreparedData
     except ImportError as error:
         raise needs_extra("worker", error) from error
     writers = {".html": report.to_html, ".json": report.to_json, ".md": report.to_markdown}
@@ -56,15 +56,15 @@ def reconstruct(
 
 def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
     """Exact name, licence (None = of a run, which has none yet) and tokenizer, in evaluation mode."""
-    from shared.bundles import choose_bundle
-    from shared.hashing import sha256_of
-    from workers.hgm3 import bundle as hgm3
-    from workers.hgm3 import config as hgm3_config
-    from workers.hgm3 import tokenizer as hgm3_tokenizer
-    from workers.mogo import bundle as mogo
-    from workers.mogo import config as mogo_config
-    from workers.mogo import tokenizer as mogo_tokenizer
-    from workers.training.parts import load_part
+    from marey.bundles import choose_bundle
+    from marey.hashing import sha256_of
+    from marey.hgm3 import bundle as hgm3
+    from marey.hgm3 import config as hgm3_config
+    from marey.hgm3 import tokenizer as hgm3_tokenizer
+    from marey.mogo import bundle as mogo
+    from marey.mogo import config as mogo_config
+    from marey.mogo import tokenizer as mogo_tokenizer
+    from marey.training.parts import load_part
 
     folder = Path(generator) / "tokenizer" / "part"
     if (folder / "part.json").is_file():

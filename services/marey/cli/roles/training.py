@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from services.cli.extras import needs_extra
+from marey.cli.extras import needs_extra
 
 
 def train_stage(
@@ -21,17 +21,17 @@ def train_stage(
     mask: Literal["hard", "random"] | None = None,
     **options: Any,
 ) -> dict[str, float]:
-    """Train one stage of a model; its metrics. See `workers.training.staging.TrainOptions` for the options."""
+    """Train one stage of a model; its metrics. See `marey.training.staging.TrainOptions` for the options."""
     try:
-        from workers.evaluator import config as evaluator_config
-        from workers.evaluator import train as evaluator
-        from workers.hgm3 import config as hgm3_config
-        from workers.hgm3 import train as hgm3
-        from workers.mogo import config as mogo_config
-        from workers.mogo import train as mogo
-        from workers.training.budget import Budget
-        from workers.training.optimisation import with_learning_rate
-        from workers.training.staging import TrainOptions
+        from marey.evaluator import config as evaluator_config
+        from marey.evaluator import train as evaluator
+        from marey.hgm3 import config as hgm3_config
+        from marey.hgm3 import train as hgm3
+        from marey.mogo import config as mogo_config
+        from marey.mogo import train as mogo
+        from marey.training.budget import Budget
+        from marey.training.optimisation import with_learning_rate
+        from marey.training.staging import TrainOptions
     except ImportError as error:
         raise needs_extra("train", error) from error
     budget = Budget(steps, minutes)
@@ -58,12 +58,12 @@ def assemble_bundle(
 ) -> str:
     """Write the bundle of a run; its exact reference."""
     try:
-        from workers.evaluator import assembly as evaluator
-        from workers.evaluator import config as evaluator_config
-        from workers.hgm3 import assembly as hgm3
-        from workers.hgm3 import config as hgm3_config
-        from workers.mogo import assembly as mogo
-        from workers.mogo import config as mogo_config
+        from marey.evaluator import assembly as evaluator
+        from marey.evaluator import config as evaluator_config
+        from marey.hgm3 import assembly as hgm3
+        from marey.hgm3 import config as hgm3_config
+        from marey.mogo import assembly as mogo
+        from marey.mogo import config as mogo_config
     except ImportError as error:
         raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
@@ -79,9 +79,9 @@ def assemble_bundle(
 def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) -> str:
     """Write the parts of a bundle into a run folder; the name of its configuration."""
     try:
-        from shared.bundles import find_bundle
-        from workers.hgm3 import assembly as hgm3
-        from workers.mogo import assembly as mogo
+        from marey.bundles import find_bundle
+        from marey.hgm3 import assembly as hgm3
+        from marey.mogo import assembly as mogo
     except ImportError as error:
         raise needs_extra("train", error) from error
     take_apart = hgm3.take_apart if model == "hgm3" else mogo.take_apart
@@ -91,8 +91,8 @@ def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) ->
 def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -> str:
     """Write an evaluator's networks with a reference of these data; the new bundle's exact reference."""
     try:
-        from shared.bundles import find_bundle
-        from workers.evaluator.assembly import renew_reference
+        from marey.bundles import find_bundle
+        from marey.evaluator.assembly import renew_reference
     except ImportError as error:
         raise needs_extra("train", error) from error
     return renew_reference(find_bundle(bundle), data, output, overwrite=overwrite).reference

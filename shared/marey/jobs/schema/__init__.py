@@ -9,13 +9,13 @@ rows, tenant row. Who holds a job's lock may change everything about that job; t
 Under the tenant's lock claims and submits count what there is of a quota, one after the other.
 """
 
-from shared.jobs.schema.base import metadata
-from shared.jobs.schema.evaluations import evaluation, evaluation_event, evaluation_report, prompt_set, schedule
-from shared.jobs.schema.jobs import JOB_STATE, idempotency, item, job, job_event, lane, lease, text_features, worker
-from shared.jobs.schema.motions import asset, asset_writer, motion, motion_file, motion_search
-from shared.jobs.schema.streams import stream, stream_chunk
-from shared.jobs.schema.tenants import api_key, audit_event, tenant
-from shared.jobs.schema.webhooks import webhook, webhook_attempt, webhook_delivery, webhook_event
+from marey.jobs.schema.base import metadata
+from marey.jobs.schema.evaluations import evaluation, evaluation_event, evaluation_report, prompt_set, schedule
+from marey.jobs.schema.jobs import JOB_STATE, idempotency, item, job, job_event, lane, lease, text_features, worker
+from marey.jobs.schema.motions import asset, asset_writer, motion, motion_file, motion_search
+from marey.jobs.schema.streams import stream, stream_chunk
+from marey.jobs.schema.tenants import api_key, audit_event, tenant
+from marey.jobs.schema.webhooks import webhook, webhook_attempt, webhook_delivery, webhook_event
 
 __all__ = [
     "JOB_STATE",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
-from shared.jobs.states import EvaluationState
+from marey.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
+from marey.jobs.states import EvaluationState
 
 # Prompts of evaluations, by the digest of their content: a schedule and all its runs share one row.
 prompt_set = sa.Table(

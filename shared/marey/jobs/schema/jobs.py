@@ -5,8 +5,8 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
-from shared.jobs.states import ItemState, JobControl, Stage
+from marey.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
+from marey.jobs.states import ItemState, JobControl, Stage
 
 # The rule of `states.job_state`.
 JOB_STATE = """CASE

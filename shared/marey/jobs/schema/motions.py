@@ -5,8 +5,8 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import JSONB, TSVECTOR
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
-from shared.jobs.states import Review
+from marey.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
+from marey.jobs.states import Review
 
 asset = sa.Table(
     "asset",

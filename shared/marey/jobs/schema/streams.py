@@ -5,8 +5,8 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
-from shared.jobs.states import StreamState
+from marey.jobs.schema.base import NOW, Id, Time, metadata, one_of, short_id
+from marey.jobs.states import StreamState
 
 stream = sa.Table(
     "stream",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, short_id
+from marey.jobs.schema.base import NOW, Id, Time, metadata, short_id
 
 tenant = sa.Table(
     "tenant",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
 
-from shared.jobs.schema.base import NOW, Id, Time, metadata, short_id
+from marey.jobs.schema.base import NOW, Id, Time, metadata, short_id
 
 webhook = sa.Table(
     "webhook",
@@ -19,7 +19,7 @@ webhook = sa.Table(
     sa.Column("name", sa.Text),
     sa.Column("url", sa.Text, nullable=False),
     sa.Column("events", ARRAY(sa.Text), nullable=False),
-    sa.Column("secret", BYTEA, nullable=False),  # encrypted: `shared.webhooks.vault`
+    sa.Column("secret", BYTEA, nullable=False),  # encrypted: `marey.webhooks.vault`
     sa.Column("previous_secret", BYTEA),  # signs beside it until then
     sa.Column("previous_until", Time),
     sa.Column("paused", sa.Boolean, nullable=False, server_default=sa.false()),

@@ -1,5 +1,5 @@
 "use strict";
-// Frames of a live stream: read from their bytes (shared/streams/frames.py), and kept back a little, so that what is
+// Frames of a live stream: read from their bytes (shared/marey/streams/frames.py), and kept back a little, so that what is
 // drawn moves evenly though frames arrive unevenly.
 const MareyFrames = (() => {
   const [MAGIC, VERSION, HEADER, LAST] = [0x4d46, 1, 24, 1 << 4];

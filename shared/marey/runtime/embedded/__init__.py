@@ -5,9 +5,9 @@ Each is a direct child of the process that starts it, in the foreground, and die
 takes a lock that all users of a machine share, and its servers outlive a killed owner.
 """
 
-from shared.runtime.embedded.postgres import postgres_url, start_postgres
-from shared.runtime.embedded.server import SOCKET_LIMIT, EmbeddedServer, StartFailed, make_socket_folder, socket_folder
-from shared.runtime.embedded.valkey import start_valkey, valkey_url
+from marey.runtime.embedded.postgres import postgres_url, start_postgres
+from marey.runtime.embedded.server import SOCKET_LIMIT, EmbeddedServer, StartFailed, make_socket_folder, socket_folder
+from marey.runtime.embedded.valkey import start_valkey, valkey_url
 
 __all__ = [
     "SOCKET_LIMIT",

@@ -13,9 +13,9 @@ import psutil
 import psycopg
 from psycopg import sql
 
-from shared.errors import Conflict
-from shared.private_home import make_private
-from shared.runtime.embedded.server import (
+from marey.errors import Conflict
+from marey.private_home import make_private
+from marey.runtime.embedded.server import (
     STOP_SECONDS,
     EmbeddedServer,
     StartFailed,

@@ -22,8 +22,8 @@ from typing import IO
 import psutil
 import psycopg
 
-from shared.errors import Conflict, MareyError
-from shared.private_home import open_private
+from marey.errors import Conflict, MareyError
+from marey.private_home import open_private
 
 SOCKET_LIMIT = 100  # bytes of a socket's path; the kernel takes 107, macOS 103
 START_SECONDS = 30.0

@@ -7,9 +7,9 @@ import socket
 import time
 from pathlib import Path
 
-from shared.errors import Conflict
-from shared.private_home import make_private
-from shared.runtime.embedded.server import (
+from marey.errors import Conflict
+from marey.private_home import make_private
+from marey.runtime.embedded.server import (
     STOP_SECONDS,
     EmbeddedServer,
     make_socket_folder,

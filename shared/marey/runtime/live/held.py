@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shared.jobs import StreamChunk, StreamRow, StreamState
-from shared.runtime.live.port import LiveFrame, Tokens
-from shared.runtime.live.reading import Reading
-from shared.streams.acts import Begun
-from shared.streams.control import Control, ControlQueue
-from shared.streams.frames import Frame
-from shared.streams.reads import ReadAs
-from shared.streams.redis import FrameStream, Lease
-from shared.streams.watch import Watch
-from shared.text.features import TextFeatures
+from marey.jobs import StreamChunk, StreamRow, StreamState
+from marey.runtime.live.port import LiveFrame, Tokens
+from marey.runtime.live.reading import Reading
+from marey.streams.acts import Begun
+from marey.streams.control import Control, ControlQueue
+from marey.streams.frames import Frame
+from marey.streams.reads import ReadAs
+from marey.streams.redis import FrameStream, Lease
+from marey.streams.watch import Watch
+from marey.text.features import TextFeatures
 
 
 @dataclass(eq=False)

@@ -12,9 +12,9 @@ import numpy as np
 import redis
 import sqlalchemy as sa
 
-from shared import metrics
-from shared.errors import InvalidInput, MareyError, Unreachable
-from shared.jobs import (
+from marey import metrics
+from marey.errors import InvalidInput, MareyError, Unreachable
+from marey.jobs import (
     NewItem,
     Problem,
     StreamPast,
@@ -29,19 +29,19 @@ from shared.jobs import (
     take_stream,
     transaction,
 )
-from shared.runtime.exposition import measure_gpu
-from shared.runtime.faults import as_problem, patiently
-from shared.runtime.live.held import Held
-from shared.runtime.live.loop import LiveLoop, Over
-from shared.runtime.live.port import Parse, Room
-from shared.runtime.live.reading import Opening, Reading
-from shared.runtime.logs import logger
-from shared.streams.bell import Bell
-from shared.streams.control import Control, ControlQueue
-from shared.streams.reads import ReadAs
-from shared.streams.recording import Recording
-from shared.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
-from shared.streams.watch import Watch
+from marey.runtime.exposition import measure_gpu
+from marey.runtime.faults import as_problem, patiently
+from marey.runtime.live.held import Held
+from marey.runtime.live.loop import LiveLoop, Over
+from marey.runtime.live.port import Parse, Room
+from marey.runtime.live.reading import Opening, Reading
+from marey.runtime.logs import logger
+from marey.streams.bell import Bell
+from marey.streams.control import Control, ControlQueue
+from marey.streams.reads import ReadAs
+from marey.streams.recording import Recording
+from marey.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
+from marey.streams.watch import Watch
 
 log = logger(__name__)
 

@@ -8,16 +8,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from shared import metrics
-from shared.errors import MareyError, Unreachable
-from shared.jobs import StreamState
-from shared.runtime.faults import as_problem
-from shared.runtime.live.held import Held
-from shared.runtime.live.port import LiveFrame, Room
-from shared.runtime.logs import logger
-from shared.streams.frames import encode_frame
-from shared.streams.redis import LeaseLost
-from shared.text.features import TextFeatures
+from marey import metrics
+from marey.errors import MareyError, Unreachable
+from marey.jobs import StreamState
+from marey.runtime.faults import as_problem
+from marey.runtime.live.held import Held
+from marey.runtime.live.port import LiveFrame, Room
+from marey.runtime.logs import logger
+from marey.streams.frames import encode_frame
+from marey.streams.redis import LeaseLost
+from marey.text.features import TextFeatures
 
 log = logger(__name__)
 

@@ -9,18 +9,18 @@ import threading
 import time
 from typing import cast
 
-from shared.errors import InvalidInput
-from shared.jobs import WorkerBeat, create_engine
-from shared.runtime.child import wait_for_database
-from shared.runtime.exposition import expose
-from shared.runtime.live.keeper import QUEUE, Keeper
-from shared.runtime.live.loop import LiveLoop
-from shared.runtime.live.port import ShowFactory
-from shared.runtime.logs import configure_logging, logger
-from shared.runtime.queue import redis_client
-from shared.runtime.signals import stop_on_signals
-from shared.runtime.status import Teller
-from shared.settings import Settings
+from marey.errors import InvalidInput
+from marey.jobs import WorkerBeat, create_engine
+from marey.runtime.child import wait_for_database
+from marey.runtime.exposition import expose
+from marey.runtime.live.keeper import QUEUE, Keeper
+from marey.runtime.live.loop import LiveLoop
+from marey.runtime.live.port import ShowFactory
+from marey.runtime.logs import configure_logging, logger
+from marey.runtime.queue import redis_client
+from marey.runtime.signals import stop_on_signals
+from marey.runtime.status import Teller
+from marey.settings import Settings
 
 log = logger(__name__)
 

@@ -9,9 +9,9 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.streams.acts import Begun
-from shared.streams.frames import Frame
-from shared.text.features import TextFeatures
+from marey.streams.acts import Begun
+from marey.streams.frames import Frame
+from marey.text.features import TextFeatures
 
 Tokens: TypeAlias = NDArray[np.int16]
 

@@ -6,13 +6,13 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shared.errors import MareyError
-from shared.jobs import StreamPast, StreamRow
-from shared.runtime.faults import as_problem
-from shared.runtime.live.port import Parse
-from shared.runtime.logs import logger
-from shared.streams.redis import FrameStream, Lease
-from shared.text.features import TextFeatures
+from marey.errors import MareyError
+from marey.jobs import StreamPast, StreamRow
+from marey.runtime.faults import as_problem
+from marey.runtime.live.port import Parse
+from marey.runtime.logs import logger
+from marey.streams.redis import FrameStream, Lease
+from marey.text.features import TextFeatures
 
 log = logger(__name__)
 

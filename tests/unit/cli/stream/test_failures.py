@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from shared.errors import Conflict
+from marey.errors import Conflict
 from tests.support.marey import REPOSITORY
 from tests.support.streaming import PROMPT, SLOW, environ, frames_of, run
 
@@ -67,7 +67,7 @@ def test_a_file_that_cannot_be_written_any_more_is_2_and_the_stream_is_stopped(
     def add(*_: object, **__: object) -> None:
         raise Conflict("the disk is full", where=str(path))
 
-    monkeypatch.setattr("shared.motion.bvh_live.LiveBVH.add", add)
+    monkeypatch.setattr("marey.motion.bvh_live.LiveBVH.add", add)
     ran = run(server, "-o", path, "--json")
     ran.refused(2, "the disk is full")
     assert ran.lines[-1]["file"] is None
@@ -114,7 +114,7 @@ def test_an_existing_file_is_replaced_when_asked(serve: Any, tmp_path: Path) -> 
 
 def test_a_client_without_numpy_watches_but_writes_no_file(serve: Any, tmp_path: Path) -> None:
     server = serve(frames=5)
-    code = "import sys; sys.modules['numpy'] = None; from services.cli.main import run; run()"
+    code = "import sys; sys.modules['numpy'] = None; from marey.cli.main import run; run()"
     command = [sys.executable, "-c", code, "stream", PROMPT, "--json"]
     options = {"cwd": REPOSITORY, "env": environ(server, tmp_path), "stdin": subprocess.DEVNULL, "timeout": 60}
     done = subprocess.run(command, capture_output=True, check=True, **options)

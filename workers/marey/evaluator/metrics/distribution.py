@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.measures.inputs import Array, Integers, Numbers, at_least, embeddings
+from marey.errors import InvalidInput
+from marey.measures.inputs import Array, Integers, Numbers, at_least, embeddings
 
 SAMPLES_PER_DIMENSION = 5
 _FEW_PAIRS = 100  # of `diversity` where there are not more motions than pairs asked for

@@ -1,4 +1,4 @@
-"""How sure a number is: the field's interval over repeats. For two runs on the same prompts see `shared.measures`."""
+"""How sure a number is: the field's interval over repeats. For two runs on the same prompts see `marey.measures`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from shared.measures.inputs import Numbers, at_least, embeddings
+from marey.measures.inputs import Numbers, at_least, embeddings
 
 T = TypeVar("T")
 

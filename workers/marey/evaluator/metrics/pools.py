@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.measures.inputs import Integers, Numbers, at_least, integers
+from marey.measures.inputs import Integers, Numbers, at_least, integers
 
 _LONE = "a match alone in its pool is always found"
 

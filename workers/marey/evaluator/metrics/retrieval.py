@@ -19,9 +19,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from shared.errors import InvalidInput
-from shared.measures.inputs import Array, Integers, Numbers, integers, pairs
-from workers.evaluator.metrics.pools import draw_distinct_pools, draw_pools
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.pools import draw_distinct_pools, draw_pools
+from marey.measures.inputs import Array, Integers, Numbers, integers, pairs
 
 Distance = Literal["euclidean", "cosine"]
 ALL_TOP = (1, 2, 3, 5, 10)

@@ -1,11 +1,10 @@
 """The report of an evaluation: one HTML page, the same as JSON and as Markdown."""
 
-from shared.measures.scores import MotionScore
-from workers.evaluator.report.document import from_json, to_json
-from workers.evaluator.report.markdown import to_markdown
-from workers.evaluator.report.model import Baseline, Change, Report
-from workers.evaluator.report.page import to_html
-from workers.evaluator.report.parts import (
+from marey.evaluator.report.document import from_json, to_json
+from marey.evaluator.report.markdown import to_markdown
+from marey.evaluator.report.model import Baseline, Change, Report
+from marey.evaluator.report.page import to_html
+from marey.evaluator.report.parts import (
     Exhibit,
     HeatCell,
     Metric,
@@ -16,7 +15,8 @@ from workers.evaluator.report.parts import (
     TrendPoint,
     Value,
 )
-from workers.evaluator.report.words import headline, sentence_of
+from marey.evaluator.report.words import headline, sentence_of
+from marey.measures.scores import MotionScore
 
 __all__ = [
     "Baseline",

@@ -18,10 +18,10 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from shared.errors import InvalidFile
-from shared.measures.scores import SCHEMA, VERSION, check_document
-from workers.evaluator.report.model import Report
-from workers.evaluator.report.parts import Exhibit
+from marey.errors import InvalidFile
+from marey.evaluator.report.model import Report
+from marey.evaluator.report.parts import Exhibit
+from marey.measures.scores import SCHEMA, VERSION, check_document
 
 DIGITS = 6  # significant; intervals are a hundred times wider
 

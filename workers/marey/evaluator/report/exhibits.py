@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 
-from shared.motion.clip import MotionClip
-from workers.evaluator.report.markup import Markup, element, join, void
-from workers.evaluator.report.model import Report
-from workers.evaluator.report.parts import Exhibit
-from workers.evaluator.report.sections import section
+from marey.evaluator.report.markup import Markup, element, join, void
+from marey.evaluator.report.model import Report
+from marey.evaluator.report.parts import Exhibit
+from marey.evaluator.report.sections import section
+from marey.motion.clip import MotionClip
 
 
 def exhibits(report: Report) -> Markup:

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
 
-from shared.errors import InvalidInput
-from shared.measures.comparing import Verdict
-from shared.measures.scores import MotionScore
-from workers.evaluator.report.parts import (
+from marey.errors import InvalidInput
+from marey.evaluator.report.parts import (
     Exhibit,
     HeatCell,
     Metric,
@@ -27,6 +25,8 @@ from workers.evaluator.report.parts import (
     distinct,
     finite,
 )
+from marey.measures.comparing import Verdict
+from marey.measures.scores import MotionScore
 
 Against = Literal["last run", "pinned baseline"]
 

@@ -6,16 +6,16 @@ hashes and lets it fetch nothing; every text is escaped: a prompt is data, whate
 
 from __future__ import annotations
 
-from shared.motion.pages import asset, fill, script_json, whole_page
-from shared.motion.paper import one_line
-from shared.motion.player import motion_document
-from workers.evaluator.report.exhibits import clips_of, exhibits
-from workers.evaluator.report.markup import Markup, element, join
-from workers.evaluator.report.model import Report
-from workers.evaluator.report.sections import heat, numbers, repeat, speed, top, verdict
-from workers.evaluator.report.trends import trends
+from marey.evaluator.report.exhibits import clips_of, exhibits
+from marey.evaluator.report.markup import Markup, element, join
+from marey.evaluator.report.model import Report
+from marey.evaluator.report.sections import heat, numbers, repeat, speed, top, verdict
+from marey.evaluator.report.trends import trends
+from marey.motion.pages import asset, fill, script_json, whole_page
+from marey.motion.paper import one_line
+from marey.motion.player import motion_document
 
-PACKAGE = "workers.evaluator.report"
+PACKAGE = "marey.evaluator.report"
 
 
 def to_html(report: Report) -> bytes:

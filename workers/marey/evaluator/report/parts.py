@@ -14,9 +14,9 @@ from typing import Literal
 
 from pydantic import InstanceOf
 
-from shared.errors import InvalidInput
-from shared.motion.clip import MotionClip
-from workers.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
+from marey.errors import InvalidInput
+from marey.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
+from marey.motion.clip import MotionClip
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 
-from workers.evaluator.report.markup import Markup, element, join
-from workers.evaluator.report.model import Report
-from workers.evaluator.report.parts import HeatCell, Metric
-from workers.evaluator.report.tables import (
+from marey.evaluator.report.markup import Markup, element, join
+from marey.evaluator.report.model import Report
+from marey.evaluator.report.parts import HeatCell, Metric
+from marey.evaluator.report.tables import (
     Cell,
     Heat,
     Line,
@@ -18,7 +18,7 @@ from workers.evaluator.report.tables import (
     tables_of,
     weakest_of,
 )
-from workers.evaluator.report.words import CHANGES, LEGEND, direction, headline, intervals_of, moment
+from marey.evaluator.report.words import CHANGES, LEGEND, direction, headline, intervals_of, moment
 
 ARROWS = {"higher": "↑", "lower": "↓", "": ""}
 MOST_STYLES = 8

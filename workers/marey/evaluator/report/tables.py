@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from workers.evaluator.report.model import ALWAYS, Baseline, Report
-from workers.evaluator.report.parts import HeatCell, Metric, Row, TrendPoint
-from workers.evaluator.report.words import (
+from marey.evaluator.report.model import ALWAYS, Baseline, Report
+from marey.evaluator.report.parts import HeatCell, Metric, Row, TrendPoint
+from marey.evaluator.report.words import (
     SUBJECTS,
     arrow,
     counts_of,

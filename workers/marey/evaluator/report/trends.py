@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from workers.evaluator.report.markup import Markup, element, join
-from workers.evaluator.report.model import Report
-from workers.evaluator.report.parts import Metric, TrendPoint
-from workers.evaluator.report.sections import section, wide
-from workers.evaluator.report.tables import trended
-from workers.evaluator.report.words import MINUS, day, direction, moment, number, with_unit
+from marey.evaluator.report.markup import Markup, element, join
+from marey.evaluator.report.model import Report
+from marey.evaluator.report.parts import Metric, TrendPoint
+from marey.evaluator.report.sections import section, wide
+from marey.evaluator.report.tables import trended
+from marey.evaluator.report.words import MINUS, day, direction, moment, number, with_unit
 
 WIDTH, HEIGHT = 340, 170
 LEFT, RIGHT, TOP, BOTTOM = 52, 328, 16, 136  # of the plot in the picture

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal
 
-from workers.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
-from workers.evaluator.report.model import Against, Change, Report
-from workers.evaluator.report.parts import Metric, Repeats, Value
+from marey.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
+from marey.evaluator.report.model import Against, Change, Report
+from marey.evaluator.report.parts import Metric, Repeats, Value
 
 MINUS, SPACE = "\u2212", "\u00a0"
 SUBJECTS: dict[Against, str] = {"last run": "the last run", "pinned baseline": "the pinned baseline"}

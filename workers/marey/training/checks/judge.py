@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from workers.training.checks.kinematics import (
+from marey.training.checks.kinematics import (
     ANKLES,
     HEAD,
     PELVIS,
@@ -21,8 +21,8 @@ from workers.training.checks.kinematics import (
     body_frame,
     smooth,
 )
-from workers.training.checks.stretch import Arm, Stretch
-from workers.training.checks.strikes import is_lively, kicks, punches, slashes
+from marey.training.checks.stretch import Arm, Stretch
+from marey.training.checks.strikes import is_lively, kicks, punches, slashes
 
 Act = Literal["walk", "run", "walk_back", "turn", "wave", "raise", "bow", "kick", "punch", "slash", "dance"]
 Side = Literal["", "left", "right", "both"]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.feet import runs
+from marey.motion.feet import runs
 
 Array = NDArray[np.floating]
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from workers.training.checks.judge import Expectation
+from marey.training.checks.judge import Expectation
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.motion.skeleton import HUMANML3D
-from workers.training.checks.kinematics import TOES, Array
+from marey.motion.skeleton import HUMANML3D
+from marey.training.checks.kinematics import TOES, Array
 
 _PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
 SKATE_HEIGHT = 0.05

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.checks.judge import Expectation, judge
-from workers.training.checks.quality import Quality, quality
+from marey.training.checks.judge import Expectation, judge
+from marey.training.checks.quality import Quality, quality
 
 _JUDGED_AS = {"dash": "run"}
 _SIDED = ("turn", "wave", "raise")

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from workers.training.checks.kinematics import (
+from marey.training.checks.kinematics import (
     ANKLES,
     PELVIS,
     SHOULDERS,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared.motion.feet import runs
-from workers.training.checks.kinematics import (
+from marey.motion.feet import runs
+from marey.training.checks.kinematics import (
     ANKLES,
     HEAD,
     PELVIS,

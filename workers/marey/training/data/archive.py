@@ -7,7 +7,7 @@ import tarfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-from shared.errors import InvalidFile, NotFound, TooLarge
+from marey.errors import InvalidFile, NotFound, TooLarge
 
 MAX_FILE_BYTES = 64 * 2**20  # the longest take of the two archives has 11 MB
 MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB: a bomb stops here

@@ -11,18 +11,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import Conflict, InvalidInput
-from shared.hashing import sha256_of
-from shared.motion.features import HUMANML3D_263
-from workers.training.data import manifest as names
-from workers.training.data.captions import captions, phrasings
-from workers.training.data.compose import COUNTS, compose
-from workers.training.data.describe import Facts, describe, describe_cmu
-from workers.training.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
-from workers.training.data.pack import SPLITS, JointsPack, PackClip, split_root
-from workers.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
-from workers.training.data.soundness import is_broken
-from workers.training.data.sources import SOURCES
+from marey.errors import Conflict, InvalidInput
+from marey.hashing import sha256_of
+from marey.motion.features import HUMANML3D_263
+from marey.training.data import manifest as names
+from marey.training.data.captions import captions, phrasings
+from marey.training.data.compose import COUNTS, compose
+from marey.training.data.describe import Facts, describe, describe_cmu
+from marey.training.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
+from marey.training.data.pack import SPLITS, JointsPack, PackClip, split_root
+from marey.training.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
+from marey.training.data.soundness import is_broken
+from marey.training.data.sources import SOURCES
 
 Array = NDArray[np.floating]
 # Heading: smoothed over half a second, which keeps the sway of a gait (1 Hz) out of it and follows a turn; hips and

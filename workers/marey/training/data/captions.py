@@ -8,11 +8,11 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import conjugate, mentioned_again, possessive, sentence, with_adjective
-from workers.training.data.grammar import grammar
-from workers.training.data.phrases import details, fields, fill, filled, phrase_of, with_adverb
-from workers.training.data.told import told_caption, told_sequence
+from marey.training.data.describe import LOCOMOTION, Facts
+from marey.training.data.english import conjugate, mentioned_again, possessive, sentence, with_adjective
+from marey.training.data.grammar import grammar
+from marey.training.data.phrases import details, fields, fill, filled, phrase_of, with_adverb
+from marey.training.data.told import told_caption, told_sequence
 
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)

@@ -16,13 +16,13 @@ from typing import cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.checks.judge import Act, Expectation, Side, judge
-from workers.training.data.captions import seeded
-from workers.training.data.cuts import WORST_SEAM, best_cut, core
-from workers.training.data.describe import CYCLIC, Facts, describe
-from workers.training.data.part import FPS, MIN_FRAMES, Part
-from workers.training.data.retime import LIMIT, Made, crop, loop, on_a_way, stretch
-from workers.training.data.splice import join_clips
+from marey.training.checks.judge import Act, Expectation, Side, judge
+from marey.training.data.captions import seeded
+from marey.training.data.cuts import WORST_SEAM, best_cut, core
+from marey.training.data.describe import CYCLIC, Facts, describe
+from marey.training.data.part import FPS, MIN_FRAMES, Part
+from marey.training.data.retime import LIMIT, Made, crop, loop, on_a_way, stretch
+from marey.training.data.splice import join_clips
 
 Array = NDArray[np.floating]
 

@@ -7,10 +7,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.checks.kinematics import heading, lean, smooth, trunk_up
-from workers.training.data.describe import CYCLIC
-from workers.training.data.part import FPS, Part
-from workers.training.data.splice import seam_costs, seam_features
+from marey.training.checks.kinematics import heading, lean, smooth, trunk_up
+from marey.training.data.describe import CYCLIC
+from marey.training.data.part import FPS, Part
+from marey.training.data.splice import seam_costs, seam_features
 
 Array = NDArray[np.floating]
 WORST_SEAM = 0.6

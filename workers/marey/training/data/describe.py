@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.checks.kinematics import Gait, Hand, gait, hand, lean
-from workers.training.checks.strikes import is_lively, kicks, punches, slashes
+from marey.training.checks.kinematics import Gait, Hand, gait, hand, lean
+from marey.training.checks.strikes import is_lively, kicks, punches, slashes
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")

@@ -6,9 +6,9 @@ from collections import Counter
 
 from pydantic import BaseModel, ConfigDict
 
-from workers.training.data.manifest import Clip
-from workers.training.data.pack import SPLITS
-from workers.training.data.prepared import PreparedData
+from marey.training.data.manifest import Clip
+from marey.training.data.pack import SPLITS
+from marey.training.data.prepared import PreparedData
 
 
 class Summary(BaseModel):

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from shared.arrays import check_array, read_npz, text_of
-from shared.documents import parse_json
-from shared.errors import InvalidFile, NotFound
+from marey.arrays import check_array, read_npz, text_of
+from marey.documents import parse_json
+from marey.errors import InvalidFile, NotFound
 
 MAX_BYTES = 8 * 2**30
 """A day of motion takes 1.5 GB."""

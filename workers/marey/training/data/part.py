@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.data.describe import Facts
-from workers.training.data.pack import PackClip
+from marey.training.data.describe import Facts
+from marey.training.data.pack import PackClip
 
 FPS = 20.0
 MAX_FRAMES = 196  # feature frames; HumanML3D's limit

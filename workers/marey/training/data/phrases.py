@@ -6,9 +6,9 @@ import random
 import re
 from collections.abc import Sequence
 
-from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import number
-from workers.training.data.grammar import grammar
+from marey.training.data.describe import LOCOMOTION, Facts
+from marey.training.data.english import number
+from marey.training.data.grammar import grammar
 
 _FIELD = re.compile(r"{(\w+)}")
 PAIR = (  # what is said of both hands as two

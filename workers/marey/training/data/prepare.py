@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from shared.documents import read_json
-from shared.errors import InvalidFile, NotFound
-from shared.motion.bvh import parse_bvh
-from workers.training.data.archive import bvh_files
-from workers.training.data.pack import JointsPack, PackClip
-from workers.training.data.retarget import read_source, retarget
-from workers.training.data.rigs import BANDAI_NAMCO, ICLONE, RIGS, Rig
-from workers.training.data.sources import cmu_split
+from marey.documents import read_json
+from marey.errors import InvalidFile, NotFound
+from marey.motion.bvh import parse_bvh
+from marey.training.data.archive import bvh_files
+from marey.training.data.pack import JointsPack, PackClip
+from marey.training.data.retarget import read_source, retarget
+from marey.training.data.rigs import BANDAI_NAMCO, ICLONE, RIGS, Rig
+from marey.training.data.sources import cmu_split
 
 Progress = Callable[[int, int | None], None]
 """Called with how many clips are done, and how many there are, when that is known."""

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from shared.arrays import check_array, map_npy, read_npz
-from shared.documents import parse_json, read_json
-from shared.errors import InvalidFile, NotFound
-from shared.hashing import sha256_of
-from shared.motion.features import FeatureLayout, layout
-from workers.training.data import manifest as names
-from workers.training.data.manifest import Clip, Manifest
-from workers.training.data.pack import SPLITS, join
+from marey.arrays import check_array, map_npy, read_npz
+from marey.documents import parse_json, read_json
+from marey.errors import InvalidFile, NotFound
+from marey.hashing import sha256_of
+from marey.motion.features import FeatureLayout, layout
+from marey.training.data import manifest as names
+from marey.training.data.manifest import Clip, Manifest
+from marey.training.data.pack import SPLITS, join
 
 HINT = "Prepare the data again."
 MAX_LINE = 2**20

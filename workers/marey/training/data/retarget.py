@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.errors import InvalidFile
-from shared.motion.bvh import BvhClip
-from shared.motion.kinematics import global_rotations
-from shared.motion.rotations import cross, normalize, rotate
-from shared.motion.skeleton import HUMANML3D
-from workers.training.data.rigs import Rig
+from marey.errors import InvalidFile
+from marey.motion.bvh import BvhClip
+from marey.motion.kinematics import global_rotations
+from marey.motion.rotations import cross, normalize, rotate
+from marey.motion.skeleton import HUMANML3D
+from marey.training.data.rigs import Rig
 
 Array = NDArray[np.floating]
 FPS = 20.0
@@ -47,7 +47,7 @@ class SourceMotion:
 def read_source(clip: BvhClip, rig: Rig, *, where: str) -> SourceMotion:
     """Take what retargeting needs from a clip: named joints, resampled to 20 fps.
 
-    `shared.motion.bvh` has left out a T-pose first frame already.
+    `marey.motion.bvh` has left out a T-pose first frame already.
 
     Raises:
         InvalidFile: a joint of the rig is missing, or fewer than four frames are left.

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.data.cuts import WORST_SEAM, best_cut, core, hold
-from workers.training.data.part import FPS, MAX_FRAMES, Part
-from workers.training.data.splice import join_clips
+from marey.training.data.cuts import WORST_SEAM, best_cut, core, hold
+from marey.training.data.part import FPS, MAX_FRAMES, Part
+from marey.training.data.splice import join_clips
 
 Array = NDArray[np.floating]
 LIMIT = MAX_FRAMES + 1  # poses

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from workers.training.data.manifest import Clip
+from marey.training.data.manifest import Clip
 
 SEQUENCE_SHARE = {2: 0.36, 3: 0.1}
 """Share of the draws that are sequences of two and of three acts; clips of one act have the rest."""

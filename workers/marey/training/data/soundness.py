@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.rotations import cross, normalize
+from marey.motion.rotations import cross, normalize
 
 Array = NDArray[np.floating]
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
-from shared.motion.skeleton import HUMANML3D
-from workers.training.checks.kinematics import heading
-from workers.training.data.retarget import two_bones
+from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
+from marey.motion.skeleton import HUMANML3D
+from marey.training.checks.kinematics import heading
+from marey.training.data.retarget import two_bones
 
 Array = NDArray[np.floating]
 

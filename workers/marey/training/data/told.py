@@ -16,10 +16,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from workers.training.data.describe import LOCOMOTION, Facts
-from workers.training.data.english import conjugate, mentioned_again, possessive
-from workers.training.data.grammar import grammar
-from workers.training.data.phrases import fields, fill, filled_if_any, phrase_of, with_adverb
+from marey.training.data.describe import LOCOMOTION, Facts
+from marey.training.data.english import conjugate, mentioned_again, possessive
+from marey.training.data.grammar import grammar
+from marey.training.data.phrases import fields, fill, filled_if_any, phrase_of, with_adverb
 
 STYLED_SHARE = 0.5
 OWN_SHARE = 0.5  # of the sequences that have words of their own
