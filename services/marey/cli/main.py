@@ -30,7 +30,7 @@ from marey.cli.commands import (
 )
 from marey.errors import MareyError
 
-SERVING = frozenset({"serve", "worker", "scheduler", "api", "text", "train", "data"})
+SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 PATIENCE = 2.0
 """Seconds that a command waits at its end for a collector that does not answer."""
 
@@ -118,6 +118,7 @@ app.command("serve")(serve.serve)
 app.command("worker")(serve.worker)
 app.command("scheduler")(serve.scheduler)
 app.command("api")(serve.api)
+app.command("probe")(serve.probe)
 app.add_typer(text.app, name="text")
 app.add_typer(models.app, name="models")
 app.add_typer(data.app, name="data")

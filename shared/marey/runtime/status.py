@@ -1,7 +1,7 @@
 """What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds. Live
 workers and the scheduler say the same, each by a `Teller`.
 
-`python -m marey.runtime.status` is the liveness probe of a machine's workers, with `ready` the readiness probe.
+`marey probe` reads them: the liveness probe of a machine's workers, with `ready` the readiness probe.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -18,9 +17,8 @@ from pathlib import Path
 
 import psutil
 
-from marey.errors import MareyError
+from marey.errors import Unreachable
 from marey.private_home import open_private
-from marey.settings import settings
 
 TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
@@ -67,11 +65,25 @@ def write_status(home: Path, name: str, status: WorkerStatus) -> None:
     temporary.replace(path)
 
 
-def probe(home: Path, *, ready: bool = False, now: float | None = None) -> bool:
-    """Whether this machine's workers live (and, with `ready`, serve): at least one is there, and none is stuck."""
+def check_health(home: Path, *, ready: bool = False, now: float | None = None) -> None:
+    """Check the processes of this machine that keep a status: at least one is there, and none is stuck.
+
+    Args:
+        ready: their models are loaded too.
+
+    Raises:
+        Unreachable: a check failed.
+    """
     now = time.time() if now is None else now
-    found = [status for _, status in _of_this_host(home)]
-    return bool(found) and all(status.alive(now) and (status.ready or not ready) for status in found)
+    found = dict(_of_this_host(home))
+    if not found:
+        raise Unreachable("no worker or scheduler runs on this machine", where=str(home / "run"))
+    stuck = [path.stem for path, status in found.items() if not status.alive(now)]
+    if stuck:
+        raise Unreachable(f"without a sign of life or of progress: {', '.join(stuck)}", where=str(home / "run"))
+    loading = [path.stem for path, status in found.items() if not status.ready]
+    if ready and loading:
+        raise Unreachable(f"not ready yet: {', '.join(loading)}", where=str(home / "run"))
 
 
 def forget_dead(home: Path) -> None:
@@ -118,10 +130,3 @@ def _read(path: Path) -> WorkerStatus | None:
         return WorkerStatus(**json.loads(path.read_text(encoding="utf-8")))
     except (FileNotFoundError, ValueError, TypeError):
         return None
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(not probe(settings().home, ready="ready" in sys.argv[1:]))
-    except MareyError as error:
-        sys.exit(f"{error}")

@@ -1,4 +1,4 @@
-"""`marey serve`, `worker`, `scheduler` and `api`: the processes of a server."""
+"""`marey serve`, `worker`, `scheduler`, `api`: the processes of a server; and `probe`, which checks them."""
 
 from __future__ import annotations
 
@@ -115,3 +115,26 @@ def api() -> None:
     except ImportError as error:
         raise needs_extra("server", error) from error
     serve_api()
+
+
+class Health(StrEnum):
+    """What a probe asks for."""
+
+    LIVE = "live"
+    READY = "ready"
+
+
+def probe(
+    health: Annotated[
+        Health, typer.Argument(help="live = none of them is stuck; ready = their models are loaded too.")
+    ] = Health.LIVE,
+) -> None:
+    """Check the workers and schedulers of this machine; exits 4 if one is not well. For health checks of containers."""
+    from marey.cli.extras import needs_extra
+
+    try:
+        from marey.runtime.status import check_health
+        from marey.settings import settings
+    except ImportError as error:
+        raise needs_extra("server", error) from error
+    check_health(settings().home, ready=health is Health.READY)
