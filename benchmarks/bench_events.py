@@ -16,7 +16,7 @@ import psutil
 import sqlalchemy as sa
 
 from benchmarks.platform import BUNDLE, Platform, platform, processor_seconds
-from marey.jobs import transaction
+from marey.db import transaction
 
 CLIENTS = (100, 500, 1000, 2000, 4000)
 CHANGES = 6

@@ -17,8 +17,8 @@ import psutil
 
 from benchmarks.platform import BUNDLE, Platform, marey, platform, processor_seconds
 from marey.cli.fetching import PARALLEL, Download, plan
+from marey.db import transaction
 from marey.jobs import (
-    DEFAULT_TENANT,
     AssetDigest,
     ClaimedItem,
     NewMotion,
@@ -28,9 +28,9 @@ from marey.jobs import (
     claim,
     commit_motions,
     commit_texts,
-    transaction,
 )
 from marey.storage import AssetStore, open_store
+from marey.tenants import DEFAULT_TENANT
 from tests.support.toy import QUEUE
 
 MOTIONS = 1000

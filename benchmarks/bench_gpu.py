@@ -18,12 +18,12 @@ import torch
 from benchmarks.bench_hgm3 import requests
 from benchmarks.bench_mogo import sentence, text
 from benchmarks.harness import measure, table
-from marey.hgm3.bundle import random_bundle as random_hgm3
-from marey.hgm3.generate import Generator as HGM3Generator
-from marey.mogo.bundle import random_bundle
-from marey.mogo.generate import Generator
-from marey.mogo.live import LiveRoom
-from marey.mogo.streaming import Streams
+from marey.models.hgm3.bundle import random_bundle as random_hgm3
+from marey.models.hgm3.generate import Generator as HGM3Generator
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.streaming import Streams
 
 FRAMES = 200
 SESSIONS = (1, 2, 4, 8, 16, 32, 64, 128, 256, 512)

@@ -20,9 +20,9 @@ import numpy as np
 import torch
 
 from benchmarks.harness import measure, table
-from marey.generating.port import Request
-from marey.hgm3.bundle import random_bundle
-from marey.hgm3.generate import Generator, Settings
+from marey.generation.port import Request
+from marey.models.hgm3.bundle import random_bundle
+from marey.models.hgm3.generate import Generator, Settings
 from marey.text.features import TextFeatures
 from marey.text.graph import Edge, Node, SemanticGraph
 

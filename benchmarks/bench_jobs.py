@@ -14,21 +14,12 @@ from uuid import uuid4
 import sqlalchemy as sa
 
 from benchmarks.harness import measure, table
-from marey.jobs import (
-    NewItem,
-    NewJob,
-    claim,
-    create_engine,
-    create_tenant,
-    release,
-    schema,
-    submit,
-    transaction,
-    upgrade,
-)
+from marey.db import create_engine, transaction, upgrade
+from marey.db.ids import new_id
+from marey.embedded import EmbeddedServer, start_postgres
+from marey.jobs import NewItem, NewJob, claim, release, submit, tables
 from marey.jobs.claim import LANES, LANES_TRIED, TAKE
-from marey.jobs.ids import new_id
-from marey.runtime.embedded import EmbeddedServer, start_postgres
+from marey.tenants import create_tenant
 
 PROMPTS = 10_000
 CLAIMS = 400
@@ -66,8 +57,8 @@ def _submits(engine: sa.Engine) -> None:
         """What an ORM's bulk insert would do: the same rows, SQLAlchemy's insertmanyvalues."""
         job = new_id()
         with transaction(engine) as conn:
-            conn.execute(sa.insert(schema.job).values(id=job, tenant_id="default", total=PROMPTS, ready=PROMPTS))
-            conn.execute(sa.insert(schema.item), [_row(item, job) for item in _items(PROMPTS)])
+            conn.execute(sa.insert(tables.job).values(id=job, tenant_id="default", total=PROMPTS, ready=PROMPTS))
+            conn.execute(sa.insert(tables.item), [_row(item, job) for item in _items(PROMPTS)])
 
     timings = measure(
         {f"submit() of {PROMPTS:,} prompts": by_submit, "bulk INSERT of as many rows": by_inserts},
@@ -131,7 +122,7 @@ def _filled(server: EmbeddedServer, index: int, jobs: int, items: int, tenants: 
     """A database with so many jobs of so many items, of so many tenants in turns, their texts parsed."""
     engine = _database(server, f"claims_{index}")
     with transaction(engine) as conn:
-        conn.execute(sa.insert(schema.text_features).values(key="known", blob=b""))
+        conn.execute(sa.insert(tables.text_features).values(key="known", blob=b""))
         for number in range(tenants):
             create_tenant(conn, f"tenant-{number}")
     for number in range(jobs):

@@ -25,9 +25,10 @@ import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
 from marey.cli.client import Client
-from marey.jobs import create_engine, schema
-from marey.mogo.bundle import random_bundle
-from marey.settings import REPOSITORY
+from marey.core.settings import REPOSITORY
+from marey.db import create_engine
+from marey.models.mogo.bundle import random_bundle
+from marey.streams import tables
 from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, Serving, serving, socket_of
 
@@ -101,7 +102,7 @@ def _holder(database_url: str, stream: str) -> int:
     """Process that shows a stream."""
     engine = create_engine(database_url)
     with engine.connect() as conn:
-        name = conn.scalar(sa.select(schema.stream.c.worker).where(schema.stream.c.id == stream))
+        name = conn.scalar(sa.select(tables.stream.c.worker).where(tables.stream.c.id == stream))
     engine.dispose()
     return int(str(name).rpartition("-")[2])
 

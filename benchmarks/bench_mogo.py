@@ -19,10 +19,10 @@ import psutil
 import torch
 
 from benchmarks.harness import measure, table
-from marey.mogo.bundle import random_bundle
-from marey.mogo.generate import Generator, Settings
-from marey.mogo.live import LiveRoom
-from marey.mogo.streaming import Streams
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.streaming import Streams
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph
 

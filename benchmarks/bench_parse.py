@@ -27,7 +27,7 @@ from benchmarks.bench_text import LONG
 from benchmarks.platform import marey
 from marey.cli.client import Client
 from marey.cli.place import Server, read_server
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 from tests.support.marey import REPOSITORY, Marey
 
 CLIENTS, PROMPTS, REPEATS = 45, 16, 40

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.harness import measure, table
-from marey.motion.bvh import format_bvh, parse_bvh
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import clean_feet, skate
 from marey.motion.finish import finish_motion
+from marey.motion.io.bvh import format_bvh, parse_bvh
 from marey.motion.kinematics import forward_kinematics, global_rotations
 from marey.motion.pose import measure_offsets, solve_pose
 from marey.motion.rotations import (

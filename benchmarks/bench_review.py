@@ -18,11 +18,12 @@ from pathlib import Path
 
 from benchmarks.bench_fetch import make_motions
 from benchmarks.platform import BUNDLE, Platform, marey, platform
+from marey.checks.prompts import evaluation_prompts
 from marey.cli.drawing import Drawing, draw
-from marey.jobs import DEFAULT_TENANT, AssetDigest, ClaimedItem, NewMotion, asset_key
+from marey.jobs import AssetDigest, ClaimedItem, NewMotion, asset_key
 from marey.motion.clip import MotionClip, load_npz
 from marey.storage import AssetStore
-from marey.training.checks.prompts import evaluation_prompts
+from marey.tenants import DEFAULT_TENANT
 
 PROMPTS, COPIES = 31, 10
 REPEATS, WARM_UP = 3, 1

@@ -34,9 +34,9 @@ import sqlalchemy as sa
 
 from benchmarks.platform import Platform
 from marey.cli.watching import watch_job
-from marey.errors import Unreachable
-from marey.jobs import transaction
-from marey.runtime.embedded import postgres_url, socket_folder
+from marey.core.errors import Unreachable
+from marey.db import transaction
+from marey.embedded import postgres_url, socket_folder
 from tests.chaos.places import S3
 from tests.servers.stalling_proxy import StallingProxy
 from tests.servers.swift import Swift

@@ -16,7 +16,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.platform import BUNDLE, Platform, forget_peak, marey, peak_megabytes, platform, processor_seconds
-from marey.items import MAX_BODY_BYTES, MAX_ITEMS
+from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS
 
 SIZES = {1_000: 3, 10_000: 5, 100_000: 1}
 """Prompts, and how often."""

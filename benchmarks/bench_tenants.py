@@ -14,23 +14,11 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from benchmarks.harness import measure, table
-from marey.jobs import (
-    NewItem,
-    NewJob,
-    Quotas,
-    cancel,
-    claim,
-    create_engine,
-    create_tenant,
-    release,
-    schema,
-    submit,
-    transaction,
-    upgrade,
-    usage,
-)
+from marey.db import create_engine, transaction, upgrade
+from marey.embedded import start_postgres
+from marey.jobs import NewItem, NewJob, cancel, claim, release, submit, tables
 from marey.jobs.types import NO_TEXT
-from marey.runtime.embedded import start_postgres
+from marey.tenants import Quotas, create_tenant, usage
 
 MANY, FEW = 50_000, 5
 WORKERS, BATCH = 4, 32
@@ -139,7 +127,7 @@ def _claim(engine: sa.Engine) -> None:
 
 
 def _oldest(conn: sa.Connection, tenant: str) -> UUID:
-    table_ = schema.job.c
+    table_ = tables.job.c
     return conn.execute(
         sa.select(table_.id).where(table_.tenant_id == tenant).order_by(table_.id).limit(1)
     ).scalar_one()

@@ -9,7 +9,7 @@ import psutil
 import sqlalchemy as sa
 
 from benchmarks.platform import Platform, platform, processor_seconds
-from marey.jobs import transaction
+from marey.db import transaction
 from tests.support.toy_jobs import ended, job_row, submit_toys
 
 WORKERS = (1, 2, 4, 8)

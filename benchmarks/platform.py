@@ -16,8 +16,9 @@ import psutil
 
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.jobs import create_key, transaction
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.tenants import create_key
 from tests.chaos.driver import Cluster
 from tests.servers.ports import free_ports
 from tests.support.live_api import write_bundle

@@ -27,9 +27,10 @@ from benchmarks.platform import BUNDLE, Platform, platform
 from benchmarks.trend import Trend, fit
 from marey.cli.client import Client
 from marey.cli.fetching import download_all, plan
-from marey.errors import Conflict, MareyError
-from marey.jobs import collect_garbage, transaction
+from marey.core.errors import Conflict, MareyError
+from marey.db import transaction
 from marey.storage import open_store
+from marey.takes import collect_garbage
 from tests.servers.receiver import Receiver
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "15"))

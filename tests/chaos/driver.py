@@ -15,9 +15,9 @@ import psutil
 import redis
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import create_engine, transaction, upgrade
-from marey.runtime.embedded import EmbeddedServer, start_postgres, start_valkey
+from marey.core.errors import Unreachable
+from marey.db import create_engine, transaction, upgrade
+from marey.embedded import EmbeddedServer, start_postgres, start_valkey
 from marey.runtime.queue import SOCKET_SCHEME, redis_client
 from marey.runtime.status import read_status
 from tests.servers.stalling_proxy import StallingProxy

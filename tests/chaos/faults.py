@@ -19,10 +19,11 @@ from uuid import UUID
 import httpx2
 import sqlalchemy as sa
 
-from marey.jobs import collect_garbage, transaction
-from marey.jobs.schema import item, lease
+from marey.db import transaction
+from marey.jobs.tables import item, lease
 from marey.runtime.faults import patiently
 from marey.runtime.status import read_status
+from marey.takes import collect_garbage
 from tests.chaos.driver import Cluster
 from tests.chaos.places import Place
 from tests.chaos.silence import ALL_SILENT, OPEN_SILENT, UNDER_WAY, EventProbe, stall

@@ -10,8 +10,9 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from marey.jobs import schema
+from marey.jobs import tables as job_tables
 from marey.jobs.states import RETRYABLE, TRANSITIONS, Cause, ItemState
+from marey.tenants import tables as tenant_tables
 
 OPEN = {ItemState.READY, ItemState.LEASED}
 
@@ -86,11 +87,11 @@ def refused(conn: sa.Connection) -> list[str]:
     for before, after in product(ItemState, ItemState):
         if before is after or (before, after) in TRANSITIONS:
             continue
-        found = conn.execute(sa.select(schema.item.c.id).where(schema.item.c.state == before).limit(1)).scalar()
+        found = conn.execute(sa.select(job_tables.item.c.id).where(job_tables.item.c.state == before).limit(1)).scalar()
         if found is None:
             continue
         ended = None if after in OPEN else sa.func.now()
-        change = sa.update(schema.item).where(schema.item.c.id == found).values(state=after, finished_at=ended)
+        change = sa.update(job_tables.item).where(job_tables.item.c.id == found).values(state=after, finished_at=ended)
         with conn.begin_nested() as savepoint:
             try:
                 conn.execute(change)
@@ -108,7 +109,7 @@ def _items_wrong(conn: sa.Connection) -> Iterator[str]:
     stories: dict[UUID, list[sa.Row]] = defaultdict(list)
     for row in conn.execute(sa.text("SELECT item, before, after, reason FROM ledger_item ORDER BY id")):
         stories[row.item].append(row)
-    for item, state in conn.execute(sa.select(schema.item.c.id, schema.item.c.state)):
+    for item, state in conn.execute(sa.select(job_tables.item.c.id, job_tables.item.c.state)):
         story = stories.pop(item, [])
         states = [ItemState.READY, *(ItemState(row.after) for row in story)]
         if [row.before for row in story] != states[:-1] or states[-1] != state:
@@ -141,7 +142,7 @@ def _cause(reason: str | None) -> Cause | None:
 
 
 def _quotas_wrong(conn: sa.Connection) -> Iterator[str]:
-    quotas = {row.id: row for row in conn.execute(sa.select(schema.tenant))}
+    quotas = {row.id: row for row in conn.execute(sa.select(tenant_tables.tenant))}
     for row in conn.execute(sa.text(PEAKS)):
         may = quotas[row.tenant]
         if may.max_queued is not None and row.queued > may.max_queued:
@@ -152,10 +153,10 @@ def _quotas_wrong(conn: sa.Connection) -> Iterator[str]:
 
 def _events_wrong(conn: sa.Connection) -> Iterator[str]:
     events: dict[UUID, list[sa.Row]] = defaultdict(list)
-    table = schema.job_event.c
-    for row in conn.execute(sa.select(schema.job_event).order_by(table.job_id, table.seq)):
+    table = job_tables.job_event.c
+    for row in conn.execute(sa.select(job_tables.job_event).order_by(table.job_id, table.seq)):
         events[row.job_id].append(row)
-    for job in conn.execute(sa.select(schema.job)):
+    for job in conn.execute(sa.select(job_tables.job)):
         told = events[job.id]
         if [event.seq for event in told] != list(range(1, job.event_seq + 1)):
             yield f"job {job.id}: its events have gaps"

@@ -10,10 +10,10 @@ import sys
 
 from celery.platforms import set_pdeathsig
 
+from marey.core.settings import settings
 from marey.runtime.handler import Role
 from marey.runtime.worker import worker_main
 from marey.scheduler.main import scheduler_main
-from marey.settings import settings
 
 
 def main(what: str, *arguments: str) -> int:

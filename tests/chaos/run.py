@@ -19,12 +19,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import Quotas, cancel, collect_garbage, create_key, create_tenant, transaction
-from marey.jobs.schema import item, job, lease
+from marey.core.errors import Unreachable
+from marey.db import transaction
+from marey.jobs import cancel
 from marey.jobs.states import OPEN
-from marey.jobs.types import DEFAULT_TENANT
+from marey.jobs.tables import item, job, lease
 from marey.runtime.faults import patiently
+from marey.takes import collect_garbage
+from marey.tenants import Quotas, create_key, create_tenant
+from marey.tenants.types import DEFAULT_TENANT
 from tests.chaos import ledger
 from tests.chaos.driver import Cluster
 from tests.chaos.faults import LIMIT, PATIENCE, SINCE_FAULT, Breaker, meanwhile, recoveries

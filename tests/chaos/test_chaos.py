@@ -11,9 +11,10 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.jobs import collect_garbage, transaction
-from marey.jobs.schema import item, lease
+from marey.db import transaction
+from marey.jobs.tables import item, lease
 from marey.storage.port import AssetStore
+from marey.takes import collect_garbage
 from tests.chaos.driver import Cluster
 from tests.chaos.places import S3, Folder
 from tests.servers.swift import Swift

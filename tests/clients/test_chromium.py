@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.motion.player import html_player
+from marey.viz.player import html_player
 from tests.support import chromium
 from tests.support.walker import walker
 

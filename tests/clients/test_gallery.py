@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.motion.gallery import Card, html_gallery
+from marey.viz.gallery import Card, html_gallery
 from tests.support import chromium
 from tests.support.tab import Tab, open_tab
 from tests.support.walker import walker

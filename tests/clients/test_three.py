@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.motion.bvh import write_bvh
 from marey.motion.clip import load_npz
+from marey.motion.io.bvh import write_bvh
 from tests.support.exported import CLIPS
 
 pytestmark = pytest.mark.slow

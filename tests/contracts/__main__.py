@@ -7,9 +7,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from marey.jobs import create_engine, upgrade
-from marey.runtime.embedded import start_postgres
-from marey.runtime.embedded.postgres import _postgres
+from marey.db import create_engine, upgrade
+from marey.embedded import start_postgres
+from marey.embedded.postgres import _postgres
 from tests.contracts.motions import BUNDLES, motion, processor
 from tests.contracts.story import events
 from tests.contracts.surfaces import SURFACES, database

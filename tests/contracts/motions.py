@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from marey.bundles import Bundle
-from marey.settings import Settings
+from marey.core.settings import Settings
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 BUNDLES = ("hgm3-starter", "mogo-starter")
@@ -28,7 +28,7 @@ def processor() -> str:
 def motion(name: str) -> dict[str, Any]:
     """Tokens of one motion, and the hash of its npz and BVH files."""
     from marey.cli.roles.oneshot import OneShot, Wanted
-    from marey.motion.bvh import format_bvh
+    from marey.motion.io.bvh import format_bvh
 
     torch.set_num_threads(1)
     studio = OneShot(Bundle.open(MODELS / name), Settings(device="cpu", threads=1))

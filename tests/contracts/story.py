@@ -10,34 +10,31 @@ from uuid import UUID, uuid4
 import sqlalchemy as sa
 
 from marey.api.jobs.events import message
+from marey.db import transaction
+from marey.evaluations import EvaluationState
+from marey.evaluations.repository import tell_of_evaluation
 from marey.jobs import (
-    DEFAULT_TENANT,
-    EvaluationState,
-    EventKind,
     EventRow,
     ItemFailure,
     Review,
-    StreamState,
     cancel,
     claim,
-    claim_deliveries,
-    erase,
     events_after,
     fail_items,
-    list_motions,
     pause,
     release,
-    reroll,
     resume,
     retry,
-    review,
     set_comment,
     set_fail_early,
     set_priority,
     sweep,
-    transaction,
 )
-from marey.jobs.outbox import tell_of_evaluation, tell_of_stream
+from marey.streams import StreamState
+from marey.streams.repository import tell_of_stream
+from marey.takes import erase, list_motions, reroll, review
+from marey.tenants import DEFAULT_TENANT
+from marey.webhooks import EventKind, claim_deliveries
 from marey.webhooks.message import headers_of, message_of
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
 from tests.support.webhooks import SECRET, new_webhook

@@ -17,7 +17,7 @@ from typing import Any
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
 DEFINE_ERRORS = (
-    *("marey.cli.text_files", "marey.items", "marey.jobs.errors", "marey.runtime.embedded.server"),
+    *("marey.cli.text_files", "marey.items.item", "marey.jobs.errors", "marey.embedded.server"),
     *("marey.runtime.faults", "marey.streams.redis", "marey.text.rewriters"),
 )
 """Modules that add to the tree of errors."""
@@ -37,7 +37,7 @@ def sources() -> Iterator[tuple[Path, ast.Module]]:
 def http_api() -> Any:
     """The OpenAPI document without its words."""
     from marey.api.app import create_app
-    from marey.settings import Settings
+    from marey.core.settings import Settings
 
     document = create_app(Settings()).openapi()
     return _without_words({name: document[name] for name in ("paths", "components")})
@@ -56,7 +56,7 @@ def _without_words(value: Any, *, names: bool = False) -> Any:
 
 def errors() -> Any:
     """Every error type of the product: its problem type, HTTP status and exit code."""
-    from marey import errors as tree
+    from marey.core import errors as tree
 
     for module in DEFINE_ERRORS:
         importlib.import_module(module)
@@ -119,7 +119,7 @@ def _default(value: Any) -> Any:
 
 def settings() -> Any:
     """Every environment variable with its kind and default."""
-    from marey.settings import Settings
+    from marey.core.settings import Settings
 
     found = {f"MAREY_{name.upper()}": _setting(field) for name, field in Settings.model_fields.items()}
     read = re.compile(r"\"(MAREY_[A-Z0-9_]+)\"")
@@ -139,7 +139,7 @@ def _setting(field: Any) -> Any:
 
 def metrics() -> Any:
     """Every Prometheus metric: kind, labels, buckets, and which processes show it."""
-    from marey import metrics as declared
+    from marey.core import metrics as declared
 
     found: dict[str, Any] = {}
     for part, registry in sorted(declared.PARTS.items()):
@@ -191,8 +191,9 @@ def _pattern(node: ast.expr) -> str:
 def queue() -> Any:
     """Names on Redis and in Celery: other releases and other processes use the same."""
     from marey.api import rates
-    from marey.jobs import EVENT_CHANNEL, TEXT_QUEUE
-    from marey.jobs.database import QUEUE_CHANNEL
+    from marey.db import EVENT_CHANNEL
+    from marey.db.database import QUEUE_CHANNEL
+    from marey.jobs import TEXT_QUEUE
     from marey.runtime.app import DRAIN, create_app
     from marey.streams.bell import KEY
     from marey.streams.redis import stream_key
@@ -216,12 +217,12 @@ def files() -> Any:
     """Keys of the files that the product writes."""
     from marey.bundles.manifest import BundleManifest, TextSpec
     from marey.cli.manifest import COLUMNS
+    from marey.data import manifest as prepared
     from marey.evaluator.report import Report
-    from marey.items import FIELDS
+    from marey.items.item import FIELDS
     from marey.motion.clip import KEYS
     from marey.streams.frames import HEADER, MAGIC, VERSION
     from marey.training.checkpoint import TrainingState
-    from marey.training.data import manifest as prepared
     from marey.training.parts import Part
 
     def fields(cls: Any) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from marey.runtime.embedded import EmbeddedServer
+from marey.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of
 
 

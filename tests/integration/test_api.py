@@ -16,9 +16,10 @@ import httpx2
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import NotFound
-from marey.jobs import WorkerBeat, beat, beat_scheduler, retire, transaction
-from marey.spool import IN_MEMORY
+from marey.core.errors import NotFound
+from marey.core.spool import IN_MEMORY
+from marey.db import transaction
+from marey.jobs import WorkerBeat, beat, beat_scheduler, retire
 from tests.support.live_api import BUNDLE, LiveApi, wait_until
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}

@@ -12,8 +12,8 @@ import pytest
 
 from marey.cli.client import Client
 from marey.cli.watching import watch_job
-from marey.errors import Busy
-from marey.runtime.embedded import EmbeddedServer
+from marey.core.errors import Busy
+from marey.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of, wait_until
 
 REQUESTS = 80

@@ -11,8 +11,9 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from marey.jobs import WorkerBeat, beat, retire, transaction
-from marey.runtime.embedded import EmbeddedServer
+from marey.db import transaction
+from marey.embedded import EmbeddedServer
+from marey.jobs import WorkerBeat, beat, retire
 from tests.support.evaluations import GENERATOR, JUDGE
 from tests.support.live_evaluations import Studio, studio
 

@@ -10,8 +10,8 @@ import httpx2
 import pytest
 
 from marey.api.app import create_app
-from marey.runtime.embedded import EmbeddedServer
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR, JUDGE, write_evaluator, write_generator
 from tests.support.live_api import running_api, settings_of
 

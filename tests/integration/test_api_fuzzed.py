@@ -18,9 +18,10 @@ from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import response_schema_conformance
 
 from marey.api.app import create_app
-from marey.jobs import create_key, create_tenant, transaction
-from marey.runtime.embedded import EmbeddedServer
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.embedded import EmbeddedServer
+from marey.tenants import create_key, create_tenant
 from tests.support.auth_states import Knock, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import add_mogo

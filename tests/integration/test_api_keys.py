@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 
 from marey.api.app import ROUTERS, create_app
 from marey.api.docs.routes import FILES
-from marey.settings import Settings
+from marey.core.settings import Settings
 from tests.support.auth_states import holders, invalid_knocks, lesser_knocks
 from tests.support.live_api import LiveApi
 

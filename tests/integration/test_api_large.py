@@ -14,10 +14,11 @@ from fastapi import FastAPI
 from marey.api.app import create_app
 from marey.cli.client import Client
 from marey.cli.place import Server
+from marey.core.spool import IN_MEMORY
+from marey.db import create_engine, transaction
+from marey.embedded import EmbeddedServer
 from marey.http.body_room import BodyRoom
-from marey.jobs import create_engine, create_key, transaction
-from marey.runtime.embedded import EmbeddedServer
-from marey.spool import IN_MEMORY
+from marey.tenants import create_key
 from tests.support.live_api import ApiThread, settings_of, wait_until
 from tests.support.raw_http import RawClient
 

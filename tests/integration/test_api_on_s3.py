@@ -13,11 +13,13 @@ import pytest
 from pydantic import SecretStr
 
 from marey.cli.fetching import ATTEMPTS, Download, download_all
-from marey.errors import Unreachable
-from marey.hashing import sha256_of
-from marey.jobs import DEFAULT_TENANT, asset_key, create_engine, create_key, transaction
+from marey.core.errors import Unreachable
+from marey.core.hashing import sha256_of
+from marey.db import create_engine, transaction
+from marey.jobs import asset_key
 from marey.storage import open_store
 from marey.storage.s3 import S3Store
+from marey.tenants import DEFAULT_TENANT, create_key
 from tests.support.live_api import ApiThread, LiveApi, settings_of
 
 

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
 
-from marey.runtime.embedded import EmbeddedServer
+from marey.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.raw_http import Answer, RawClient
 

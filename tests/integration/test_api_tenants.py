@@ -17,7 +17,9 @@ from fastapi.routing import APIRoute, APIWebSocketRoute
 from websockets.exceptions import ConnectionClosed
 
 from marey.api.app import ROUTERS
-from marey.jobs import (
+from marey.db import transaction
+from marey.embedded import EmbeddedServer
+from marey.tenants import (
     Quotas,
     authenticate,
     create_tenant,
@@ -25,9 +27,7 @@ from marey.jobs import (
     revoke_key,
     set_quotas,
     suspend_tenant,
-    transaction,
 )
-from marey.runtime.embedded import EmbeddedServer
 from tests.support.auth_states import ENDINGS, end_key
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR

@@ -11,9 +11,10 @@ import pytest
 import sqlalchemy as sa
 from typer.testing import _NamedTextIOWrapper
 
-from marey.errors import Unauthenticated
-from marey.jobs import authenticate, transaction
-from marey.settings import settings
+from marey.core.errors import Unauthenticated
+from marey.core.settings import settings
+from marey.db import transaction
+from marey.tenants import authenticate
 from tests.servers.jobs import submit_items
 from tests.support.command import Command
 from tests.support.marey import Ran

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from marey.cli.main import app
-from marey.runtime.embedded import EmbeddedServer
+from marey.embedded import EmbeddedServer
 from tests.support.evaluations import GENERATOR
 from tests.support.live_evaluations import Studio, studio
 from tests.support.marey import COMMAND, REPOSITORY, Ran

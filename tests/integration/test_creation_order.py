@@ -12,29 +12,15 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput
-from marey.jobs import (
-    DEFAULT_TENANT,
-    Actor,
-    EventKind,
-    NewStream,
-    audit,
-    create_engine,
-    create_key,
-    create_stream,
-    list_audit,
-    list_deliveries,
-    list_evaluations,
-    list_jobs,
-    list_keys,
-    list_motions,
-    list_schedules,
-    list_streams,
-    list_webhooks,
-    send_test,
-    transaction,
-)
-from marey.jobs import ids as ids_module
+from marey.core.errors import InvalidInput
+from marey.db import create_engine, transaction
+from marey.db import ids as ids_module
+from marey.evaluations import list_evaluations, list_schedules
+from marey.jobs import list_jobs
+from marey.streams import NewStream, create_stream, list_streams
+from marey.takes import list_motions
+from marey.tenants import DEFAULT_TENANT, Actor, audit, create_key, list_audit, list_keys
+from marey.webhooks import EventKind, list_deliveries, list_webhooks, send_test
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation
 from tests.support.schedules import new_schedule

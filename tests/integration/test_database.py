@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import Listener, create_engine, get_job, sweep, transaction, upgrade
-from marey.jobs.database import EVENT_CHANNEL
-from marey.jobs.deadlines import ORDINARY
-from marey.runtime.embedded import start_postgres
+from marey.core.errors import Unreachable
+from marey.db import Listener, create_engine, transaction, upgrade
+from marey.db.database import EVENT_CHANNEL
+from marey.db.deadlines import ORDINARY
+from marey.embedded import start_postgres
+from marey.jobs import get_job, sweep
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 

@@ -18,9 +18,9 @@ import psycopg
 import pytest
 import redis
 
-from marey.errors import Conflict, InvalidInput
-from marey.runtime import embedded
-from marey.runtime.embedded import (
+from marey import embedded
+from marey.core.errors import Conflict, InvalidInput
+from marey.embedded import (
     SOCKET_LIMIT,
     EmbeddedServer,
     StartFailed,
@@ -33,7 +33,7 @@ from marey.runtime.embedded import (
 OWNER = """
 import sys, time
 from pathlib import Path
-from marey.runtime.embedded import start_postgres, start_valkey
+from marey.embedded import start_postgres, start_valkey
 servers = [start_postgres(Path(sys.argv[1]), durable=False), start_valkey(Path(sys.argv[1]))]
 print(*(server.process.pid for server in servers), flush=True)
 time.sleep(600)

@@ -12,9 +12,9 @@ import pytest
 from pydantic import SecretStr
 
 from marey.api.text_client import MAX_ANSWER, TextService
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
+from marey.core.settings import Settings
 from marey.http.problems import problem_response
-from marey.settings import Settings
 from marey.text_service.routes import ParseBody
 
 JSON, PROBLEM = "application/json", "application/problem+json"

@@ -11,6 +11,7 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
+from marey.db import create_engine, transaction
 from marey.jobs import (
     JobState,
     Policy,
@@ -18,7 +19,6 @@ from marey.jobs import (
     beat,
     cancel,
     claim,
-    create_engine,
     fail_items,
     get_job,
     heartbeat,
@@ -31,10 +31,9 @@ from marey.jobs import (
     retire,
     set_priority,
     sweep,
-    transaction,
     waiting_batches,
 )
-from marey.jobs.lease_types import Claim, ItemFailure
+from marey.jobs.leases import Claim, ItemFailure
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

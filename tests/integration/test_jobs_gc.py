@@ -8,24 +8,12 @@ import threading
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import (
-    GarbageReport,
-    Policy,
-    asset_key,
-    begin_assets,
-    cancel,
-    collect_garbage,
-    commit_motions,
-    delete,
-    get_motion,
-    list_motions,
-    remove_stale_assets,
-    sweep,
-    transaction,
-)
-from marey.jobs.lease_types import Claim, NewMotion
+from marey.core.errors import Unreachable
+from marey.db import transaction
+from marey.jobs import Policy, asset_key, begin_assets, cancel, commit_motions, get_motion, sweep
+from marey.jobs.leases import Claim, NewMotion
 from marey.storage import AssetStore, FolderStore
+from marey.takes import GarbageReport, collect_garbage, delete, list_motions, remove_stale_assets
 from tests.servers.jobs import claim_some, let_expire, motion_of, parse_texts, submit_items
 
 HOUR_AGO = sa.text("UPDATE asset SET announced_at = now() - interval '61 minutes'")

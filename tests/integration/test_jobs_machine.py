@@ -19,7 +19,8 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from marey.errors import Conflict, NotFound, QuotaUsedUp
+from marey.core.errors import Conflict, NotFound, QuotaUsedUp
+from marey.db import transaction
 from marey.jobs import (
     Claim,
     Committed,
@@ -30,7 +31,6 @@ from marey.jobs import (
     claim,
     commit_motions,
     commit_texts,
-    delete,
     fail_items,
     heartbeat,
     pause,
@@ -39,10 +39,10 @@ from marey.jobs import (
     retry,
     set_fail_early,
     set_priority,
-    set_quotas,
     sweep,
-    transaction,
 )
+from marey.takes import delete
+from marey.tenants import set_quotas
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, let_expire, make_due, motion_of, new_item, submit_items
 from tests.support.webhooks import new_webhook

@@ -8,7 +8,9 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput, NotFound
+from marey.core.errors import Conflict, InvalidInput, NotFound
+from marey.db import transaction
+from marey.db.pages import Page
 from marey.jobs import (
     ItemFailure,
     ItemState,
@@ -16,23 +18,20 @@ from marey.jobs import (
     JobState,
     cancel,
     claim,
-    delete,
     events_after,
     fail_items,
     get_job,
     get_motion,
     list_items,
     list_jobs,
-    list_motions,
     pause,
     resume,
     retry,
     set_comment,
     set_fail_early,
     set_priority,
-    transaction,
 )
-from marey.jobs.types import Page
+from marey.takes import delete, list_motions
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, parse_texts, submit_items
 

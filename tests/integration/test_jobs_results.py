@@ -10,13 +10,14 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
+from marey.db import Listener, transaction
+from marey.db.database import EVENT_CHANNEL
 from marey.jobs import (
     Claim,
     Committed,
     ItemFailure,
     ItemState,
     JobState,
-    Listener,
     NewText,
     Stage,
     begin_assets,
@@ -29,9 +30,7 @@ from marey.jobs import (
     list_items,
     release,
     sweep,
-    transaction,
 )
-from marey.jobs.database import EVENT_CHANNEL
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     PROBLEM,

@@ -9,8 +9,9 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from marey.jobs import JobControl, schema, transaction
-from marey.jobs.ids import new_id
+from marey.db import transaction
+from marey.db.ids import new_id
+from marey.jobs import JobControl, tables
 from marey.jobs.journal import LockedJob
 from marey.jobs.states import ItemState, allowed, job_state
 from tests.servers.jobs import claim_some, parse_texts, submit_items
@@ -29,8 +30,8 @@ WAYS: dict[ItemState, list[ItemState]] = {
 def put(conn: sa.Connection, item: object, state: ItemState, lease: object) -> None:
     """Set a state and what must go with it, so that the transition alone decides."""
     conn.execute(
-        sa.update(schema.item)
-        .where(schema.item.c.id == item)
+        sa.update(tables.item)
+        .where(tables.item.c.id == item)
         .values(
             state=state,
             lease_token=lease if state is ItemState.LEASED else None,
@@ -44,7 +45,7 @@ def test_the_database_allows_the_transitions_of_the_table_and_no_other(engine: s
     parse_texts(engine)
     claimed = claim_some(engine, limit=1)
     with transaction(engine) as conn:
-        item = conn.execute(sa.select(schema.item.c.id).where(schema.item.c.state == "ready")).scalar_one()
+        item = conn.execute(sa.select(tables.item.c.id).where(tables.item.c.state == "ready")).scalar_one()
     for before, after in product(ItemState, ItemState):
         if before is after:
             continue
@@ -62,9 +63,9 @@ def test_the_database_allows_the_transitions_of_the_table_and_no_other(engine: s
 def test_an_item_cannot_begin_in_another_state_than_ready(engine: sa.Engine) -> None:
     submit_items(engine, 1)
     with engine.connect() as conn:
-        first = dict(conn.execute(sa.select(schema.item)).mappings().one())
+        first = dict(conn.execute(sa.select(tables.item)).mappings().one())
         for position, state in enumerate(ItemState, 1):
-            second = sa.insert(schema.item).values(first | {"id": new_id(), "position": position, "state": state})
+            second = sa.insert(tables.item).values(first | {"id": new_id(), "position": position, "state": state})
             with conn.begin_nested() as savepoint:
                 if state is ItemState.READY:
                     conn.execute(second)
@@ -99,10 +100,10 @@ def test_the_database_derives_the_state_of_a_job_as_the_code_does(engine: sa.Eng
         for counts, control, started in product(product((0, 2), repeat=6), JobControl, (False, True)):
             values = {str(state): count for state, count in zip(ItemState, counts, strict=True)}
             found = conn.execute(
-                sa.insert(schema.job)
+                sa.insert(tables.job)
                 .values(id=new_id(), tenant_id="default", total=sum(counts), control=control, **values)
                 .values(started_at=sa.func.now() if started else None)
-                .returning(schema.job.c.state)
+                .returning(tables.job.c.state)
             ).scalar_one()
             counters = LockedJob(uuid4(), "default", control, None, started, sum(counts), **values)
             assert found == job_state(control, counters, started=started), (values, control, started)

@@ -9,11 +9,12 @@ from collections.abc import Iterator
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
+from marey.db import Listener, transaction
+from marey.db.database import QUEUE_CHANNEL
 from marey.jobs import (
     IdempotencyMismatch,
     JobState,
-    Listener,
     NewItem,
     NewJob,
     SubmittedJob,
@@ -23,10 +24,8 @@ from marey.jobs import (
     list_jobs,
     submit,
     sweep,
-    transaction,
     waiting_batches,
 )
-from marey.jobs.database import QUEUE_CHANNEL
 from tests.servers.audit import audit
 from tests.servers.jobs import new_item, parse_texts, submit_items
 

@@ -7,25 +7,25 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import Conflict, NotFound
+from marey.core.errors import Conflict, NotFound
+from marey.db import transaction
 from marey.jobs import (
     ItemFailure,
     JobRow,
     JobState,
     cancel,
-    delete,
     events_after,
     fail_items,
     get_job,
     pause,
     resume,
     retry,
-    schema,
     set_comment,
     set_fail_early,
     set_priority,
-    transaction,
+    tables,
 )
+from marey.takes import delete
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, submit_items
 
@@ -91,8 +91,8 @@ READ = "0" * 64
 def made(engine: sa.Engine, state: JobState) -> UUID:
     """A job in a state, by the steps that lead there."""
     with transaction(engine) as conn:  # read already, by whoever asked for the same prompts before
-        read = schema.text_features.insert().values(key=READ, blob=b"toy")
-        if conn.execute(sa.select(schema.text_features.c.key)).first() is None:
+        read = tables.text_features.insert().values(key=READ, blob=b"toy")
+        if conn.execute(sa.select(tables.text_features.c.key)).first() is None:
             conn.execute(read)
     job = submit_items(engine, [new_item(n, text_key=READ) for n in range(3)])
     if state is S.QUEUED:

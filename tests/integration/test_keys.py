@@ -8,8 +8,9 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
-from marey.jobs import (
+from marey.core.errors import Conflict, InvalidInput, NotFound, Refused, Unauthenticated
+from marey.db import transaction
+from marey.tenants import (
     SCOPES,
     authenticate,
     check_key,
@@ -18,7 +19,6 @@ from marey.jobs import (
     revoke_key,
     rotate_key,
     suspend_tenant,
-    transaction,
 )
 from tests.servers.jobs import new_tenant
 

@@ -15,33 +15,27 @@ import redis
 import sqlalchemy as sa
 import torch
 
-from marey.generating.handler import GeneratorHandler
-from marey.jobs import (
-    StreamPrompt,
-    StreamState,
-    get_job,
-    list_items,
-    stream_acts,
-    stream_prompts,
-    told_prompts,
-    transaction,
-)
-from marey.jobs.states import STREAM_TRANSITIONS, ItemState
-from marey.mogo.bundle import random_bundle
-from marey.mogo.generate import Generator
-from marey.mogo.live import LiveRoom
+from marey.core.settings import Settings as Configuration
+from marey.db import transaction
+from marey.generation.handler import GeneratorHandler
+from marey.jobs import get_job, list_items
+from marey.jobs.states import ItemState
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.live import LiveRoom
 from marey.runtime.live import keeper
 from marey.runtime.live.held import Held
 from marey.runtime.live.port import LiveFrame
 from marey.runtime.queue import redis_client
-from marey.settings import Settings as Configuration
 from marey.storage import FolderStore
+from marey.streams import StreamPrompt, StreamState, stream_acts, stream_prompts, told_prompts
 from marey.streams.acts import Begun
 from marey.streams.bell import Bell
 from marey.streams.control import Control
 from marey.streams.frames import Frame
 from marey.streams.reads import ReadAs
 from marey.streams.redis import LEASE_MS
+from marey.streams.states import STREAM_TRANSITIONS
 from marey.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
 from tests.support.runtime import Loop

@@ -9,8 +9,9 @@ import sqlalchemy as sa
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 
-from marey.errors import Conflict
-from marey.jobs import check_revision, create_engine, downgrade, schema, upgrade
+from marey.core.errors import Conflict
+from marey.db import check_revision, create_engine, downgrade, upgrade
+from marey.migrations.tables import metadata
 from tests.servers.jobs import submit_items
 
 
@@ -28,7 +29,7 @@ def things_in(engine: sa.Engine) -> dict[str, list[str]]:
 def test_the_migrated_database_is_the_one_in_the_code(engine: sa.Engine) -> None:
     with engine.begin() as conn:
         context = MigrationContext.configure(conn, opts={"compare_server_default": True, "compare_type": True})
-        assert compare_metadata(context, schema.metadata) == []
+        assert compare_metadata(context, metadata) == []
 
 
 def test_checks_and_generated_columns_are_those_in_the_code(engine: sa.Engine) -> None:
@@ -43,7 +44,7 @@ def test_checks_and_generated_columns_are_those_in_the_code(engine: sa.Engine) -
         migrated = [tuple(row) for row in conn.execute(query) if "alembic" not in row[0]]
         conn.execute(sa.text("CREATE SCHEMA code"))
         conn.execute(sa.text("SET LOCAL search_path = code"))
-        schema.metadata.create_all(conn)
+        metadata.create_all(conn)
         coded = [tuple(row) for row in conn.execute(query)]
     assert coded == migrated
     assert len(coded) > 60

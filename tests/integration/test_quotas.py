@@ -9,40 +9,39 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Busy, Conflict, InvalidInput, NotFound, QuotaUsedUp
+from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, QuotaUsedUp
+from marey.db import transaction
 from marey.jobs import (
     Claim,
     NewItem,
     NewJob,
-    NewStream,
     Policy,
-    Quotas,
     begin_assets,
     cancel,
-    check_room,
     claim,
     commit_motions,
-    create_key,
-    create_stream,
-    create_tenant,
-    end_stream,
     get_job,
-    get_tenant,
     list_jobs,
-    list_motions,
-    list_tenants,
-    open_streams,
-    reinstate_tenant,
     release,
     retry,
-    set_quotas,
     submit,
-    suspend_tenant,
-    transaction,
-    usage,
     waiting_batches,
 )
-from marey.jobs.quotas import EXPECTED_BYTES
+from marey.streams import NewStream, create_stream, end_stream, open_streams
+from marey.takes import list_motions
+from marey.tenants import (
+    Quotas,
+    check_room,
+    create_key,
+    create_tenant,
+    get_tenant,
+    list_tenants,
+    reinstate_tenant,
+    set_quotas,
+    suspend_tenant,
+    usage,
+)
+from marey.tenants.quotas import EXPECTED_BYTES
 from tests.servers.audit import audit
 from tests.servers.jobs import (
     claim_some,

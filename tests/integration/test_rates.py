@@ -14,11 +14,12 @@ from marey.api import rates
 from marey.api.rates import Rates
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.errors import Busy
-from marey.jobs import ApiKey, create_key, transaction
-from marey.runtime.embedded import start_valkey
+from marey.core.errors import Busy
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
+from marey.tenants import ApiKey, create_key
 from tests.support.live_api import ApiThread, settings_of
 
 LIMITS = {"read": "3/day", "submit": "2/day"}

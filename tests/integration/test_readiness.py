@@ -14,9 +14,9 @@ from websockets.sync.client import connect
 
 from marey.api import readiness
 from marey.api.readiness import Check, Readiness
-from marey.errors import Unreachable
-from marey.runtime.embedded import EmbeddedServer
-from marey.settings import Settings
+from marey.core.errors import Unreachable
+from marey.core.settings import Settings
+from marey.embedded import EmbeddedServer
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of, wait_until
 

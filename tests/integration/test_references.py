@@ -8,21 +8,14 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput, NotFound
-from marey.jobs import (
-    DEFAULT_TENANT,
-    EventKind,
-    NewStream,
-    ReferenceKind,
-    create_key,
-    create_stream,
-    list_motions,
-    resolve_reference,
-    schema,
-    send_test,
-    transaction,
-)
-from marey.jobs import references as references_module
+from marey.core.errors import InvalidInput, NotFound
+from marey.db import transaction
+from marey.jobs import tables
+from marey.streams import NewStream, create_stream
+from marey.takes import ReferenceKind, list_motions, resolve_reference
+from marey.takes import references as references_module
+from marey.tenants import DEFAULT_TENANT, create_key
+from marey.webhooks import EventKind, send_test
 from tests.servers.jobs import claim_some, commit_all, new_item, new_tenant, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation
 from tests.support.schedules import new_schedule
@@ -40,7 +33,7 @@ def found(
 
 def renamed(engine: sa.Engine, job: UUID, identifier: UUID) -> UUID:
     with transaction(engine) as conn:
-        conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(id=identifier))
+        conn.execute(sa.update(tables.job).where(tables.job.c.id == job).values(id=identifier))
     return identifier
 
 
@@ -120,8 +113,8 @@ def test_two_ids_that_end_alike_are_told_apart_by_more_digits(engine: sa.Engine)
 def _empty(engine: sa.Engine) -> UUID:
     """A job without items, whose id nothing refers to."""
     with transaction(engine) as conn:
-        new = sa.insert(schema.job).values(id=sa.func.gen_random_uuid(), tenant_id=DEFAULT_TENANT)
-        return conn.execute(new.returning(schema.job.c.id)).scalar_one()
+        new = sa.insert(tables.job).values(id=sa.func.gen_random_uuid(), tenant_id=DEFAULT_TENANT)
+        return conn.execute(new.returning(tables.job.c.id)).scalar_one()
 
 
 def test_a_motion_is_found_by_its_place_in_a_job_however_the_job_is_named(engine: sa.Engine) -> None:

@@ -10,14 +10,16 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import Policy, cancel, collect_garbage, sweep, transaction
-from marey.jobs.schema import item, motion
-from marey.jobs.types import DEFAULT_TENANT
+from marey.core.errors import Unreachable
+from marey.db import transaction
+from marey.jobs import Policy, cancel, sweep
+from marey.jobs.tables import item, motion
 from marey.runtime import committer as committer_module
 from marey.runtime import loop as loop_module
 from marey.runtime.handler import Batch, BatchControl, Outcome
 from marey.storage import FolderStore, NewObject
+from marey.takes import collect_garbage
+from marey.tenants.types import DEFAULT_TENANT
 from tests.support.runtime import Loop
 from tests.support.toy import FITS, ToyHandler
 from tests.support.toy_jobs import TEXT_KEY, audit, ended, job_row, states, submit_toys

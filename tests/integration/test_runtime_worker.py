@@ -10,14 +10,15 @@ import pytest
 import sqlalchemy as sa
 from pydantic import SecretStr
 
-from marey.errors import InvalidInput, Unreachable
-from marey.jobs import list_workers, live_workers, transaction
-from marey.jobs.schema import item, lease
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.jobs import list_workers, live_workers
+from marey.jobs.tables import item, lease
 from marey.runtime.child import import_handler
 from marey.runtime.handler import Role
 from marey.runtime.status import read_status
 from marey.runtime.worker import wait_for_database, worker_main
-from marey.settings import Settings
 from tests.chaos.driver import Cluster
 from tests.support.toy import QUEUE, REFERENCE, ToyHandler
 from tests.support.toy_jobs import BUNDLE, ended, job_row, submit_toys

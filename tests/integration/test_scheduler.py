@@ -16,9 +16,10 @@ import redis
 import sqlalchemy as sa
 from pydantic import SecretStr
 
-from marey.errors import InvalidInput, Unreachable
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings
+from marey.db import QUEUE_CHANNEL, transaction
 from marey.jobs import (
-    QUEUE_CHANNEL,
     SchedulerRow,
     WorkerBeat,
     beat,
@@ -29,16 +30,14 @@ from marey.jobs import (
     live_workers,
     pause,
     retire,
-    transaction,
 )
-from marey.jobs.types import DEFAULT_TENANT
 from marey.runtime.app import DRAIN, create_app
 from marey.runtime.queue import redis_client
 from marey.scheduler.main import scheduler_main
 from marey.scheduler.parts import EXIT_STALLED, note_progress, watch
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
-from marey.settings import Settings
+from marey.tenants.types import DEFAULT_TENANT
 from tests.support.toy import QUEUE
 from tests.support.toy_jobs import job_row, submit_toys
 
@@ -346,7 +345,7 @@ def test_scheduler_returns_lost_leases_and_stops_when_told(
 def run_alone(chosen: Settings, seconds: float, before: str = "pass") -> subprocess.Popen[str]:
     """A scheduler process that exits when a part makes no progress for `seconds`; `before`: what is run in it first."""
     code = (
-        "import marey.scheduler.main as main, marey.scheduler.parts as parts, marey.settings as settings; "
+        "import marey.scheduler.main as main, marey.scheduler.parts as parts, marey.core.settings as settings; "
         f"parts.LOOK_SECONDS = {seconds / 4}; parts.STALL_SECONDS = {seconds}; main.BEAT_SECONDS = 0.2; "
         f"import sys, time; {before}; sys.exit(main.scheduler_main(settings.settings()))"
     )

@@ -15,10 +15,10 @@ from urllib.parse import urlsplit
 import pytest
 import urllib3
 
-from marey.disposition import attachment
-from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.core.disposition import attachment
+from marey.core.errors import InvalidInput, NotFound, Unreachable
+from marey.core.settings import Settings
 from marey.jobs import asset_key
-from marey.settings import Settings
 from marey.storage import AssetStore, FolderStore, NewObject, deadlines, open_store
 from marey.storage.s3 import S3Store
 from tests.servers.swift import Swift

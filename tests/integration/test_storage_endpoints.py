@@ -10,11 +10,11 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from marey.errors import InvalidInput, Unreachable
-from marey.settings import Settings
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings
+from marey.core.tls import trusting_context
 from marey.storage import open_store
 from marey.storage.s3 import S3Options, S3Store
-from marey.tls import trusting_context
 from tests.servers.receiver import Authority
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.servers.tls_front import TlsFront

@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from marey.runtime.embedded import EmbeddedServer
+from marey.embedded import EmbeddedServer
 from tests.servers.ports import free_ports
 from tests.support.live_api import ApiThread, settings_of
 

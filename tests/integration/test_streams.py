@@ -14,8 +14,8 @@ import redis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from marey.errors import Conflict, InvalidInput, Unreachable
-from marey.runtime.embedded import start_valkey
+from marey.core.errors import Conflict, InvalidInput, Unreachable
+from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
 from marey.streams.bell import Bell
 from marey.streams.control import START, Control, ControlQueue

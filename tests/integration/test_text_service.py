@@ -10,9 +10,10 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from marey.jobs import create_engine, create_key, transaction
-from marey.runtime.embedded import EmbeddedServer
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.db import create_engine, transaction
+from marey.embedded import EmbeddedServer
+from marey.tenants import create_key
 from marey.text_service import routes
 from marey.text_service.routes import GraphsView, ParseBody
 from marey.text_service.server import create_text_app

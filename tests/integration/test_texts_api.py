@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from marey.bundles import BundleWriter, TextSpec
-from marey.jobs import create_engine, create_key, transaction
-from marey.runtime.embedded import EmbeddedServer
-from marey.settings import settings
+from marey.core.settings import settings
+from marey.db import create_engine, transaction
+from marey.embedded import EmbeddedServer
+from marey.tenants import create_key
 from marey.text_service.routes import pipeline_of
 from tests.support.live_api import ApiThread, settings_of, with_text_service
 

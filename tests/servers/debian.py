@@ -14,7 +14,7 @@ from pathlib import Path
 import psycopg
 import redis
 
-from marey.versions import POSTGRES
+from marey.core.versions import POSTGRES
 from tests.servers.ports import free_ports
 
 POSTGRES_PROGRAMS = Path(f"/usr/lib/postgresql/{POSTGRES}/bin")

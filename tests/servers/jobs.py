@@ -8,6 +8,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
+from marey.db import transaction
 from marey.jobs import (
     AssetDigest,
     Claim,
@@ -16,15 +17,13 @@ from marey.jobs import (
     NewMotion,
     NewText,
     Problem,
-    Quotas,
     begin_assets,
     claim,
     commit_motions,
     commit_texts,
-    create_tenant,
     submit,
-    transaction,
 )
+from marey.tenants import Quotas, create_tenant
 
 MODEL = "hgm3"
 PROBLEM = Problem("test", "it does not work", hint="Try another.")

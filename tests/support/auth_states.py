@@ -9,8 +9,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import authenticate, create_key, create_tenant, revoke_key, schema, suspend_tenant, transaction
-from marey.jobs.keys import SCOPES
+from marey.db import transaction
+from marey.tenants import authenticate, create_key, create_tenant, revoke_key, suspend_tenant, tables
+from marey.tenants.keys import SCOPES
 
 ENDINGS = ("revoked", "expired", "suspended")
 HOLDERS = {scope: {scope} if scope == "metrics" else {scope, "admin"} for scope in SCOPES}
@@ -49,7 +50,7 @@ def end_key(conn: sa.Connection, ending: str, tenant: str, key: UUID) -> None:
     elif ending == "suspended":
         suspend_tenant(conn, tenant)
     else:
-        conn.execute(sa.update(schema.api_key).where(schema.api_key.c.id == key).values(expires_at=sa.func.now()))
+        conn.execute(sa.update(tables.api_key).where(tables.api_key.c.id == key).values(expires_at=sa.func.now()))
 
 
 def invalid_knocks(engine: sa.Engine) -> list[Knock]:

@@ -17,19 +17,19 @@ import torch
 
 from marey.evaluator.config import TINY as TINY_EVALUATOR
 from marey.evaluator.train import train_stage as train_evaluator
-from marey.generating.port import NoControl, Request
-from marey.hgm3.bundle import random_bundle as random_hgm3
-from marey.hgm3.config import TINY as TINY_HGM3
-from marey.hgm3.generate import Generator as HGM3Generator
-from marey.hgm3.train import train_stage as train_hgm3
-from marey.mogo.bundle import random_bundle as random_mogo
-from marey.mogo.config import TINY, DepthConfig, MOGOConfig
-from marey.mogo.generate import Generator
-from marey.mogo.live import LiveRoom
-from marey.mogo.model import RQHCTransformer
-from marey.mogo.packed_model import PackedModel
-from marey.mogo.streaming import Streams
-from marey.mogo.train import train_stage as train_mogo
+from marey.generation.port import NoControl, Request
+from marey.models.hgm3.bundle import random_bundle as random_hgm3
+from marey.models.hgm3.config import TINY as TINY_HGM3
+from marey.models.hgm3.generate import Generator as HGM3Generator
+from marey.models.hgm3.train import train_stage as train_hgm3
+from marey.models.mogo.bundle import random_bundle as random_mogo
+from marey.models.mogo.config import TINY, DepthConfig, MOGOConfig
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.model import RQHCTransformer
+from marey.models.mogo.packed_model import PackedModel
+from marey.models.mogo.streaming import Streams
+from marey.models.mogo.train import train_stage as train_mogo
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.card import CARD, card, waits

@@ -15,12 +15,9 @@ import numpy as np
 import sqlalchemy as sa
 
 from marey.bundles import BundleWriter, TextSpec
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.jobs import (
-    DEFAULT_TENANT,
-    EVALUATOR_QUEUE,
-    TEXT_QUEUE,
-    ClaimedItem,
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import (
     EvaluationRequest,
     EvaluationRow,
     EvaluationState,
@@ -29,15 +26,15 @@ from marey.jobs import (
     create_evaluation,
     evaluation_events,
     get_evaluation,
-    schema,
     store_prompts,
-    transaction,
 )
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, ClaimedItem, tables
 from marey.measures.scores import SCHEMA, VERSION, MotionScore
 from marey.runtime.handler import Batch, BatchControl, ExportedFile, Outcome, Scored, TextDone
 from marey.runtime.scoring import ScoreInput
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
+from marey.tenants import DEFAULT_TENANT
 from tests.support import toy
 from tests.support.runtime import Loop
 
@@ -257,7 +254,7 @@ def history(engine: sa.Engine, evaluation: UUID) -> list[str]:
 def jobs_there(engine: sa.Engine) -> int:
     """How many jobs there are."""
     with transaction(engine) as conn:
-        return conn.execute(sa.select(sa.func.count()).select_from(schema.job)).scalar_one()
+        return conn.execute(sa.select(sa.func.count()).select_from(tables.job)).scalar_one()
 
 
 def at_once(*actions: Callable[[], None]) -> None:

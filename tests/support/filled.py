@@ -8,49 +8,40 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
+from marey.db import transaction
+from marey.evaluations import EvaluationState, lock_evaluation, move_evaluation
+from marey.evaluations import tables as evaluation_tables
 from marey.jobs import (
-    DEFAULT_TENANT,
-    Actor,
     AssetDigest,
-    Attempt,
-    EvaluationState,
-    EventKind,
     ItemFailure,
     NewJob,
-    NewStream,
     Policy,
-    Quotas,
     Review,
-    StreamChunk,
-    StreamState,
     WorkerBeat,
-    add_chunk,
-    audit,
     beat,
     begin_assets,
     cancel,
-    claim_deliveries,
-    create_key,
-    create_stream,
-    create_tenant,
-    end_stream,
-    erase,
     fail_items,
     get_job,
     list_items,
-    lock_evaluation,
-    move_evaluation,
     pause,
-    record_attempt,
-    reroll,
-    review,
-    rotate_key,
-    schema,
     submit,
     sweep,
-    take_stream,
-    transaction,
 )
+from marey.jobs import tables as job_tables
+from marey.migrations.tables import metadata
+from marey.streams import (
+    NewStream,
+    StreamChunk,
+    StreamState,
+    add_chunk,
+    create_stream,
+    end_stream,
+    take_stream,
+)
+from marey.takes import erase, reroll, review
+from marey.tenants import DEFAULT_TENANT, Actor, Quotas, audit, create_key, create_tenant, rotate_key
+from marey.webhooks import Attempt, EventKind, claim_deliveries, record_attempt
 from tests.servers.jobs import MODEL, PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation
 from tests.support.schedules import new_schedule
@@ -187,13 +178,15 @@ def _evaluations(engine: sa.Engine) -> None:
         for state in way:
             _move(engine, evaluation, state)
     evaluation = new_evaluation(engine)
-    table = schema.evaluation
+    table = evaluation_tables.evaluation
     with transaction(engine) as conn:
         conn.execute(
             sa.update(table).where(table.c.id == evaluation).values(schedule_id=schedule, due_at=sa.func.now())
         )
         key = {"tenant_id": DEFAULT_TENANT, "key": "evaluated once", "body_sha256": "1" * 64}
-        conn.execute(sa.insert(schema.idempotency).values(**key, evaluation_id=evaluation, created_at=sa.func.now()))
+        conn.execute(
+            sa.insert(job_tables.idempotency).values(**key, evaluation_id=evaluation, created_at=sa.func.now())
+        )
 
 
 def _move(engine: sa.Engine, evaluation: UUID, state: EvaluationState) -> None:
@@ -210,9 +203,9 @@ def _move(engine: sa.Engine, evaluation: UUID, state: EvaluationState) -> None:
             values["generate_job_id" if generating else "score_job_id"] = submit(conn, NewJob([item], metered=False)).id
         move_evaluation(conn, row, state, "told", **values)
         if state is EvaluationState.DONE:
-            asset = conn.execute(sa.select(schema.asset.c.id).limit(1)).scalar_one()
+            asset = conn.execute(sa.select(job_tables.asset.c.id).limit(1)).scalar_one()
             report = {"evaluation_id": evaluation, "format": "json", "asset_id": asset}
-            conn.execute(sa.insert(schema.evaluation_report).values(**report))
+            conn.execute(sa.insert(evaluation_tables.evaluation_report).values(**report))
 
 
 def _score(engine: sa.Engine) -> None:
@@ -227,7 +220,7 @@ def _deliveries(engine: sa.Engine) -> None:
         due = claim_deliveries(conn, 3, each=3)
         record_attempt(conn, due[0], Attempt(200, 0.1, None))
         record_attempt(conn, due[1], Attempt(500, 0.1, "it is broken"))
-        table = schema.metadata.tables["webhook_delivery"]
+        table = metadata.tables["webhook_delivery"]
         conn.execute(
             sa.update(table).where(table.c.claim == due[2].claim, table.c.event_id == due[2].event).values(attempts=99)
         )

@@ -23,8 +23,9 @@ from marey.api.app import create_app, protocol_options
 from marey.bundles import BundleWriter, TextSpec
 from marey.cli.client import Client
 from marey.cli.place import Server
+from marey.core.settings import Settings
+from marey.db import create_engine, transaction
 from marey.jobs import (
-    DEFAULT_TENANT,
     AssetDigest,
     ItemFailure,
     NewMotion,
@@ -35,13 +36,10 @@ from marey.jobs import (
     claim,
     commit_motions,
     commit_texts,
-    create_engine,
-    create_key,
     fail_items,
-    transaction,
 )
-from marey.settings import Settings
 from marey.storage import AssetStore, open_store
+from marey.tenants import DEFAULT_TENANT, create_key
 from marey.text_service.server import create_text_app
 from tests.servers.ports import free_ports
 from tests.servers.receiver import LOOPBACK

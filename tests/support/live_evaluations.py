@@ -11,9 +11,12 @@ from uuid import UUID
 import httpx2
 import sqlalchemy as sa
 
-from marey.jobs import create_key, schema, transaction
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import tables as evaluation_tables
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
+from marey.tenants import create_key
+from marey.tenants import tables as tenant_tables
 from tests.support.evaluations import ToyEvaluator, ToyTexts, write_evaluator, write_generator
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.runtime import Loop
@@ -41,9 +44,11 @@ class Studio:
     def key(self, *scopes: str, tenant: str = "default") -> str:
         """A key with these scopes."""
         with transaction(self.api.engine) as conn:
-            known = conn.execute(sa.select(schema.tenant.c.id).where(schema.tenant.c.id == tenant)).one_or_none()
+            known = conn.execute(
+                sa.select(tenant_tables.tenant.c.id).where(tenant_tables.tenant.c.id == tenant)
+            ).one_or_none()
             if known is None:
-                conn.execute(sa.insert(schema.tenant).values(id=tenant))
+                conn.execute(sa.insert(tenant_tables.tenant).values(id=tenant))
             return create_key(conn, tenant, scopes, tenant=tenant).secret
 
     def http(self, *scopes: str, tenant: str = "default") -> httpx2.Client:
@@ -54,7 +59,7 @@ class Studio:
     def make_due(self, schedule: str) -> None:
         """As if a schedule's time had come."""
         with transaction(self.api.engine) as conn:
-            table = schema.schedule
+            table = evaluation_tables.schedule
             due = sa.update(table).where(table.c.id == UUID(schedule)).values(next_at=sa.text("now()"))
             conn.execute(due)
 

@@ -14,23 +14,18 @@ import numpy as np
 import redis
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput
-from marey.jobs import (
-    NewStream,
-    StreamRow,
-    WorkerBeat,
-    create_key,
-    create_stream,
-    get_stream,
-    transaction,
-)
+from marey.core.errors import InvalidInput
+from marey.db import transaction
+from marey.jobs import WorkerBeat
 from marey.runtime.live.keeper import QUEUE, Keeper
 from marey.runtime.live.loop import LiveLoop
 from marey.runtime.live.port import Parse, Room
+from marey.streams import NewStream, StreamRow, create_stream, get_stream
 from marey.streams.control import Control, ControlQueue
 from marey.streams.frames import Frame, decode_frame
 from marey.streams.redis import FrameStream, Gap
 from marey.streams.watch import Watch
+from marey.tenants import create_key
 from marey.text.features import TextFeatures
 from tests.support.prepared import text_features
 

@@ -17,10 +17,11 @@ import sqlalchemy as sa
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from marey.errors import InvalidInput
-from marey.jobs import StreamChunk, StreamState, add_chunk, end_stream, take_stream, transaction
-from marey.mogo.bundle import random_bundle
-from marey.settings import REPOSITORY, Settings
+from marey.core.errors import InvalidInput
+from marey.core.settings import REPOSITORY, Settings
+from marey.db import transaction
+from marey.models.mogo.bundle import random_bundle
+from marey.streams import StreamChunk, StreamState, add_chunk, end_stream, take_stream
 from marey.streams.control import START, Control, ControlQueue
 from marey.streams.frames import Frame, encode_frame
 from marey.streams.reads import ReadAs

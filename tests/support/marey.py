@@ -158,8 +158,8 @@ def serving(marey: Marey) -> Iterator[Serving]:
 
 def tiny_models(folder: Path) -> Path:
     """A folder of models: HGM³ and MOGO with random weights, and the labeller that comes with the product."""
-    from marey.hgm3 import bundle as hgm3
-    from marey.mogo import bundle as mogo
+    from marey.models.hgm3 import bundle as hgm3
+    from marey.models.mogo import bundle as mogo
 
     hgm3.random_bundle(folder / TINY)
     mogo.random_bundle(folder / TINY_MOGO)

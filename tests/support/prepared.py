@@ -10,15 +10,15 @@ import numpy as np
 import torch
 
 from marey.bundles import TextSpec
-from marey.hashing import sha256_of
+from marey.core.hashing import sha256_of
+from marey.data import manifest as names
+from marey.data.manifest import Clip, FileEntry, Manifest, Measured
+from marey.data.pack import split_root
 from marey.motion.features import HUMANML3D_263
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.skeleton import HUMANML3D
 from marey.text.features import TextFeatures
 from marey.text.graph import Edge, Node, SemanticGraph
-from marey.training.data import manifest as names
-from marey.training.data.manifest import Clip, FileEntry, Manifest, Measured
-from marey.training.data.pack import split_root
 from marey.training.texts import CaptionTexts
 
 WIDTH = 384

@@ -10,7 +10,7 @@ from marey.cli.client import Client
 from marey.cli.fetching import Download, download_all
 from marey.cli.live.link import Link
 from marey.cli.place import Server
-from marey.hashing import sha256_of
+from marey.core.hashing import sha256_of
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import Hand
 

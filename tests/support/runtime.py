@@ -8,8 +8,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
+from marey.db import transaction
 from marey.jobs import Heartbeat as Answer
-from marey.jobs import Policy, heartbeat, transaction
+from marey.jobs import Policy, heartbeat
 from marey.runtime.committer import Committer
 from marey.runtime.handler import Handler
 from marey.runtime.lease import Heartbeat

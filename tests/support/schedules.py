@@ -8,8 +8,8 @@ from zoneinfo import ZoneInfo
 
 import sqlalchemy as sa
 
-from marey.jobs import (
-    DEFAULT_TENANT,
+from marey.db import transaction
+from marey.evaluations import (
     EvaluationRequest,
     EvaluationRow,
     NewSchedule,
@@ -20,11 +20,11 @@ from marey.jobs import (
     create_schedule,
     get_schedule,
     list_evaluations,
-    schema,
     store_prompts,
-    transaction,
+    tables,
 )
-from marey.jobs.cron import next_time
+from marey.evaluations.cron import next_time
+from marey.tenants import DEFAULT_TENANT
 from tests.support.evaluations import GENERATOR, PROMPTS
 
 BERLIN = "Europe/Berlin"
@@ -68,7 +68,7 @@ def time_passes(engine: sa.Engine, schedule: UUID, *, missed: int = 0) -> dateti
         times.append(next_time(row.cron, row.time_zone, times[-1]))
     due = times[-2 - missed]
     with transaction(engine) as conn:
-        table = schema.schedule
+        table = tables.schedule
         conn.execute(sa.update(table).where(table.c.id == schedule).values(next_at=due))
     return due
 

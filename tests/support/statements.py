@@ -16,30 +16,20 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import event
 
-from marey.jobs import (
-    DEFAULT_TENANT,
-    ItemFailure,
+from marey.db import create_engine, transaction, upgrade
+from marey.embedded import start_postgres
+from marey.jobs import ItemFailure, WorkerBeat, beat, fail_items, heartbeat, leased_items, release, retire
+from marey.streams import (
     NewStream,
     StreamChunk,
     StreamState,
-    WorkerBeat,
     add_chunk,
-    beat,
-    create_engine,
-    create_key,
     create_stream,
     end_stream,
-    fail_items,
-    heartbeat,
-    leased_items,
     open_streams,
-    release,
-    retire,
     take_stream,
-    transaction,
-    upgrade,
 )
-from marey.runtime.embedded import start_postgres
+from marey.tenants import DEFAULT_TENANT, create_key
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, new_item, parse_texts, submit_items
 from tests.support.marey import REPOSITORY
 

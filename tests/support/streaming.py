@@ -15,7 +15,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 from marey.cli.main import app
-from marey.motion.bvh import read_bvh
+from marey.motion.io.bvh import read_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.skeleton import HUMANML3D
 from tests.support.marey import COMMAND, REPOSITORY, Ran

@@ -9,8 +9,9 @@ from typing import Any
 import httpx2
 import sqlalchemy as sa
 
-from marey.jobs import create_key, transaction
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.tenants import create_key
 from tests.support.live_api import LiveApi, settings_of
 from tests.support.live_streams import PATIENCE, watching
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 
-from marey.errors import InvalidInput, NotFound, Unreachable
+from marey.core.errors import InvalidInput, NotFound, Unreachable
 from marey.jobs import ClaimedItem
 from marey.runtime.handler import Batch, BatchControl, Done, Export, ExportedFile, Failed, Outcome, TextDone
 

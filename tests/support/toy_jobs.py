@@ -9,11 +9,14 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import EVALUATOR_QUEUE, NewItem, NewJob, asset_key, get_job, submit, transaction
-from marey.jobs.schema import asset, evaluation_report, item, job_event, lease, motion, motion_file, text_features
+from marey.db import transaction
+from marey.evaluations.tables import evaluation_report
+from marey.jobs import EVALUATOR_QUEUE, NewItem, NewJob, asset_key, get_job, submit
 from marey.jobs.states import ENDED
-from marey.jobs.types import DEFAULT_TENANT, JobRow
+from marey.jobs.tables import asset, item, job_event, lease, motion, motion_file, text_features
+from marey.jobs.types import JobRow
 from marey.storage import AssetStore
+from marey.tenants.types import DEFAULT_TENANT
 from tests.support.toy import QUEUE
 
 TEXT_KEY = hashlib.sha256(b"toy").hexdigest()

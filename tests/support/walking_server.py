@@ -22,10 +22,10 @@ from starlette.websockets import WebSocketDisconnect
 
 from marey.api.catalogue import Catalogue
 from marey.api.live.routes import router
-from marey.disposition import attachment
+from marey.core.disposition import attachment
+from marey.core.settings import Settings
 from marey.motion.clip import MotionClip
 from marey.motion.skeleton import HUMANML3D, Skeleton
-from marey.settings import Settings
 from marey.streams.frames import Frame, encode_frame
 from tests.support.walker import walker
 

@@ -10,15 +10,15 @@ import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from pydantic import SecretStr
 
-from marey.jobs import (
-    DEFAULT_TENANT,
+from marey.db import transaction
+from marey.tenants import DEFAULT_TENANT
+from marey.webhooks import (
     DeliveryRow,
     EventKind,
     NewWebhook,
     create_webhook,
     delivery_attempts,
     list_deliveries,
-    transaction,
 )
 from marey.webhooks.vault import Vault, new_signing_secret
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.characters import (
+from marey.core.characters import (
     FORBIDDEN,
     LINES,
     STORED,
@@ -19,7 +19,7 @@ from marey.characters import (
     find_forbidden,
     normalize_newlines,
 )
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 REFUSED = [*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0xD800, 0xDBFF, 0xDFFF]
 TEXT = st.text(st.characters(), max_size=60)  # with surrogates

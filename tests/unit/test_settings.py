@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from marey.errors import InvalidInput
-from marey.settings import Settings, settings
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings, settings
 
 
 @pytest.fixture(autouse=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pydantic import SecretStr
 
+from marey.core.settings import BY_FILE, Settings
 from marey.runtime.child import NAME_VARIABLE, ROLE_VARIABLE
-from marey.settings import BY_FILE, Settings
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = (REPOSITORY / "docs" / "settings.md").read_text(encoding="utf-8")

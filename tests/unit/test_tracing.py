@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from marey import tracing
-from marey.errors import InvalidInput
-from marey.tracing import ENDPOINTS
+from marey.core import tracing
+from marey.core.errors import InvalidInput
+from marey.core.tracing import ENDPOINTS
 
 TRACE, SPAN = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"
 CONTEXT = f"00-{TRACE}-{SPAN}-01"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from marey.errors import Conflict
-from marey.versions import check_postgres, check_redis
+from marey.core.errors import Conflict
+from marey.core.versions import check_postgres, check_redis
 
 
 @pytest.mark.parametrize("number", [150_000, 150_020, 180_004])

@@ -1,8 +1,8 @@
-"""Alembic's environment: runs on the connection that `marey.jobs.migrate` hands over."""
+"""Alembic's environment: runs on the connection that `marey.db.migrate` hands over."""
 
 from alembic import context
 
-from marey.jobs.schema import metadata
+from marey.migrations.tables import metadata
 
 context.configure(
     connection=context.config.attributes["connection"],

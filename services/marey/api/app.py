@@ -14,7 +14,6 @@ import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import APIRoute
 
-from marey.addresses import Allowed
 from marey.api.catalogue import Catalogue
 from marey.api.context import CONNECTIONS, Context
 from marey.api.docs.routes import router as docs_router
@@ -43,7 +42,10 @@ from marey.api.tailer import Tailer
 from marey.api.text_client import TextService
 from marey.api.texts.routes import router as texts_router
 from marey.api.webhooks.routes import router as webhooks_router
-from marey.errors import InvalidInput
+from marey.core.addresses import Allowed
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings, settings
+from marey.db import check_listening, create_engine
 from marey.http import problems
 from marey.http.bodies import BodyGuard, Patience
 from marey.http.connections import connection_options
@@ -52,9 +54,7 @@ from marey.http.origins import OriginGuard
 from marey.http.process import prepare_process
 from marey.http.queries import known_query
 from marey.http.traces import Trace
-from marey.jobs import check_listening, create_engine
 from marey.runtime.systemd import notified
-from marey.settings import Settings, settings
 from marey.storage import open_store
 from marey.webhooks.vault import Vault
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sqlalchemy as sa
 
-from marey import jobs
+from marey import tenants
 
 
-def note(conn: sa.Connection, key: jobs.ApiKey, verb: str, target: object, **data: object) -> None:
-    """Note that this key did something; see `marey.jobs.audit`."""
-    jobs.audit(conn, key.tenant, jobs.Actor(key.name, key.id), verb, target, **data)
+def note(conn: sa.Connection, key: tenants.ApiKey, verb: str, target: object, **data: object) -> None:
+    """Note that this key did something; see `marey.tenants.audit`."""
+    tenants.audit(conn, key.tenant, tenants.Actor(key.name, key.id), verb, target, **data)

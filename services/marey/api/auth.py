@@ -10,9 +10,10 @@ from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer, SecurityS
 from starlette.requests import HTTPConnection
 
 from marey.api.context import Context, Shared, no_key
-from marey.errors import Refused
+from marey.core.errors import Refused
+from marey.db import transaction
 from marey.http.queries import check_query
-from marey.jobs import ApiKey, authenticate, transaction
+from marey.tenants import ApiKey, authenticate
 
 METRICS = "metrics"
 """The scope to see all tenants' queues; no other holds it."""
@@ -40,7 +41,7 @@ def admit(shared: Context, key: ApiKey, scope: str, kind: str | None = None) -> 
     """Nothing, if the key has the scope and has not asked too often.
 
     Args:
-        kind: class of the request (`marey.rates`), where it is not called as its scope.
+        kind: class of the request (`marey.core.rates`), where it is not called as its scope.
 
     Raises:
         Refused: it lacks the scope.

@@ -6,8 +6,8 @@ import threading
 import time
 
 from marey.bundles import choose_bundle
-from marey.offers import Offer, offer_of
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.jobs.offers import Offer, offer_of
 
 FRESH_SECONDS = 5.0
 """A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""

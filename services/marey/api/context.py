@@ -17,12 +17,12 @@ from marey.api.readiness import Readiness
 from marey.api.stream_hub import Hub
 from marey.api.tailer import Tailer
 from marey.api.text_client import TextService
-from marey.errors import Unauthenticated
+from marey.core.errors import Unauthenticated
+from marey.core.metrics import EVENT_STREAMS
+from marey.core.settings import Settings
+from marey.db import Deadline, transaction
 from marey.http.body_room import BodyRoom
 from marey.http.places import Places, Shares
-from marey.jobs import Deadline, transaction
-from marey.metrics import EVENT_STREAMS
-from marey.settings import Settings
 from marey.storage import AssetStore
 
 LARGE_THREADS = 1
@@ -78,7 +78,7 @@ Route = TypeVar("Route", bound=Callable[..., object])
 
 
 def deadline(kind: Deadline) -> Callable[[Route], Route]:
-    """Decorate a route whose `Connection` makes calls of this kind (`marey.jobs.deadlines`)."""
+    """Decorate a route whose `Connection` makes calls of this kind (`marey.db.deadlines`)."""
 
     def mark(route: Route) -> Route:
         setattr(route, DEADLINE, kind)

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from json.decoder import JSONDecodeError
 from typing import Any, BinaryIO
 
-from marey.errors import InvalidInput, TooLarge
-from marey.items import MAX_ITEMS
+from marey.core.errors import InvalidInput, TooLarge
+from marey.items.item import MAX_ITEMS
 
 MAX_VALUE = 2**20
 """Characters of one element, and of all other fields together."""

@@ -12,7 +12,7 @@ from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
 from marey.api.context import Context
-from marey.disposition import attachment, download_name
+from marey.core.disposition import attachment, download_name
 from marey.http.ranges import ByteRange, parse_range
 from marey.http.schemas import View
 from marey.jobs import asset_key

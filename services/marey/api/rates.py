@@ -13,11 +13,11 @@ from limits.errors import StorageError
 from limits.storage import RedisStorage
 from limits.strategies import SlidingWindowCounterRateLimiter
 
-from marey.errors import Busy
-from marey.jobs import ApiKey
-from marey.rates import Rate, read_rate
+from marey.core.errors import Busy
+from marey.core.rates import Rate, read_rate
+from marey.core.settings import Settings
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
+from marey.tenants import ApiKey
 
 TIMEOUT = 0.5
 """A counter is worth less than the request it counts: who waits longer for Redis goes without."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import structlog
 
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 
 INTERVAL_SECONDS = 2.0
 """Between the end of one round of a check and its next."""

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 from anyio import CapacityLimiter, to_thread
 
+from marey.core.metrics import SOCKETS as SOCKETS_OPEN
 from marey.http.places import Places, Shares
-from marey.metrics import SOCKETS as SOCKETS_OPEN
 from marey.runtime.queue import redis_client
 
 Answer = TypeVar("Answer")

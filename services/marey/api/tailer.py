@@ -14,9 +14,11 @@ from uuid import UUID
 import sqlalchemy as sa
 import structlog
 
-from marey.errors import InvalidInput, NotFound, Unreachable
-from marey.jobs import EVENT_CHANNEL, ApiKey, EventRow, Listener, events_after, keys_still_valid, transaction
+from marey.core.errors import InvalidInput, NotFound, Unreachable
+from marey.db import EVENT_CHANNEL, Listener, transaction
+from marey.jobs import EventRow, events_after
 from marey.jobs.states import ENDED
+from marey.tenants import ApiKey, keys_still_valid
 
 log = structlog.get_logger(__name__)
 

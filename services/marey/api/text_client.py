@@ -11,10 +11,10 @@ from anyio import to_thread
 from pydantic import ValidationError
 from starlette.responses import Response
 
-from marey import tracing
-from marey.errors import InvalidInput, Unreachable
+from marey.core import tracing
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings
 from marey.http.problems import MEDIA_TYPE, RETRY_AFTER, ProblemBody
-from marey.settings import Settings
 from marey.text_service.limits import WordLimit
 from marey.text_service.routes import GraphsView, ParseBody, too_late
 

@@ -18,12 +18,14 @@ from uuid import UUID
 import sqlalchemy as sa
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
-from marey.errors import Conflict, InvalidFile, InvalidInput, NotFound
-from marey.hashing import sha256_of
-from marey.jobs import BACKUP, asset_key, get_tenant, transaction
-from marey.jobs.backup import JobBackup, announce, back_up, ended_jobs, restore
+from marey.backup import JobBackup, announce, back_up, ended_jobs, restore
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from marey.core.hashing import sha256_of
+from marey.db import BACKUP, transaction
+from marey.jobs import asset_key
 from marey.motion.files import write_atomically
 from marey.storage import AssetStore
+from marey.tenants import get_tenant
 
 MANIFEST = "manifest.json"
 MOST_BYTES = 2**31

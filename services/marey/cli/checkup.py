@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from marey.cli.findings import Check, broken, free_space
-from marey.errors import MareyError
-from marey.private_home import FOLDER_MODE, is_open
+from marey.core.errors import MareyError
+from marey.core.private_home import FOLDER_MODE, is_open
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.cli.place import Server
-    from marey.settings import Settings
+    from marey.core.settings import Settings
 
 ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
 """Deadlines of a server's answers: a listing takes milliseconds, and a missed deadline of the database 5 s."""
@@ -33,7 +33,7 @@ def check_all() -> Iterator[Check]:
     yield _home()
     yield _server()
     if _installed("pydantic_settings"):
-        from marey.settings import settings
+        from marey.core.settings import settings
 
         try:
             settings()
@@ -45,7 +45,7 @@ def check_all() -> Iterator[Check]:
 
         yield from check_backing()
     if _installed("pydantic_settings") and _installed("safetensors"):
-        from marey.settings import settings
+        from marey.core.settings import settings
 
         yield from models(settings())
         if _installed("torch"):
@@ -83,7 +83,7 @@ def _home() -> Check:
 def _server() -> Check:
     from marey.cli.client import Client
     from marey.cli.place import find_server
-    from marey.errors import Unreachable
+    from marey.core.errors import Unreachable
 
     try:
         server = find_server()

@@ -12,13 +12,13 @@ from marey.cli.database import engine_of, settings_here
 from marey.cli.findings import Check, broken, free_space
 from marey.cli.place import read_server
 from marey.cli.ports import try_port
-from marey.errors import MareyError, Unreachable
+from marey.core.errors import MareyError, Unreachable
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
+    from marey.core.settings import Settings
     from marey.jobs import SchedulerRow
-    from marey.settings import Settings
     from marey.storage import AssetStore
 
 SKEW_WARN, SKEW_BAD = 2.0, 60.0
@@ -30,7 +30,7 @@ UNSWEPT = 30.0
 
 def check_backing() -> Iterator[Check]:
     """Each thing by itself; nothing but the port where no server is named and none runs here."""
-    from marey.settings import settings
+    from marey.core.settings import settings
 
     config = settings_here()
     home = config.home.expanduser().absolute()
@@ -70,7 +70,8 @@ def _port(config: Settings) -> Check:
 
 def database(engine: sa.Engine) -> Check:
     """It answers, and its tables are those this version needs."""
-    from marey.jobs import check_revision, server_version, transaction
+    from marey.db import check_revision, transaction
+    from marey.jobs import server_version
 
     try:
         with transaction(engine) as conn:
@@ -82,7 +83,8 @@ def database(engine: sa.Engine) -> Check:
 
 
 def _clock(engine: sa.Engine) -> Check:
-    from marey.jobs import database_now, transaction
+    from marey.db import transaction
+    from marey.jobs import database_now
 
     with transaction(engine) as conn:
         before = datetime.now(UTC)
@@ -105,7 +107,8 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
     Args:
         logs: of the `marey serve` that runs here and starts workers itself; None = there is none.
     """
-    from marey.jobs import list_workers, queue_depths, transaction
+    from marey.db import transaction
+    from marey.jobs import list_workers, queue_depths
 
     with transaction(engine) as conn:
         known, depths = list_workers(conn), queue_depths(conn)
@@ -128,7 +131,8 @@ def workers(engine: sa.Engine, logs: Path | None = None) -> Check:
 
 def scheduler(engine: sa.Engine) -> Check:
     """One works: it said so a moment ago, and leases that ran out are taken back."""
-    from marey.jobs import list_schedulers, overdue_leases, transaction
+    from marey.db import transaction
+    from marey.jobs import list_schedulers, overdue_leases
 
     with transaction(engine) as conn:
         unswept, known = overdue_leases(conn, UNSWEPT), list_schedulers(conn)
@@ -158,7 +162,7 @@ def _silence_of(row: SchedulerRow) -> str:
 
 
 def _queues(config: Settings) -> Iterator[Check]:
-    from marey.runtime.embedded import valkey_url
+    from marey.embedded import valkey_url
 
     named = config.queue_url
     url = valkey_url(config.home.expanduser().absolute()) if named is None else named.get_secret_value()

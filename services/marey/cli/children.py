@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from marey.cli import console
-from marey.private_home import open_private
+from marey.core.private_home import open_private
 
 if TYPE_CHECKING:
-    from marey.settings import Settings
+    from marey.core.settings import Settings
 
 TICK = 0.2
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0

@@ -12,11 +12,11 @@ from uuid import uuid4
 
 import httpx2
 
-from marey import tracing
 from marey.cli.foreign import connection_failure, foreign_answer
 from marey.cli.lines import Lines
 from marey.cli.place import Server, ca_file, find_server
-from marey.errors import (
+from marey.core import tracing
+from marey.core.errors import (
     Busy,
     Conflict,
     InvalidBundle,
@@ -33,8 +33,8 @@ from marey.errors import (
     Unauthenticated,
     Unreachable,
 )
-from marey.items import InvalidItems, Problem
-from marey.tls import trusting_context
+from marey.core.tls import trusting_context
+from marey.items.item import InvalidItems, Problem
 
 ATTEMPTS = 5
 FIRST_PAUSE, LONGEST_PAUSE = 0.25, 8.0

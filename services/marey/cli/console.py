@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-from marey.characters import escape, escape_json, escaping, unescaped
-from marey.errors import InvalidInput
+from marey.core.characters import escape, escape_json, escaping, unescaped
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from marey.jobs import Actor
-    from marey.settings import Settings
+    from marey.core.settings import Settings
+    from marey.tenants import Actor
 
 
 def settings_here() -> Settings:
@@ -23,8 +23,8 @@ def settings_here() -> Settings:
     from marey.cli.extras import needs_extra
 
     try:
-        from marey.runtime.embedded import postgres_url
-        from marey.settings import settings
+        from marey.core.settings import settings
+        from marey.embedded import postgres_url
     except ImportError as error:
         raise needs_extra("server", error) from error
     from pydantic import SecretStr
@@ -37,7 +37,7 @@ def settings_here() -> Settings:
 
 def engine_of(config: Settings) -> sa.Engine:
     """An engine for the database of `settings_here`."""
-    from marey.jobs import create_engine
+    from marey.db import create_engine
 
     if config.database_url is None:
         raise AssertionError("settings_here fills it")
@@ -52,7 +52,7 @@ def connection() -> Iterator[sa.Connection]:
         Unreachable: it does not answer.
     """
     config = settings_here()
-    from marey.jobs import transaction
+    from marey.db import transaction
 
     engine = engine_of(config)
     try:
@@ -64,7 +64,7 @@ def connection() -> Iterator[sa.Connection]:
 
 def operator() -> Actor:
     """Who runs this command, for the audit log."""
-    from marey.jobs import Actor
+    from marey.tenants import Actor
 
     try:
         name = getpass.getuser()

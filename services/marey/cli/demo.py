@@ -16,7 +16,7 @@ from marey.cli import console
 from marey.cli.client import Client
 from marey.cli.place import Server, find_server
 from marey.cli.watching import watch_job
-from marey.errors import MareyError, NotFound, TimedOut, Unreachable
+from marey.core.errors import MareyError, NotFound, TimedOut, Unreachable
 
 OUT = Path("out/demo")
 INTERRUPTED = 130
@@ -136,7 +136,7 @@ def _run() -> list[dict[str, Any]]:
 def _draw(lines: list[dict[str, Any]]) -> None:
     """A contact sheet beside each npz."""
     from marey.motion.clip import load_npz
-    from marey.motion.render import contact_sheet
+    from marey.viz.render import contact_sheet
 
     with console.bar() as bar:
         for line in bar.track(lines, description="drawing"):

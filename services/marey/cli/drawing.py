@@ -16,7 +16,7 @@ from multiprocessing import connection, resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -105,10 +105,10 @@ class Drawers:
 def draw(drawing: Drawing) -> Pixels:
     """Draw one motion."""
     from marey.motion.clip import load_npz
-    from marey.motion.overview import draw_tile
-    from marey.motion.paper import theme_named
-    from marey.motion.render import draw_row
-    from marey.motion.strip import chosen_frames
+    from marey.viz.overview import draw_tile
+    from marey.viz.paper import theme_named
+    from marey.viz.render import draw_row
+    from marey.viz.strip import chosen_frames
 
     clip, theme = load_npz(drawing.path), theme_named(THEME)
     if drawing.columns is None:

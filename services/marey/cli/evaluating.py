@@ -13,13 +13,13 @@ from urllib.parse import quote
 
 import typer
 
-from marey.characters import escape
 from marey.cli import console
 from marey.cli.options import ExtraColumns
 from marey.cli.references import FORMS
-from marey.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
-from marey.evaluation_prompts import PromptCheck
-from marey.items import InvalidItems, Problem, outside_range
+from marey.core.characters import escape
+from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
+from marey.items.evaluation_prompts import PromptCheck
+from marey.items.item import InvalidItems, Problem, outside_range
 
 if TYPE_CHECKING:
     from marey.cli.client import Client

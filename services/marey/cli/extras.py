@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 
 def needs_extra(extra: str, error: ImportError) -> InvalidInput:

@@ -13,8 +13,8 @@ from typing import Any
 
 from marey.cli.client import Client
 from marey.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
-from marey.errors import Conflict, InvalidFile, InvalidInput, Unreachable
-from marey.hashing import sha256_of
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, Unreachable
+from marey.core.hashing import sha256_of
 
 PARALLEL = 8
 ATTEMPTS = 4

@@ -7,7 +7,7 @@ import shutil
 from dataclasses import dataclass
 from typing import Literal
 
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 
 SMALLEST_FREE, LITTLE_FREE = 2 * 2**30, 10 * 2**30
 """Bytes: Postgres stops at a full disk, and 1,000 motions take 200 MB."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from marey.errors import InvalidInput, MareyError, Refused, TooLarge, TooSlow, Unreachable
-from marey.tls import UNTRUSTED_HINT, verification_error
+from marey.core.errors import InvalidInput, MareyError, Refused, TooLarge, TooSlow, Unreachable
+from marey.core.tls import UNTRUSTED_HINT, verification_error
 
 GUIDE = "docs/proxy.md"
 HTTP_TO_HTTPS = "plain HTTP request was sent to HTTPS port"

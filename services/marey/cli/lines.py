@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self
 
-from marey.spool import Spool
+from marey.core.spool import Spool
 
 PIECE = 64 * 2**10
 """Bytes that are sent at a time."""

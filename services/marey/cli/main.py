@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from marey import tracing
 from marey.cli import console
 from marey.cli.commands import (
     admin,
@@ -28,7 +27,8 @@ from marey.cli.commands import (
     train,
     webhooks,
 )
-from marey.errors import MareyError
+from marey.core import tracing
+from marey.core.errors import MareyError
 
 SERVING = frozenset({"serve", "worker", "scheduler", "api", "probe", "text", "train", "data"})
 PATIENCE = 2.0

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from marey.cli.csv_cells import join_tags, restore, write_csv
-from marey.errors import Conflict, InvalidInput
+from marey.core.errors import Conflict, InvalidInput
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"

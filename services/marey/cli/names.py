@@ -12,9 +12,9 @@ import unicodedata
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
-from marey.characters import MARKS, is_printable
-from marey.errors import InvalidInput
-from marey.items import RESERVED
+from marey.core.characters import MARKS, is_printable
+from marey.core.errors import InvalidInput
+from marey.items.item import RESERVED
 
 DEFAULT_TEMPLATE = "{index:05}_{name}_{seed}"
 MAX_SLUG = 48

@@ -7,8 +7,8 @@ import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from marey.documents import read_json
-from marey.errors import InvalidFile, InvalidInput, NotFound, Unauthenticated, Unreachable
+from marey.core.documents import read_json
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, Unauthenticated, Unreachable
 
 MAX_BYTES = 2**16
 HINT = "Delete it and start `marey serve` again."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from marey.errors import Conflict
+from marey.core.errors import Conflict
 
 HINT = "Choose another with --port (0 = any) or MAREY_PORT."
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from uuid import UUID
 
 from marey.cli import console
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
     from marey.cli.client import Client

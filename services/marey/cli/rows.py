@@ -12,10 +12,10 @@ from typing import Any, Literal, cast
 
 from marey.cli.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
 from marey.cli.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
-from marey.errors import InvalidInput
-from marey.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
-from marey.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
-from marey.items import (
+from marey.core.errors import InvalidInput
+from marey.items.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
+from marey.items.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
+from marey.items.item import (
     CHECKS,
     COLUMNS,
     MAX_BODY_BYTES,

@@ -20,13 +20,14 @@ from marey.cli.children import Child, marey, metrics_port, stop_all
 from marey.cli.place import Server, read_server, write_server
 from marey.cli.ports import try_port
 from marey.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
-from marey.errors import Conflict, InvalidInput, MareyError
-from marey.jobs import create_engine, create_key, list_keys, revoke_key, transaction, upgrade
-from marey.jobs.types import DEFAULT_TENANT
-from marey.private_home import make_private, open_private
-from marey.runtime.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
-from marey.settings import Settings
+from marey.core.errors import Conflict, InvalidInput, MareyError
+from marey.core.private_home import make_private, open_private
+from marey.core.settings import Settings
+from marey.db import create_engine, transaction, upgrade
+from marey.embedded import EmbeddedServer, make_socket_folder, socket_folder, start_postgres, start_valkey
 from marey.storage import open_store
+from marey.tenants import create_key, list_keys, revoke_key
+from marey.tenants.types import DEFAULT_TENANT
 from marey.webhooks.vault import Vault, key_file
 
 KEY_NAME = "serve"

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from marey.characters import find_forbidden
 from marey.cli import manifest
 from marey.cli.csv_cells import TAG_SEPARATOR, restore, split_tags
-from marey.items import Unreadable
+from marey.core.characters import find_forbidden
+from marey.items.item import Unreadable
 
 Rows = Iterator[tuple[int | None, object]]
 Lines = Iterator[tuple[int, str]]

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from marey.errors import InvalidFile, NotFound, TooLarge
+from marey.core.errors import InvalidFile, NotFound, TooLarge
 
 GZIP_ENDING = ".gz"
 GZIP_MAGIC = b"\x1f\x8b"

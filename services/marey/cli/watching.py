@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.cli import console
 from marey.cli.client import Client
-from marey.errors import Busy, ItemsFailed, TimedOut, Unreachable
+from marey.core.errors import Busy, ItemsFailed, TimedOut, Unreachable
 
 ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
 PATIENCE = 180.0

@@ -15,11 +15,11 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from marey.errors import InvalidInput, MareyError, TooLarge, TooSlow
+from marey.core.errors import InvalidInput, MareyError, TooLarge, TooSlow
+from marey.core.spool import IN_MEMORY, Spool
 from marey.http.body_room import BodyRoom
 from marey.http.problems import problem_response
-from marey.items import MAX_BODY_BYTES
-from marey.spool import IN_MEMORY, Spool
+from marey.items.item import MAX_BODY_BYTES
 
 Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20

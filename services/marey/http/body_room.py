@@ -8,8 +8,8 @@ from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
-from marey.errors import Overloaded
-from marey.items import MAX_BODY_BYTES
+from marey.core.errors import Overloaded
+from marey.items.item import MAX_BODY_BYTES
 
 ROOM_BYTES = 3 * MAX_BODY_BYTES
 """In files of the temporary folder. In docker-compose.yml that is in memory: 256 MB, of the 1 GiB of the container."""

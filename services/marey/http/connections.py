@@ -8,9 +8,9 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from marey.errors import TooSlow
+from marey.core.errors import TooSlow
+from marey.core.settings import Settings
 from marey.http.problems import problem_response
-from marey.settings import Settings
 
 
 class PatientProtocol(H11Protocol):

@@ -1,4 +1,4 @@
-"""JSON Schema of fields that `marey.items` checks, from the constants of the check; for the reference alone."""
+"""JSON Schema of fields that `marey.items.item` checks, from the constants of the check; for the reference alone."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 from pydantic.config import JsonDict
 
-from marey.characters import LINE_PATTERN
-from marey.expected import ACTS, JOIN, MAX_ACTS, SIDED, STRAIGHT
-from marey.items import MAX_NAME, MAX_TAG_LENGTH, MODEL, SETTINGS
-from marey.prompts import MAX_CHARACTERS
+from marey.core.characters import LINE_PATTERN
+from marey.items.expected import ACTS, JOIN, MAX_ACTS, SIDED, STRAIGHT
+from marey.items.item import MAX_NAME, MAX_TAG_LENGTH, MODEL, SETTINGS
+from marey.items.prompts import MAX_CHARACTERS
 
 MAX_MODEL = 165
 """Characters: a name of 100, `@` and 64 hexadecimal digits."""

@@ -9,9 +9,9 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 
-from marey.errors import MareyError, Refused, UpgradeMissing
+from marey.core.errors import MareyError, Refused, UpgradeMissing
+from marey.core.origins import origin_of
 from marey.http.problems import problem_response
-from marey.origins import origin_of
 
 
 class HostGuard:

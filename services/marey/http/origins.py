@@ -8,9 +8,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from marey.errors import Refused
+from marey.core.errors import Refused
+from marey.core.origins import origin_of
 from marey.http.problems import problem_response
-from marey.origins import origin_of
 
 METHODS = "DELETE, GET, HEAD, PATCH, POST"
 REQUEST_HEADERS = ", ".join(

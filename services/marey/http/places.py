@@ -11,8 +11,8 @@ from uuid import UUID
 
 from prometheus_client import Gauge
 
-from marey.errors import Busy
-from marey.jobs import ApiKey
+from marey.core.errors import Busy
+from marey.tenants import ApiKey
 
 Name = TypeVar("Name", str, UUID)
 

@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from marey.errors import (
+from marey.core.errors import (
     Busy,
     InvalidInput,
     MareyError,
@@ -24,8 +24,8 @@ from marey.errors import (
     Unauthenticated,
     Unreachable,
 )
-from marey.items import InvalidItems
-from marey.jobs import Room
+from marey.items.item import InvalidItems
+from marey.tenants import Room
 
 TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"

@@ -6,10 +6,10 @@ import signal
 import sys
 from typing import Any
 
+from marey.core.settings import Settings
+from marey.core.tracing import configure_tracing
 from marey.runtime.logs import configure_logging
 from marey.runtime.malloc import one_heap
-from marey.settings import Settings
-from marey.tracing import configure_tracing
 
 GRACE_SECONDS = 3
 """For answers under way at SIGTERM; event streams and sockets end at once."""

@@ -8,7 +8,7 @@ from fastapi.params import ParamTypes
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 LONGEST_NAME = 60
 

@@ -9,8 +9,8 @@ from fastapi import Header, Query
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from marey.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text, normalize_newlines
-from marey.errors import InvalidInput
+from marey.core.characters import LINE_PATTERN, LINES, TEXT_PATTERN, check_text, normalize_newlines
+from marey.core.errors import InvalidInput
 
 Row = TypeVar("Row")
 
@@ -19,7 +19,7 @@ MAX_NAME, MAX_COMMENT, MAX_REASON = 200, 2000, 500
 
 @dataclass(frozen=True)
 class FreeText:
-    """Marks free text of a request in `Annotated`: `marey.characters` says what it may hold.
+    """Marks free text of a request in `Annotated`: `marey.core.characters` says what it may hold.
 
     Attributes:
         lines: it may hold newlines and tabs.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from marey import tracing
+from marey.core import tracing
 
 UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
 """Asked every few seconds by machines."""

@@ -8,32 +8,28 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import MareyError, QuotaUsedUp, Unreachable
-from marey.evaluating import plan_evaluation, scoring_job
-from marey.items import InvalidItems
-from marey.jobs import (
-    BULK,
+from marey.core.errors import MareyError, QuotaUsedUp, Unreachable
+from marey.core.settings import Settings
+from marey.db import BULK, transaction
+from marey.evaluations import (
     MAX_MISSING,
     EvaluationJob,
     EvaluationRow,
     EvaluationState,
-    ItemState,
-    JobState,
     check_baseline,
     due_schedules,
     fire_schedule,
-    list_items,
     load_prompts,
     lock_evaluation,
     move_evaluation,
     open_evaluations,
     store_prompts,
-    submit,
-    transaction,
 )
+from marey.evaluations.requests import plan_evaluation, scoring_job
+from marey.items.item import InvalidItems
+from marey.jobs import ItemState, JobState, list_items, submit
 from marey.jobs.states import ENDED
 from marey.runtime.logs import logger
-from marey.settings import Settings
 
 log = logger(__name__)
 

@@ -11,27 +11,14 @@ from functools import partial
 
 import sqlalchemy as sa
 
-from marey import metrics
-from marey.addresses import Allowed
-from marey.errors import InvalidInput, Unreachable
-from marey.jobs import (
-    KEPT,
-    Problem,
-    abandoned_streams,
-    beat_scheduler,
-    check_listening,
-    create_engine,
-    delete_expired,
-    end_stream,
-    make_due,
-    outages,
-    remove_stale_assets,
-    remove_unused_prompts,
-    retire,
-    rewrite_files,
-    sweep,
-    transaction,
-)
+from marey.core import metrics
+from marey.core.addresses import Allowed
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings
+from marey.core.tls import trusting_context
+from marey.db import check_listening, create_engine, outages, transaction
+from marey.evaluations import remove_unused_prompts
+from marey.jobs import Problem, beat_scheduler, make_due, retire, sweep
 from marey.motion.clip import without_prompt
 from marey.runtime.app import create_app
 from marey.runtime.exposition import expose
@@ -47,9 +34,9 @@ from marey.scheduler.relay import Relay, publisher
 from marey.scheduler.sending import Sender
 from marey.scheduler.servers import CHECK_SECONDS, server_check
 from marey.scheduler.webhooks import Deliverer
-from marey.settings import Settings
 from marey.storage import open_store
-from marey.tls import trusting_context
+from marey.streams import abandoned_streams, end_stream
+from marey.takes import KEPT, delete_expired, remove_stale_assets, rewrite_files
 from marey.webhooks.vault import Vault
 
 log = logger(__name__)

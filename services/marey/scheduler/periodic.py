@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
-from marey import metrics
-from marey.errors import Unreachable
+from marey.core import metrics
+from marey.core.errors import Unreachable
 from marey.runtime.logs import logger
 from marey.scheduler.parts import Part
 

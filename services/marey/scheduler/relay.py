@@ -17,9 +17,10 @@ import redis
 import sqlalchemy as sa
 from celery import Celery
 
-from marey import metrics
-from marey.errors import InvalidInput, Unreachable
-from marey.jobs import EVALUATOR_QUEUE, QUEUE_CHANNEL, TEXT_QUEUE, Listener, live_workers, transaction, waiting_batches
+from marey.core import metrics
+from marey.core.errors import InvalidInput, Unreachable
+from marey.db import QUEUE_CHANNEL, Listener, transaction
+from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, live_workers, waiting_batches
 from marey.runtime.app import DRAIN, PUBLISH_RETRY
 from marey.runtime.logs import logger
 from marey.scheduler.parts import Part

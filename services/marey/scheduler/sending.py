@@ -14,9 +14,9 @@ from email.utils import parsedate_to_datetime
 
 import httpx2
 
-from marey.addresses import Allowed
-from marey.errors import MareyError, Refused
-from marey.jobs import Attempt
+from marey.core.addresses import Allowed
+from marey.core.errors import MareyError, Refused
+from marey.webhooks import Attempt
 from marey.webhooks.addresses import choose_address
 
 CONNECT_SECONDS = 5.0

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import sqlalchemy as sa
 
-from marey.errors import Conflict
-from marey.jobs import check_revision
+from marey.core.errors import Conflict
+from marey.db import check_revision
 from marey.runtime.logs import logger
 from marey.runtime.queue import check_queue
 

@@ -13,20 +13,20 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey import metrics
-from marey.errors import InvalidInput, Unreachable
-from marey.jobs import (
+from marey.core import metrics
+from marey.core.errors import InvalidInput, Unreachable
+from marey.db import transaction
+from marey.runtime.logs import logger
+from marey.scheduler.parts import Part
+from marey.scheduler.sending import Sender
+from marey.webhooks import (
     Attempt,
     DeliveryState,
     DueDelivery,
     claim_deliveries,
     give_back_deliveries,
     record_attempt,
-    transaction,
 )
-from marey.runtime.logs import logger
-from marey.scheduler.parts import Part
-from marey.scheduler.sending import Sender
 from marey.webhooks.message import headers_of, message_of
 from marey.webhooks.vault import Vault
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from marey.bundles import TextSpec, find_bundle
-from marey.errors import InvalidBundle, MareyError
+from marey.core.errors import InvalidBundle, MareyError
 from marey.jobs import TEXT_QUEUE, ClaimedItem
 from marey.runtime.handler import Batch, BatchControl, Failed, Outcome, TextDone
 from marey.text.keys import as_served

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 
-from marey.errors import Busy
+from marey.core.errors import Busy
 
 MAX_WORDS = 4000
 """Words in flight in one process: four seconds of one core. A request that is alone may have more."""

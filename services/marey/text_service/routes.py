@@ -12,12 +12,12 @@ from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.bundles import TextSpec, choose_bundle, named_by
-from marey.errors import InvalidInput, Unauthenticated, Unreachable
+from marey.core.errors import InvalidInput, Unauthenticated, Unreachable
+from marey.core.settings import Settings
 from marey.http.fields import PROMPT
 from marey.http.problems import RESPONSES
-from marey.items import MODEL
-from marey.prompts import check_prompt
-from marey.settings import Settings
+from marey.items.item import MODEL
+from marey.items.prompts import check_prompt
 from marey.text.keys import as_served
 from marey.text_service.limits import Ticket, WordLimit
 

@@ -19,14 +19,14 @@ from fastapi.responses import PlainTextResponse
 from starlette.responses import Response
 
 from marey.bundles import list_bundles
-from marey.errors import InvalidInput, MareyError
+from marey.core.errors import InvalidInput, MareyError
+from marey.core.settings import Settings, settings
 from marey.http import problems
 from marey.http.bodies import BodyGuard, Patience
 from marey.http.connections import connection_options
 from marey.http.process import prepare_process
 from marey.http.traces import Trace
 from marey.runtime.systemd import notified
-from marey.settings import Settings, settings
 from marey.text_service.routes import load_pipeline, text_router
 
 log = structlog.get_logger(__name__)

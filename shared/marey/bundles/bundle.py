@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.arrays import parse_safetensors
 from marey.bundles.manifest import DESCRIPTIVE, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
-from marey.documents import parse_json, read_bytes
-from marey.errors import InvalidBundle, NotFound
-from marey.hashing import sha256_of
+from marey.core.arrays import parse_safetensors
+from marey.core.documents import parse_json, read_bytes
+from marey.core.errors import InvalidBundle, NotFound
+from marey.core.hashing import sha256_of
 
 MAX_MANIFEST_BYTES = 4 * 2**20
 STATISTICS = "statistics"

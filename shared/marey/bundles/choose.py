@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from marey.bundles.bundle import Bundle
 from marey.bundles.find import find_bundle, has_bundle, list_bundles
 from marey.bundles.manifest import BundleManifest
-from marey.errors import InvalidBundle, NotFound, Refused
-from marey.settings import Settings, settings
+from marey.core.errors import InvalidBundle, NotFound, Refused
+from marey.core.settings import Settings, settings
 
 
 def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = True) -> Bundle:

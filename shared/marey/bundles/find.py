@@ -12,9 +12,9 @@ from typing import Literal
 
 from marey.bundles.bundle import Bundle
 from marey.bundles.manifest import MANIFEST_NAME
-from marey.characters import escape
-from marey.errors import InvalidBundle, MareyError, NotFound, Refused
-from marey.settings import Settings, settings
+from marey.core.characters import escape
+from marey.core.errors import InvalidBundle, MareyError, NotFound, Refused
+from marey.core.settings import Settings, settings
 
 log = logging.getLogger(__name__)
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
-from marey.errors import InvalidBundle, InvalidInput
-from marey.items import OUTPUT_FPS, SETTINGS, outside_range
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.items.item import OUTPUT_FPS, SETTINGS, outside_range
 
 MAX_FRAMES = 2**53
 """The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from marey.documents import parse_json
-from marey.errors import InvalidBundle
+from marey.core.documents import parse_json
+from marey.core.errors import InvalidBundle
 
 FORMAT = 2
 """The format of new bundles. Format 1, whose hash covers the files alone, is read with the same hash as ever."""

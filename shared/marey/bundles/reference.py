@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
-from marey.errors import InvalidBundle, InvalidInput, MareyError
-from marey.evaluation_prompts import EvaluationPrompt, read_prompts
-from marey.expected import read_expected
+from marey.core.errors import InvalidBundle, InvalidInput, MareyError
+from marey.items.evaluation_prompts import EvaluationPrompt, read_prompts
+from marey.items.expected import read_expected
 
 FILE, PART = "reference.json", "reference"
 

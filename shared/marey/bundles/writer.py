@@ -17,7 +17,7 @@ from safetensors.numpy import save as save_safetensors
 
 from marey.bundles.bundle import STATISTICS, Bundle, Tensors
 from marey.bundles.manifest import FORMAT, MANIFEST_NAME, BundleManifest, FileEntry, parse_manifest
-from marey.errors import Conflict, InvalidInput
+from marey.core.errors import Conflict, InvalidInput
 
 MAX_SHARD_BYTES = 15 * 2**20
 """Under the size at which hosts of git repositories begin to refuse or warn."""

@@ -9,12 +9,13 @@ from uuid import UUID, uuid4
 
 import sqlalchemy as sa
 
-from marey.jobs import schema
-from marey.jobs.journal import CLOCK, LockedJob, interval, lock_job, record
-from marey.jobs.lease_types import Claim, ClaimedItem, Heartbeat
+from marey.db.sql import CLOCK, interval
+from marey.jobs import tables
+from marey.jobs.journal import LockedJob, lock_job, record
+from marey.jobs.leases import Claim, ClaimedItem, Heartbeat
 from marey.jobs.policy import Policy, policy
-from marey.jobs.quotas import room_to_run
 from marey.jobs.states import ItemState, JobControl, Stage
+from marey.tenants.quotas import room_to_run
 
 LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 
@@ -153,13 +154,13 @@ def heartbeat(
             progress for 120 s the lease is not renewed.
     """
     rules = rules or policy()
-    table = schema.lease.c
+    table = tables.lease.c
     if progressed:
         renewal = {"expires_at": CLOCK + interval(rules.lease), "progress_at": CLOCK}
     else:
         moves = table.progress_at > CLOCK - interval(rules.stall)
         renewal = {"expires_at": sa.case((moves, CLOCK + interval(rules.lease)), else_=table.expires_at)}
-    renewed = conn.execute(sa.update(schema.lease).where(table.token == lease_token).values(renewal))
+    renewed = conn.execute(sa.update(tables.lease).where(table.token == lease_token).values(renewal))
     if renewed.rowcount == 0:
         return Heartbeat(lost=True, gone=frozenset(open_items))
     return Heartbeat(lost=False, gone=frozenset(open_items) - leased_items(conn, lease_token))
@@ -167,7 +168,7 @@ def heartbeat(
 
 def leased_items(conn: sa.Connection, lease_token: UUID) -> frozenset[UUID]:
     """The items that a lease holds; none once it is gone."""
-    table = schema.item.c
+    table = tables.item.c
     return frozenset(conn.execute(sa.select(table.id).where(table.lease_token == lease_token)).scalars())
 
 
@@ -184,7 +185,7 @@ def waiting_batches(conn: sa.Connection, batch_sizes: Mapping[str, int]) -> dict
 
 def waiting_items(conn: sa.Connection) -> dict[str, int]:
     """How many items of running jobs are ready, by queue. Only queues with some."""
-    lane, job = schema.lane, schema.job
+    lane, job = tables.lane, tables.job
     count = sa.func.sum(lane.c.ready + lane.c.solo)
     query = (
         sa.select(lane.c.queue, count.label("items"))

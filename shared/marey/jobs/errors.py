@@ -1,6 +1,6 @@
 """Errors of this room."""
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 
 class IdempotencyMismatch(InvalidInput):

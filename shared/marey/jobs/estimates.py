@@ -7,7 +7,7 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import schema
+from marey.jobs import tables
 from marey.jobs.estimate_types import Estimate, QueuePlace, Speed
 from marey.jobs.listings import get_job
 from marey.jobs.states import ENDED, OPEN, JobControl
@@ -82,7 +82,7 @@ def place_of(conn: sa.Connection, tenant: str, job: UUID) -> QueuePlace:
         NotFound: the tenant has no such job.
     """
     row = get_job(conn, tenant, job)
-    item = schema.item.c
+    item = tables.item.c
     left = conn.execute(
         sa.select(item.model, item.bundle, sa.func.count().label("items"))
         .where(item.job_id == job, item.state.in_(sorted(OPEN)))

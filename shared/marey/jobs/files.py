@@ -9,10 +9,15 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import schema
-from marey.jobs.journal import among
+from marey.db.sql import among
+from marey.jobs import tables
 
 F = TypeVar("F")
+
+
+def asset_key(tenant: str, sha256: str) -> str:
+    """Key of an asset in the store: `t/{tenant}/{sha[:2]}/{sha}`."""
+    return f"t/{tenant}/{sha256[:2]}/{sha256}"
 
 
 def files_of(
@@ -30,10 +35,10 @@ def files_of(
         kind: makes one of format, sha256, size and media type.
         where: which files.
     """
-    file, asset = owner.table.c, schema.asset.c
+    file, asset = owner.table.c, tables.asset.c
     query = (
         sa.select(owner, file.format, asset.sha256, asset.size, asset.media_type)
-        .join(schema.asset, asset.id == file.asset_id)
+        .join(tables.asset, asset.id == file.asset_id)
         .where(among(owner, owners), *where)
         .order_by(file.format)
     )

@@ -8,9 +8,10 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import schema
-from marey.jobs.journal import CLOCK, LockedJob, NewEvent, among, change_lanes, lock_job, returned
-from marey.jobs.lease_types import Committed
+from marey.db.sql import CLOCK, among
+from marey.jobs import tables
+from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, returned
+from marey.jobs.leases import Committed
 from marey.jobs.states import Cause, ItemState
 from marey.jobs.types import Problem
 
@@ -58,7 +59,7 @@ def give_back(
     attempts: int = 0,
 ) -> None:
     """Leased items become ready, in their lanes; `solo` marks them, `attempts` are added. Counters are the caller's."""
-    table = schema.item
+    table = tables.item
     values: dict[str, object] = {
         "state": ItemState.READY,
         "lease_token": None,
@@ -109,7 +110,7 @@ def hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None)
 def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
     """Leased items come to a last state. Counters are the caller's."""
     values = {"state": state, "lease_token": None, "reason": str(cause), "finished_at": CLOCK} | more
-    conn.execute(sa.update(schema.item).where(among(schema.item.c.id, items)).values(values))
+    conn.execute(sa.update(tables.item).where(among(tables.item.c.id, items)).values(values))
 
 
 def document(problem: Problem) -> dict[str, object]:

@@ -8,10 +8,10 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from marey.errors import InvalidInput
-from marey.jobs import schema
+from marey.core.errors import InvalidInput
+from marey.db.sql import CLOCK, interval
+from marey.jobs import tables
 from marey.jobs.errors import IdempotencyMismatch
-from marey.jobs.journal import CLOCK, interval
 from marey.jobs.policy import policy
 
 Owner = Literal["job_id", "evaluation_id"]
@@ -39,7 +39,7 @@ def take_key(
         return None
     if body_sha256 is None:
         raise InvalidInput("an idempotency key needs the digest of the body", where="body_sha256")
-    table = schema.idempotency
+    table = tables.idempotency
     values = {
         "body_sha256": body_sha256,
         "job_id": None,

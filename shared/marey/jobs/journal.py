@@ -9,27 +9,14 @@ from typing import Any
 from uuid import UUID
 
 import sqlalchemy as sa
-from sqlalchemy.dialects.postgresql import ARRAY, insert
+from sqlalchemy.dialects.postgresql import insert
 
-from marey.errors import NotFound
-from marey.jobs import schema
-from marey.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
-from marey.jobs.outbox import tell_of_job
+from marey.core.errors import NotFound
+from marey.db.database import EVENT_CHANNEL, QUEUE_CHANNEL
+from marey.db.sql import CLOCK, notify
+from marey.jobs import tables
+from marey.jobs.notices import tell_of_job
 from marey.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
-
-CLOCK = sa.func.clock_timestamp()
-"""Database time at this statement; `now()` is that of the transaction's begin, before it waited for locks."""
-
-
-def among(column: sa.Column[Any], values: Iterable[object]) -> sa.ColumnElement[bool]:
-    """`column = ANY(array)`: one parameter, however many values."""
-    return column == sa.any_(sa.literal(list(values), ARRAY(column.type)))
-
-
-def interval(seconds: float) -> sa.Function[object]:
-    """A length of time for comparisons with `CLOCK`."""
-    return sa.func.make_interval(0, 0, 0, 0, 0, 0, seconds)
-
 
 Lane = tuple[str, str]
 """Queue and batch key."""
@@ -87,7 +74,7 @@ def lock_job(
     conn: sa.Connection, job: UUID, *, tenant: str | None = None, skip_locked: bool = False
 ) -> LockedJob | None:
     """Lock a job row until the transaction ends; None when there is none (or, with `skip_locked`, none free)."""
-    table = schema.job.c
+    table = tables.job.c
     query = sa.select(
         table.id,
         table.tenant_id.label("tenant"),
@@ -149,7 +136,7 @@ def record(
     if after.state is not job.state:
         change = NewEvent("state", f"{job.state} → {after.state}", data={"from": job.state, "to": after.state})
         events = [*events, change]
-    table = schema.job
+    table = tables.job
     ended = after.state in ENDED
     last = conn.execute(
         sa.update(table)
@@ -165,7 +152,7 @@ def record(
         .returning(table.c.event_seq)
     ).scalar_one()
     if ended:
-        conn.execute(sa.delete(schema.lane).where(schema.lane.c.job_id == job.id))  # all empty; a retry makes them anew
+        conn.execute(sa.delete(tables.lane).where(tables.lane.c.job_id == job.id))  # all empty; a retry makes them anew
     if events:
         _write_events(conn, after, events, first=last - len(events) + 1)
     tell_of_job(conn, job.tenant, job.id, job.state, after.state, after.counters())
@@ -174,7 +161,7 @@ def record(
 
 def change_lanes(conn: sa.Connection, job: UUID, changes: Mapping[Lane, LaneChange]) -> None:
     """Add to lanes of a job under lock (and make them), tell the relay of those that gained; or take from them."""
-    table = schema.lane
+    table = tables.lane
     gains = {lane: change for lane, change in changes.items() if change.ready >= 0 and change.solo >= 0}
     if gains:
         new = insert(table).values(
@@ -213,12 +200,6 @@ def returned(items: Iterable[tuple[str, str, bool]]) -> dict[Lane, LaneChange]:
     }
 
 
-def notify(conn: sa.Connection, channel: str, payloads: Iterable[str]) -> None:
-    """NOTIFY when this transaction commits; equal ones are sent once."""
-    for payload in payloads:
-        conn.execute(sa.select(sa.func.pg_notify(channel, payload)))
-
-
 def _moved(job: LockedJob, moved: Mapping[tuple[ItemState, ItemState], int]) -> LockedJob:
     counts = {str(state): int(getattr(job, state)) for state in ItemState}
     for (before, after), count in moved.items():
@@ -230,7 +211,7 @@ def _moved(job: LockedJob, moved: Mapping[tuple[ItemState, ItemState], int]) -> 
 def _write_events(conn: sa.Connection, job: LockedJob, events: Sequence[NewEvent], *, first: int) -> None:
     common = {"counters": job.counters(), "state": job.state}
     conn.execute(
-        sa.insert(schema.job_event).values(at=CLOCK),
+        sa.insert(tables.job_event).values(at=CLOCK),
         [
             {
                 "job_id": job.id,

@@ -7,16 +7,16 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput
-from marey.jobs import schema
-from marey.jobs.database import EVENT_CHANNEL, QUEUE_CHANNEL
-from marey.jobs.evaluation_types import EVALUATOR_QUEUE
-from marey.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, lock_job_of, notify, record, returned
+from marey.core.errors import Conflict, InvalidInput
+from marey.db.database import QUEUE_CHANNEL
+from marey.db.sql import CLOCK, notify
+from marey.jobs import tables
+from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job_of, record, returned
 from marey.jobs.listings import get_job
-from marey.jobs.quotas import take_room
 from marey.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
 from marey.jobs.submit import check_share
-from marey.jobs.types import NO_TEXT, PRIORITY_LIMIT, JobRow
+from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, JobRow
+from marey.tenants.quotas import take_room
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:
@@ -44,7 +44,7 @@ def resume(conn: sa.Connection, tenant: str, job: UUID, reason: str = "resumed b
     _refuse_ended(locked, "resumed")
     if locked.control is not JobControl.RUN:
         record(conn, locked, [NewEvent("resumed", reason)], control=JobControl.RUN)
-        lane = schema.lane.c
+        lane = tables.lane.c
         waiting = sa.select(lane.queue).where(lane.job_id == job, lane.ready + lane.solo > 0).distinct()
         notify(conn, QUEUE_CHANNEL, conn.execute(waiting).scalars().all())
     return get_job(conn, tenant, job)
@@ -83,7 +83,7 @@ def retry(
             hint=f"Items that are {', '.join(sorted(wanted))} can.",
         )
     take_room(conn, tenant, sum(moved.values()))
-    table = schema.item
+    table = tables.item
     ours = (table.c.job_id == job) & table.c.state.in_(sorted(wanted))
     _refuse_unread(conn, job, ours)
     rows = conn.execute(
@@ -116,7 +116,7 @@ def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int, rea
     if not -PRIORITY_LIMIT <= priority <= PRIORITY_LIMIT:
         raise InvalidInput(f"{priority} is not between -{PRIORITY_LIMIT} and {PRIORITY_LIMIT}", where="priority")
     locked = lock_job_of(conn, tenant, job)
-    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(priority=priority))
+    conn.execute(sa.update(tables.job).where(tables.job.c.id == job).values(priority=priority))
     record(conn, locked, [NewEvent("priority", f"priority {priority}: {reason}", data={"priority": priority})])
     return get_job(conn, tenant, job)
 
@@ -132,7 +132,7 @@ def set_fail_early(
     """
     check_share(share)
     locked = replace(lock_job_of(conn, tenant, job), fail_early=share)
-    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(fail_early=share))
+    conn.execute(sa.update(tables.job).where(tables.job.c.id == job).values(fail_early=share))
     told = "never fails early" if share is None else f"fails early above a share of {share:g}"
     cancel_if_failing(conn, record(conn, locked, [NewEvent("fail_early", f"{told}: {reason}", data={"share": share})]))
     return get_job(conn, tenant, job)
@@ -145,33 +145,16 @@ def set_comment(conn: sa.Connection, tenant: str, job: UUID, comment: str | None
         NotFound: the tenant has no such job.
     """
     locked = lock_job_of(conn, tenant, job)
-    conn.execute(sa.update(schema.job).where(schema.job.c.id == job).values(comment=comment))
+    conn.execute(sa.update(tables.job).where(tables.job.c.id == job).values(comment=comment))
     record(conn, locked, [NewEvent("comment", comment or "comment removed")])
     return get_job(conn, tenant, job)
-
-
-def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
-    """Remove a job that has ended, with its items, events and motions; their files go at the next garbage collection.
-
-    Raises:
-        NotFound: the tenant has no such job.
-        Conflict: the job has open items, or works for an evaluation that is not over; cancel it first.
-    """
-    refuse_needed(conn, tenant, job)
-    locked = lock_job_of(conn, tenant, job)
-    if locked.state not in ENDED:
-        raise Conflict(
-            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
-        )
-    conn.execute(sa.delete(schema.job).where(schema.job.c.id == job))
-    notify(conn, EVENT_CHANNEL, [str(job)])
 
 
 def cancel_open_items(
     conn: sa.Connection, job: LockedJob, cause: Cause, reason: str, *, control: JobControl | None
 ) -> None:
     """Cancel what is ready or leased of a job under lock; its leases end."""
-    table = schema.item
+    table = tables.item
     conn.execute(
         sa.update(table)
         .where(table.c.job_id == job.id, table.c.state.in_(sorted(OPEN)))
@@ -183,7 +166,7 @@ def cancel_open_items(
             reason=f"{cause}: {reason}",
         )
     )
-    conn.execute(sa.delete(schema.lease).where(schema.lease.c.job_id == job.id))
+    conn.execute(sa.delete(tables.lease).where(tables.lease.c.job_id == job.id))
     moved = {(ItemState.READY, ItemState.CANCELLED): job.ready, (ItemState.LEASED, ItemState.CANCELLED): job.leased}
     event = NewEvent("cancelled", reason, data={"items": job.ready + job.leased, "cause": cause})
     record(conn, job, [event], moved=moved, control=control)
@@ -196,24 +179,6 @@ def cancel_if_failing(conn: sa.Connection, job: LockedJob) -> None:
         return
     reason = f"{broken} of {job.total} items failed, more than the share of {job.fail_early:g} allowed"
     cancel_open_items(conn, job, Cause.FAIL_EARLY, reason, control=None)
-
-
-def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
-    """Nothing, if no evaluation that is not over works with this job. Its row is locked, before the job's.
-
-    Raises:
-        Conflict: one does.
-    """
-    table = schema.evaluation.c
-    ours = (table.tenant_id == tenant) & ((table.generate_job_id == job) | (table.score_job_id == job))
-    rows = conn.execute(sa.select(table.id, table.finished_at).where(ours).order_by(table.id).with_for_update())
-    needed = next((row.id for row in rows if row.finished_at is None), None)
-    if needed is not None:
-        raise Conflict(
-            f"evaluation {needed} needs this job",
-            where=f"job {job}",
-            hint=f"Wait for it, or cancel it: `marey eval cancel {needed}`.",
-        )
 
 
 def refuse_erased(job: LockedJob, verb: str) -> None:
@@ -232,7 +197,7 @@ def refuse_erased(job: LockedJob, verb: str) -> None:
 
 def _refuse_unread(conn: sa.Connection, job: UUID, items: sa.ColumnElement[bool]) -> None:
     """A backup holds nothing of what was read of a prompt; what brings such an item back could not make it."""
-    table = schema.item.c
+    table = tables.item.c
     unread = items & (table.text_key == NO_TEXT) & (table.model != EVALUATOR_QUEUE)
     if conn.execute(sa.select(table.id).where(unread).limit(1)).one_or_none() is not None:
         raise Conflict(

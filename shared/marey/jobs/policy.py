@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from marey.settings import settings
+from marey.core.settings import settings
 
 
 @dataclass(frozen=True)

@@ -11,21 +11,12 @@ from uuid import UUID
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from marey.jobs import schema
+from marey.db.ids import new_id
+from marey.db.sql import CLOCK, among, interval
+from marey.jobs import tables
 from marey.jobs.held import HeldItem, document, drop_empty_lease, end_dead, end_items, give_back, hold
-from marey.jobs.ids import new_id
-from marey.jobs.journal import (
-    CLOCK,
-    LaneChange,
-    LockedJob,
-    NewEvent,
-    among,
-    change_lanes,
-    interval,
-    record,
-    returned,
-)
-from marey.jobs.lease_types import AssetDigest, Committed, ItemFailure, NewMotion, NewText
+from marey.jobs.journal import LaneChange, LockedJob, NewEvent, change_lanes, record, returned
+from marey.jobs.leases import AssetDigest, Committed, ItemFailure, NewMotion, NewText
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemState, Stage
@@ -131,7 +122,7 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
     if done:
         blobs = {text.key: text.blob for text in done}
         rows = [{"key": key, "blob": blobs[key]} for key in sorted(blobs)]  # in order: two commits may share keys
-        conn.execute(insert(schema.text_features).values(rows).on_conflict_do_nothing())
+        conn.execute(insert(tables.text_features).values(rows).on_conflict_do_nothing())
         _leave_text_stage(conn, held.job, [text.item for text in done], list(blobs))
         drop_empty_lease(conn, lease_token)
     return held.committed([text.item for text in texts])
@@ -238,7 +229,7 @@ def _store(
 
 
 def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID], keys: Sequence[str]) -> None:
-    table = schema.item
+    table = tables.item
     waiting = (
         (table.c.job_id == job.id)
         & (table.c.state == ItemState.READY)
@@ -284,8 +275,8 @@ def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Poli
         return ItemState.DEAD, end_dead(conn, item, failure.problem)
     delay = min(rules.backoff * 2 ** (attempts - 1), rules.backoff_limit)
     conn.execute(
-        sa.update(schema.item)
-        .where(schema.item.c.id == item.id)
+        sa.update(tables.item)
+        .where(tables.item.c.id == item.id)
         .values(
             state=ItemState.READY,
             lease_token=None,

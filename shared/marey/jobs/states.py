@@ -104,56 +104,6 @@ class Review(StrEnum):
     """Another take was asked for in its place."""
 
 
-class StreamState(StrEnum):
-    """Where a live stream stands. `ENDED` and `FAILED` are final."""
-
-    WAITING = "waiting"
-    LIVE = "live"
-    PAUSED = "paused"
-    ENDED = "ended"
-    FAILED = "failed"
-
-
-STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
-    StreamState.WAITING: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
-    StreamState.LIVE: frozenset({StreamState.PAUSED, StreamState.ENDED, StreamState.FAILED}),
-    StreamState.PAUSED: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
-    StreamState.ENDED: frozenset(),
-    StreamState.FAILED: frozenset(),
-}
-"""Allowed transitions of streams; the trigger `stream_transition` is the same table."""
-
-OPEN_STREAMS = frozenset({StreamState.WAITING, StreamState.LIVE, StreamState.PAUSED})
-"""States of streams that are not over."""
-
-
-class EvaluationState(StrEnum):
-    """Where an evaluation stands. `DONE`, `FAILED` and `CANCELLED` are final; to try again is a new evaluation."""
-
-    PLANNED = "planned"
-    GENERATING = "generating"
-    """Its motions are made by a job like any other, in the background."""
-    SCORING = "scoring"
-    """They are measured, by a job of one item."""
-    DONE = "done"
-    FAILED = "failed"
-    CANCELLED = "cancelled"
-
-
-EVALUATION_TRANSITIONS: dict[EvaluationState, frozenset[EvaluationState]] = {
-    EvaluationState.PLANNED: frozenset({EvaluationState.GENERATING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
-    EvaluationState.GENERATING: frozenset({EvaluationState.SCORING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
-    EvaluationState.SCORING: frozenset({EvaluationState.DONE, EvaluationState.FAILED, EvaluationState.CANCELLED}),
-    EvaluationState.DONE: frozenset(),
-    EvaluationState.FAILED: frozenset(),
-    EvaluationState.CANCELLED: frozenset(),
-}
-"""Allowed transitions of evaluations; the trigger `evaluation_transition` is the same table."""
-
-OPEN_EVALUATIONS = frozenset({EvaluationState.PLANNED, EvaluationState.GENERATING, EvaluationState.SCORING})
-"""States of evaluations that are not over."""
-
-
 class Counters(Protocol):
     """How many items of a job are in each state; the states add up to `total`."""
 

@@ -13,13 +13,12 @@ import psycopg
 import sqlalchemy as sa
 from psycopg import sql
 
-from marey import characters
-from marey.errors import InvalidInput
-from marey.jobs import schema
+from marey.core.errors import InvalidInput
+from marey.db.ids import new_id
+from marey.db.sql import among, check_text
+from marey.jobs import tables
 from marey.jobs.idempotency import take_key
-from marey.jobs.ids import new_id
-from marey.jobs.journal import Lane, LaneChange, NewEvent, among, change_lanes, lock_job, record
-from marey.jobs.quotas import check_queue, take_room
+from marey.jobs.journal import Lane, LaneChange, NewEvent, change_lanes, lock_job, record
 from marey.jobs.states import JobState, Stage
 from marey.jobs.types import (
     MAX_KEEP_DAYS,
@@ -31,6 +30,7 @@ from marey.jobs.types import (
     NewJob,
     SubmittedJob,
 )
+from marey.tenants.quotas import check_queue, take_room
 
 CHUNK = 2000  # items held in memory at a time, and keys of one look-up
 
@@ -69,7 +69,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if job.metered:
         check_queue(conn, job.tenant, job.count or 1)
     conn.execute(
-        sa.insert(schema.job).values(
+        sa.insert(tables.job).values(
             id=identifier,
             tenant_id=job.tenant,
             name=job.name,
@@ -92,7 +92,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
 
 
 def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:
-    conn.execute(sa.update(schema.job).where(schema.job.c.id == identifier).values(total=total, ready=total))
+    conn.execute(sa.update(tables.job).where(tables.job.c.id == identifier).values(total=total, ready=total))
     locked = lock_job(conn, identifier)
     assert locked is not None
     record(conn, locked, [NewEvent("submitted", f"submitted with {total} items", data={"to": JobState.QUEUED})])
@@ -103,7 +103,7 @@ def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob
     made = take_key(conn, job.tenant, job.idempotency_key, job.body_sha256, "job_id", identifier)
     if made is None:
         return None
-    total = conn.execute(sa.select(schema.job.c.total).where(schema.job.c.id == made)).scalar_one()
+    total = conn.execute(sa.select(tables.job.c.total).where(tables.job.c.id == made)).scalar_one()
     return SubmittedJob(made, replayed=True, items=total)
 
 
@@ -141,7 +141,7 @@ def _row(item: NewItem, job: UUID, position: int, stage: Stage, lane: Lane) -> t
 
 
 def _known_texts(conn: sa.Connection, keys: set[str]) -> set[str]:
-    table = schema.text_features.c
+    table = tables.text_features.c
     return set(conn.execute(sa.select(table.key).where(among(table.key, keys))).scalars())
 
 
@@ -163,13 +163,3 @@ def check_share(share: float | None) -> None:
     """
     if share is not None and not 0 <= share <= 1:
         raise InvalidInput(f"{share} is not a share between 0 and 1", where="fail_early", hint="0.1 is one in ten.")
-
-
-def check_text(text: str | None, where: str) -> None:
-    """Check that Postgres can hold a text; what may come in is checked at the edge (`marey.characters`).
-
-    Raises:
-        InvalidInput: it holds NUL or a lone surrogate.
-    """
-    if text is not None:
-        characters.check_text(text, allowed=characters.STORED, where=where)

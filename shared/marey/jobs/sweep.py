@@ -7,17 +7,19 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.jobs import schema
-from marey.jobs.database import transaction
-from marey.jobs.deadlines import BULK
-from marey.jobs.deliveries import forget_events
+from marey.db.database import transaction
+from marey.db.deadlines import BULK
+from marey.db.sql import CLOCK, interval
+from marey.jobs import tables
 from marey.jobs.held import drop_empty_lease, end_dead, give_back, held_items
-from marey.jobs.journal import CLOCK, LockedJob, NewEvent, change_lanes, interval, lock_job, record, returned
-from marey.jobs.lease_types import SweepReport
+from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, record, returned
+from marey.jobs.leases import SweepReport
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemState
 from marey.jobs.types import Problem
+from marey.tenants import tables as tenant_tables
+from marey.webhooks.deliveries import forget_events
 
 
 def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
@@ -32,7 +34,7 @@ def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
     """
     rules = rules or policy()
     total = SweepReport()
-    lease = schema.lease.c
+    lease = tables.lease.c
     with transaction(engine) as conn:
         expired = conn.execute(sa.select(lease.job_id).where(lease.expires_at < CLOCK).distinct()).scalars().all()
     for job in expired:
@@ -49,7 +51,7 @@ def make_due(engine: sa.Engine) -> int:
     Raises:
         Unreachable: the database does not answer.
     """
-    item = schema.item.c
+    item = tables.item.c
     with transaction(engine) as conn:
         due = conn.execute(sa.select(item.job_id).where(item.run_after <= CLOCK).distinct()).scalars().all()
     items = 0
@@ -65,7 +67,7 @@ def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:
     report = SweepReport()
     if job is None:
         return report
-    lease = schema.lease.c
+    lease = tables.lease.c
     expired = conn.execute(  # looked at again under lock: a heartbeat may have come in between
         sa.select(lease.token, lease.worker, lease.solo)
         .where(lease.job_id == job_id, lease.expires_at < CLOCK)
@@ -107,7 +109,7 @@ def _make_due_ready(conn: sa.Connection, job_id: UUID) -> int:
     job = lock_job(conn, job_id)
     if job is None:
         return 0
-    table = schema.item
+    table = tables.item
     rows = conn.execute(
         sa.update(table)
         .where(table.c.job_id == job_id, table.c.run_after <= CLOCK)
@@ -120,7 +122,7 @@ def _make_due_ready(conn: sa.Connection, job_id: UUID) -> int:
 
 def _tidy(conn: sa.Connection, rules: Policy) -> int:
     """Forget what is old; how many assets are stale (their removal needs the store: `remove_stale_assets`)."""
-    keys, workers, assets, audits = schema.idempotency, schema.worker, schema.asset, schema.audit_event
+    keys, workers, assets, audits = tables.idempotency, tables.worker, tables.asset, tenant_tables.audit_event
     conn.execute(sa.delete(keys).where(keys.c.created_at < CLOCK - interval(rules.idempotency)))
     conn.execute(sa.delete(workers).where(workers.c.seen_at < CLOCK - interval(rules.worker_kept)))
     forget_events(conn)
@@ -131,7 +133,7 @@ def _tidy(conn: sa.Connection, rules: Policy) -> int:
         .where(
             assets.c.state == "writing",
             assets.c.announced_at < CLOCK - interval(rules.asset_grace),
-            ~sa.exists().where(schema.asset_writer.c.asset_id == assets.c.id),
+            ~sa.exists().where(tables.asset_writer.c.asset_id == assets.c.id),
         )
     ).scalar_one()
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Generic, TypeVar
+from typing import TypeVar
 from uuid import UUID
 
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
+from marey.tenants.types import DEFAULT_TENANT
 
-DEFAULT_TENANT = "default"
 TEXT_QUEUE = "text"
+EVALUATOR_QUEUE = "evaluator"
+"""The queue of score items."""
 NO_TEXT = ""
 """The `text_key` of an item whose prompt nobody reads: it begins at `generate`."""
 SEED_LIMIT = 2**31
@@ -28,7 +30,7 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class Problem:
-    """Why an item failed, for a person: the shape of `marey.errors.MareyError`."""
+    """Why an item failed, for a person: the shape of `marey.core.errors.MareyError`."""
 
     type: str
     message: str
@@ -99,7 +101,7 @@ class NewJob:
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
     traceparent: str | None = None
-    """Of the request, as `marey.tracing` writes it."""
+    """Of the request, as `marey.core.tracing` writes it."""
 
 
 @dataclass(frozen=True)
@@ -155,22 +157,6 @@ class MotionFile:
 
 
 @dataclass(frozen=True)
-class MotionFilter:
-    """Which motions a listing shows: those that fit everything given."""
-
-    tags: Sequence[str] = ()
-    """All of them, as written."""
-    name: str | None = None
-    """How the name begins, in any case."""
-    text: str | None = None
-    """Words of the prompt in any form and order; "a phrase", or, -not as on the web."""
-    reviews: Sequence[Review] = ()
-    """One of these."""
-    unreviewed: bool = False
-    """Or not looked at yet."""
-
-
-@dataclass(frozen=True)
 class MotionRow:
     """A motion with its files, newest first in listings."""
 
@@ -202,19 +188,6 @@ class MotionRow:
     """The motion that it is another take of."""
     replaced_by: UUID | None
     """The item that is another take of it."""
-
-
-@dataclass(frozen=True)
-class Reroll:
-    """Another take of a motion: an item in the same job."""
-
-    motion: UUID
-    item: UUID
-    job: UUID
-    seed: int
-    state: ItemState
-    made: bool
-    """Now; else it was asked for before."""
 
 
 @dataclass(frozen=True)
@@ -261,33 +234,3 @@ class EventRow:
     reason: str
     data: JsonObject
     at: datetime
-
-
-@dataclass(frozen=True)
-class Page(Generic[Row]):
-    """One page of a listing; `cursor` asks for the next, None at the end."""
-
-    rows: tuple[Row, ...]
-    cursor: str | None
-
-
-@dataclass(frozen=True)
-class GarbageReport:
-    """What a garbage collection removed."""
-
-    rows: int
-    """Asset rows that nothing refers to, with their objects."""
-    orphans: int
-    """Objects without a row."""
-    missing: tuple[str, ...]
-    """Keys of rows whose object is not in the store: data loss, told, never hidden."""
-
-
-@dataclass(frozen=True)
-class Erasure:
-    """A job whose prompts were erased."""
-
-    job: UUID
-    erased: datetime
-    files_left: int
-    """Files that are still to be written anew; nobody gets them before."""

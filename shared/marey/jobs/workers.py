@@ -5,9 +5,9 @@ from __future__ import annotations
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from marey.jobs import schema
-from marey.jobs.journal import CLOCK, interval
-from marey.jobs.lease_types import SchedulerRow, WorkerBeat, WorkerRow
+from marey.db.sql import CLOCK, interval
+from marey.jobs import tables
+from marey.jobs.leases import SchedulerRow, WorkerBeat, WorkerRow
 from marey.jobs.policy import Policy, policy
 
 SCHEDULER = "scheduler"
@@ -28,7 +28,7 @@ def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
         "seen_at": CLOCK,
     }
     conn.execute(
-        insert(schema.worker)
+        insert(tables.worker)
         .values(id=worker.id, started_at=CLOCK, **values)
         .on_conflict_do_update(index_elements=["id"], set_=values)
     )
@@ -36,12 +36,12 @@ def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
 
 def retire(conn: sa.Connection, worker: str) -> None:
     """Forget a worker that stops in good order."""
-    conn.execute(sa.delete(schema.worker).where(schema.worker.c.id == worker))
+    conn.execute(sa.delete(tables.worker).where(tables.worker.c.id == worker))
 
 
 def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[str, int]:
     """How many workers live, by queue."""
-    table = schema.worker.c
+    table = tables.worker.c
     rows = conn.execute(
         sa.select(table.queue, sa.func.count().label("workers"))
         .where(_live(rules or policy()), table.queue != SCHEDULER)
@@ -52,7 +52,7 @@ def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[st
 
 def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[WorkerRow]:
     """Every worker seen within a day, newest heartbeat first."""
-    table = schema.worker.c
+    table = tables.worker.c
     rows = conn.execute(
         sa.select(
             *(table.id, table.queue, table.host, table.pid, table.device, table.bundle),
@@ -68,17 +68,17 @@ def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[Wo
 
 def beat_scheduler(conn: sa.Connection, name: str, *, host: str, pid: int) -> None:
     """Note that a scheduler works, and at its first word forget those that fell silent: this one is in their place."""
-    table = schema.worker.c
+    table = tables.worker.c
     known = conn.execute(sa.select(table.id).where(table.id == name)).one_or_none()
     if known is None:
         silent = (table.queue == SCHEDULER) & (table.seen_at < CLOCK - interval(SCHEDULER_LIVE))
-        conn.execute(sa.delete(schema.worker).where(silent))
+        conn.execute(sa.delete(tables.worker).where(silent))
     beat(conn, WorkerBeat(name, SCHEDULER, host, pid, device=""))
 
 
 def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
     """Every scheduler that was not told to stop, that heard of last first."""
-    table = schema.worker.c
+    table = tables.worker.c
     rows = conn.execute(
         sa.select(
             *(table.id, table.host, table.pid),
@@ -93,4 +93,4 @@ def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
 
 
 def _live(rules: Policy) -> sa.ColumnElement[bool]:
-    return schema.worker.c.seen_at > CLOCK - interval(rules.worker_live)
+    return tables.worker.c.seen_at > CLOCK - interval(rules.worker_live)

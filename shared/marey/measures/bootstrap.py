@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.measures.inputs import Array, Numbers, at_least, embeddings, integers
 
 _AT_ONCE = 2_000_000  # draws held: under 64 MB with what they pick

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.measures.bootstrap import Difference, paired_bootstrap
 from marey.measures.scores import MotionScore
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from marey.documents import parse_json
-from marey.errors import InvalidFile, InvalidInput
+from marey.core.documents import parse_json
+from marey.core.errors import InvalidFile, InvalidInput
 
 SCHEMA, VERSION = "marey.evaluation-report", 1
 

@@ -16,10 +16,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.arrays import check_array, text_of
-from marey.arrays import parse_npz as parse_arrays
-from marey.documents import parse_json
-from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.core.arrays import check_array, text_of
+from marey.core.arrays import parse_npz as parse_arrays
+from marey.core.documents import parse_json
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from marey.motion.files import write_atomically
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array

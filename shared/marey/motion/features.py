@@ -24,7 +24,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 from marey.motion.filters import smooth
 from marey.motion.kinematics import across, facing
 from marey.motion.rotations import Array, about, between, conjugate, multiply, normalize, rotate, to_6d

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.legs import follow_feet, foot_chain
 from marey.motion.rotations import Array, normalize
 from marey.motion.skeleton import Skeleton

@@ -6,7 +6,7 @@ import os
 import secrets
 from pathlib import Path
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 
 def write_atomically(path: Path, data: bytes) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.features import FeatureLayout
 from marey.motion.feet import clean_feet, find_contacts

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.features import Float32, HeadingLayout, to_world
 from marey.motion.rotations import Array
 from marey.motion.rows import Rows

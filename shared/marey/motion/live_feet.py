@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.feet import FLOOR_BAND, RELEASE, RULE, Bool, ContactRule, need_feet, over_floor
 from marey.motion.kinematics import facing
 from marey.motion.legs import draw_foot, foot_chain, leg_lengths, soft_stretch, two_bone_knee

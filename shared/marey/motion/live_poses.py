@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.pose import PLANE_PRIOR, Pose, checked_joints
 from marey.motion.rotations import Array, dot
 from marey.motion.rows import Rows

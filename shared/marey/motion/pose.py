@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.filters import smooth
 from marey.motion.kinematics import bone_lengths
 from marey.motion.rigid import bodies_of, fit_rotation, rest_vectors

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array, normalize, unroll

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 Float32 = NDArray[np.float32]
 

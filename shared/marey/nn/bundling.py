@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from marey.bundles import Bundle, BundleWriter, TextSpec
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.motion.features import layout
 
 NOT_STORED = frozenset({"quantizer.sums", "mean", "std"})

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import torch
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 HINT = "Set MAREY_DEVICE (of a training, --device) to cpu or auto."
 

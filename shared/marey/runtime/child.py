@@ -14,9 +14,12 @@ from types import FrameType
 from typing import cast
 from uuid import UUID
 
-from marey.errors import InvalidInput, Unreachable
-from marey.jobs import HEARTBEAT, WorkerBeat, beat, create_engine, heartbeat, leased_items, retire, transaction
+from marey.core.errors import InvalidInput, Unreachable
+from marey.core.settings import Settings, settings
+from marey.core.tracing import configure_tracing, end_tracing
+from marey.db import HEARTBEAT, create_engine, transaction
 from marey.jobs import Heartbeat as Answer
+from marey.jobs import WorkerBeat, beat, heartbeat, leased_items, retire
 from marey.runtime.committer import Committer
 from marey.runtime.exposition import expose, measure_gpu
 from marey.runtime.faults import patiently
@@ -25,9 +28,7 @@ from marey.runtime.lease import Heartbeat
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.loop import Drain, end_child
 from marey.runtime.status import WorkerStatus, status_file, write_status
-from marey.settings import Settings, settings
 from marey.storage import open_store
-from marey.tracing import configure_tracing, end_tracing
 
 log = logger(__name__)
 

@@ -13,23 +13,22 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import MareyError, Unreachable
+from marey.core.errors import MareyError, Unreachable
+from marey.db import transaction
+from marey.evaluations import NewScore, commit_score
 from marey.jobs import (
     AssetDigest,
     Committed,
     ItemFailure,
     NewMotion,
-    NewScore,
     NewText,
     Problem,
     asset_key,
     begin_assets,
     commit_motions,
-    commit_score,
     commit_texts,
     fail_items,
     release,
-    transaction,
 )
 from marey.runtime.faults import as_problem, patiently
 from marey.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone

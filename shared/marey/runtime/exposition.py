@@ -6,10 +6,10 @@ import sys
 
 from prometheus_client import start_http_server
 
-from marey import metrics
-from marey.errors import Conflict
+from marey.core import metrics
+from marey.core.errors import Conflict
+from marey.core.settings import Settings
 from marey.runtime.logs import logger
-from marey.settings import Settings
 
 log = logger(__name__)
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import tenacity
 
-from marey.errors import MareyError, Unreachable
+from marey.core.errors import MareyError, Unreachable
 
 T = TypeVar("T")
 

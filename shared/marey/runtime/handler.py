@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 from uuid import UUID
 
-from marey.errors import MareyError
-from marey.jobs.lease_types import Claim, ClaimedItem
+from marey.core.errors import MareyError
+from marey.jobs.leases import Claim, ClaimedItem
 from marey.runtime.scoring import ScoreInput
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Collection, Iterable
 from uuid import UUID
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
 from marey.jobs import Claim
 from marey.jobs import Heartbeat as Answer
 from marey.runtime.logs import logger

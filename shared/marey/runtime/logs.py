@@ -15,8 +15,8 @@ import structlog
 from structlog.stdlib import BoundLogger
 from structlog.typing import EventDict, ExcInfo, Processor, WrappedLogger
 
-from marey import tracing
-from marey.characters import escape, unescaped
+from marey.core import tracing
+from marey.core.characters import escape, unescaped
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
 """Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""

@@ -14,8 +14,9 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import MareyError, Unreachable
-from marey.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts, transaction
+from marey.core.errors import MareyError, Unreachable
+from marey.db import transaction
+from marey.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts
 from marey.runtime.committer import Committer
 from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
 from marey.runtime.handler import Batch, Failed, Handler

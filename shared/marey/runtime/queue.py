@@ -12,9 +12,9 @@ import redis
 from redis.backoff import NoBackoff
 from redis.retry import Retry
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
+from marey.core.versions import check_redis
 from marey.runtime.app import CONNECT_TIMEOUT, HEALTH_CHECK_INTERVAL, SOCKET_TIMEOUT
-from marey.versions import check_redis
 
 SOCKET_SCHEME = "redis+socket://"
 

@@ -8,17 +8,10 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.errors import NotFound
-from marey.jobs import (
-    SEARCH,
-    EarlierRun,
-    EvaluationJob,
-    EvaluationRequest,
-    MadeItem,
-    asset_key,
-    load_score,
-    transaction,
-)
+from marey.core.errors import NotFound
+from marey.db import SEARCH, transaction
+from marey.evaluations import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem, load_score
+from marey.jobs import asset_key
 from marey.storage import AssetStore
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import psutil
 
-from marey.errors import Unreachable
-from marey.private_home import open_private
+from marey.core.errors import Unreachable
+from marey.core.private_home import open_private
 
 TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats

@@ -11,12 +11,12 @@ import time
 from celery import shared_task
 from celery.signals import worker_process_init, worker_process_shutdown
 
-from marey.errors import MareyError, Unreachable
+from marey.core.errors import MareyError, Unreachable
+from marey.core.settings import settings
 from marey.runtime.app import DRAIN
 from marey.runtime.child import NAME_VARIABLE, Child
 from marey.runtime.logs import logger
 from marey.runtime.status import WorkerStatus, write_status
-from marey.settings import settings
 
 log = logger(__name__)
 

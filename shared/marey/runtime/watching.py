@@ -9,9 +9,9 @@ from uuid import UUID
 
 from structlog.contextvars import bound_contextvars
 
-from marey import metrics, tracing
+from marey.core import metrics, tracing
+from marey.core.tracing import Span
 from marey.jobs import Claim
-from marey.tracing import Span
 
 MOST_IDS = 64
 """Items named in one attribute or line; a claim holds no more."""

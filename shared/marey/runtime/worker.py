@@ -20,13 +20,13 @@ import psutil
 from celery import signals
 from celery.platforms import SecurityWarning
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
 from marey.runtime.app import create_app
 from marey.runtime.child import NAME_VARIABLE, ROLE_VARIABLE, wait_for_database
 from marey.runtime.handler import Role
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.status import WorkerStatus, forget_dead, read_status, status_file
-from marey.settings import Settings
 
 log = logger(__name__)
 

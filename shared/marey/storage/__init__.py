@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from marey.errors import InvalidInput
-from marey.settings import Settings
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
 from marey.storage.folder import FolderStore
 from marey.storage.port import CHUNK, PRESIGN_SECONDS, AssetStore, Digest, NewObject, Opened, asset_digest
 

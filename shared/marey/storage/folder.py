@@ -14,8 +14,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from marey.errors import Unreachable
-from marey.metrics import STORE_ERRORS
+from marey.core.errors import Unreachable
+from marey.core.metrics import STORE_ERRORS
 from marey.storage.port import (
     CHUNK,
     PRESIGN_SECONDS,

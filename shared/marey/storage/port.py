@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, Protocol, runtime_checkable
 
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 
 CHUNK = 1 << 20
 PRESIGN_SECONDS = 900

@@ -14,9 +14,10 @@ import urllib3
 from minio import Minio
 from minio.error import InvalidResponseError, MinioException, S3Error, ServerError
 
-from marey.disposition import attachment
-from marey.errors import Unreachable
-from marey.metrics import STORE_ERRORS
+from marey.core.disposition import attachment
+from marey.core.errors import Unreachable
+from marey.core.metrics import STORE_ERRORS
+from marey.core.tls import UNTRUSTED_HINT, trusting_context, verification_error
 from marey.storage.deadlines import Silence, open_pool
 from marey.storage.port import (
     CHUNK,
@@ -31,7 +32,6 @@ from marey.storage.port import (
     no_such_object,
     range_past_end,
 )
-from marey.tls import UNTRUSTED_HINT, trusting_context, verification_error
 
 PROBE = "doctor/none"
 """A key without an object."""

@@ -1,1 +1,37 @@
-"""Live streams: bytes of a frame, the streams on Redis that carry frames to any API process, messages, recordings."""
+"""Live streams: rows of the database, and the messages, frames and recordings that Redis carries."""
+
+from marey.streams.repository import (
+    abandoned_streams,
+    add_chunk,
+    create_stream,
+    end_stream,
+    get_stream,
+    list_streams,
+    open_streams,
+    stream_acts,
+    stream_prompts,
+    take_stream,
+    told_prompts,
+)
+from marey.streams.states import StreamState
+from marey.streams.types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
+
+__all__ = [
+    "NewStream",
+    "StreamChunk",
+    "StreamPast",
+    "StreamPrompt",
+    "StreamRow",
+    "StreamState",
+    "abandoned_streams",
+    "add_chunk",
+    "create_stream",
+    "end_stream",
+    "get_stream",
+    "list_streams",
+    "open_streams",
+    "stream_acts",
+    "stream_prompts",
+    "take_stream",
+    "told_prompts",
+]

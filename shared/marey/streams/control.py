@@ -13,7 +13,7 @@ from typing import Any, Literal, cast, get_args
 
 import redis
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.streams.redis import BLOCK_MS, KEEP_MS, reached, stream_entries, stream_key
 
 Kind = Literal["steer", "pause", "resume", "stop"]

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 MAGIC, VERSION = b"MF", 1
 HEADER = struct.Struct("<2sBBIHH3f")

@@ -26,7 +26,7 @@ from redis.exceptions import ConnectionError as NoConnection
 from redis.exceptions import OutOfMemoryError, ReadOnlyError
 from redis.exceptions import TimeoutError as TookTooLong
 
-from marey.errors import Conflict, InvalidInput, Unreachable
+from marey.core.errors import Conflict, InvalidInput, Unreachable
 from marey.streams.frames import Frame, encode_frame
 
 LEASE_MS = 1500

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 
 from marey.bundles import Bundle, find_bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.nn.threads import one_thread
 from marey.text.bio import start_scores, transition_scores, viterbi
 from marey.text.keys import labeller_bundle

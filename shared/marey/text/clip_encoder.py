@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.nn.threads import one_thread
 from marey.text.encoders import WIDTHS, Encoding, weights_sha256
 from marey.text.pretrained import load_pretrained, read_config

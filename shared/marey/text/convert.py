@@ -23,8 +23,8 @@ import torch
 from safetensors.torch import save_file  # pyright: ignore[reportUnknownVariableType]
 
 from marey.bundles import Bundle, BundleWriter, DataSource
-from marey.characters import escape
-from marey.errors import InvalidFile, MareyError
+from marey.core.characters import escape
+from marey.core.errors import InvalidFile, MareyError
 from marey.text.bert_srl import PREFIX, PROJECTION
 from marey.text.pretrained import read_config
 

@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidFile, NotFound
-from marey.hashing import sha256_of
-from marey.settings import Settings, settings
+from marey.core.errors import InvalidFile, NotFound
+from marey.core.hashing import sha256_of
+from marey.core.settings import Settings, settings
 
 WIDTHS = {"minilm": 384, "clip-vit-b32": 512, "t5-base": 768, "t5-v1_1-base": 768}
 HUB = {

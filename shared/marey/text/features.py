@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import save
 
-from marey.arrays import parse_safetensors
-from marey.documents import parse_json
-from marey.errors import InvalidFile
+from marey.core.arrays import parse_safetensors
+from marey.core.documents import parse_json
+from marey.core.errors import InvalidFile
 from marey.text.graph import SemanticGraph
 
 FORMAT = 1

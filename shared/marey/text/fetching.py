@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from marey.errors import InvalidFile, NotFound, Unreachable
-from marey.settings import Settings, settings
+from marey.core.errors import InvalidFile, NotFound, Unreachable
+from marey.core.settings import Settings, settings
 from marey.text.encoders import find_weights
 
 log = logging.getLogger(__name__)

@@ -6,8 +6,8 @@ import hashlib
 import json
 
 from marey.bundles import TextSpec, find_bundle
-from marey.errors import InvalidBundle
-from marey.settings import Settings, settings
+from marey.core.errors import InvalidBundle
+from marey.core.settings import Settings, settings
 
 PIPELINE_VERSION = 5
 """Raise it when the graph, the acts or the features of the same prompt change for any reason but weights."""

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.nn.threads import one_thread
 from marey.text.bio import start_scores, transition_scores, viterbi
 from marey.text.encoders import weights_sha256

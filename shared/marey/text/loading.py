@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from marey.bundles import find_bundle
-from marey.errors import InvalidBundle, NotFound
-from marey.settings import settings
+from marey.core.errors import InvalidBundle, NotFound
+from marey.core.settings import settings
 from marey.text.encoders import WIDTHS, TextEncoder
 from marey.text.fetching import need_weights
 from marey.text.keys import NO_LABELLER, labeller_bundle

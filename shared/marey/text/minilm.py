@@ -23,7 +23,7 @@ from safetensors.torch import load_file  # pyright: ignore[reportUnknownVariable
 from tokenizers import Tokenizer
 from torch import Tensor, nn
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.nn.compiled import compiled
 from marey.nn.packed import PackedLinear, can_pack
 

@@ -19,11 +19,11 @@ from pathlib import Path
 import httpx2
 from pydantic import SecretStr
 
-from marey.errors import InvalidInput, MareyError
-from marey.prompts import check_prompt
-from marey.settings import Settings
+from marey.core.errors import InvalidInput, MareyError
+from marey.core.settings import Settings
+from marey.core.tls import trusting_context
+from marey.items.prompts import check_prompt
 from marey.text.rewriters import NotRewritten
-from marey.tls import trusting_context
 
 log = logging.getLogger(__name__)
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidBundle
-from marey.prompts import check_prompt
+from marey.core.errors import InvalidBundle
+from marey.items.prompts import check_prompt
 from marey.text.acts import acts_of
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, cast
 
-from marey.documents import read_json
-from marey.errors import InvalidFile, NotFound
+from marey.core.documents import read_json
+from marey.core.errors import InvalidFile, NotFound
 
 
 def read_config(folder: Path) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 from marey.text.roles import Frame, RoleLabeller
 from marey.text.words import SINGULAR, UNITS, bare, inflected, is_past, lemma
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import httpx2
 
-from marey.addresses import Allowed, parse_address
-from marey.errors import InvalidInput, Refused
+from marey.core.addresses import Allowed, parse_address
+from marey.core.errors import InvalidInput, Refused
 
 MAX_URL = 2000  # characters
 HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."

@@ -9,7 +9,7 @@ from importlib.metadata import version
 
 from standardwebhooks.webhooks import Webhook
 
-from marey.jobs.webhook_types import DueDelivery
+from marey.webhooks.types import DueDelivery
 
 NOUNS = {
     "job": "/v1/jobs/{}",

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from cryptography.fernet import Fernet, InvalidToken, MultiFernet
 
-from marey.errors import InvalidInput, Refused
-from marey.settings import Settings
+from marey.core.errors import InvalidInput, Refused
+from marey.core.settings import Settings
 
 KEY_FILE = "webhook.key"
 WHERE = "MAREY_WEBHOOK_KEY"

@@ -15,8 +15,8 @@ import sqlalchemy as sa
 
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.jobs import create_engine, transaction
-from marey.runtime.embedded import EmbeddedServer
+from marey.db import create_engine, transaction
+from marey.embedded import EmbeddedServer
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
 from tests.support.compose import services, waits_for
 from tests.support.composed import Network, Process, free_ports, write_secrets

@@ -11,9 +11,10 @@ import sqlalchemy as sa
 from marey.cli import checkup_backing as backing
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.jobs import create_engine, downgrade, server_version, transaction, upgrade
+from marey.core.versions import POSTGRES, REDIS
+from marey.db import create_engine, downgrade, transaction, upgrade
+from marey.jobs import server_version
 from marey.runtime.queue import check_queue, redis_client
-from marey.versions import POSTGRES, REDIS
 from tests.servers.debian import INSTALLED, debian_postgres, debian_redis
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import Hand, add_mogo

@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 from cryptography.fernet import Fernet
 
-from marey.runtime.embedded import EmbeddedServer
+from marey.embedded import EmbeddedServer
 from tests.servers.debian import INSTALLED, debian_postgres, debian_redis
 from tests.servers.ports import free_ports
 from tests.support.marey import REPOSITORY, Marey

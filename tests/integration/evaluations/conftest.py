@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
+from marey.core.settings import Settings
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
 from marey.storage import FolderStore
 from tests.support.evaluations import ToyEvaluator, ToyTexts, models_of
 from tests.support.runtime import Loop

@@ -8,27 +8,16 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.jobs import (
-    DEFAULT_TENANT,
-    AssetDigest,
-    EvaluationState,
-    JobState,
-    NewScore,
-    begin_assets,
-    cancel,
-    cancel_evaluation,
-    claim,
-    collect_garbage,
-    commit_score,
-    delete,
-    sweep,
-    transaction,
-)
+from marey.core.errors import Conflict, InvalidInput
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import EvaluationState, NewScore, cancel_evaluation, commit_score
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.jobs import AssetDigest, JobState, begin_assets, cancel, claim, sweep
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
 from marey.storage import FolderStore
+from marey.takes import collect_garbage, delete
+from marey.tenants import DEFAULT_TENANT
 from tests.servers.audit import audit as audit_tables
 from tests.support.evaluations import (
     GENERATOR,

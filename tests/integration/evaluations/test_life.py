@@ -7,18 +7,15 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import NotFound
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.jobs import (
-    DEFAULT_TENANT,
-    EvaluationRow,
-    EvaluationState,
-    get_job,
-    transaction,
-)
+from marey.core.errors import NotFound
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import EvaluationRow, EvaluationState
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.jobs import get_job
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
 from marey.storage import FolderStore
+from marey.tenants import DEFAULT_TENANT
 from tests.servers.audit import audit as audit_tables
 from tests.support.evaluations import (
     GENERATOR,

@@ -7,9 +7,8 @@ from uuid import UUID
 
 import sqlalchemy as sa
 
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.jobs import (
-    DEFAULT_TENANT,
+from marey.db import transaction
+from marey.evaluations import (
     EvaluationRequest,
     NewSchedule,
     ScheduleChange,
@@ -20,10 +19,11 @@ from marey.jobs import (
     load_prompts,
     remove_unused_prompts,
     run_schedule,
-    schema,
     store_prompts,
-    transaction,
+    tables,
 )
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.tenants import DEFAULT_TENANT
 from tests.support.evaluations import GENERATOR, PROMPTS, new_evaluation, wait
 
 OTHER = (EvaluationPrompt("run"), EvaluationPrompt("jump"))
@@ -31,7 +31,7 @@ OTHER = (EvaluationPrompt("run"), EvaluationPrompt("jump"))
 
 def sets(engine: sa.Engine) -> int:
     with transaction(engine) as conn:
-        return conn.execute(sa.select(sa.func.count()).select_from(schema.prompt_set)).scalar_one()
+        return conn.execute(sa.select(sa.func.count()).select_from(tables.prompt_set)).scalar_one()
 
 
 def schedule_of(engine: sa.Engine, prompts: tuple[EvaluationPrompt, ...]) -> UUID:

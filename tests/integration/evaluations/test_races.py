@@ -8,37 +8,39 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput, NotFound, Unreachable
-from marey.jobs import (
-    DEFAULT_TENANT,
-    AssetDigest,
+from marey.core.errors import InvalidInput, NotFound, Unreachable
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import (
     EvaluationState,
-    JobState,
-    NewJob,
     NewScore,
-    begin_assets,
     cancel_evaluation,
-    claim,
-    collect_garbage,
     commit_score,
-    delete,
     get_evaluation,
-    get_job,
     list_evaluations,
-    list_items,
     lock_evaluation,
     move_evaluation,
+)
+from marey.evaluations import tables as evaluation_tables
+from marey.evaluations.states import EVALUATION_TRANSITIONS
+from marey.jobs import (
+    AssetDigest,
+    JobState,
+    NewJob,
+    begin_assets,
+    claim,
+    get_job,
+    list_items,
     retry,
-    schema,
     submit,
     sweep,
-    transaction,
 )
-from marey.jobs.states import EVALUATION_TRANSITIONS
 from marey.scheduler import evaluations as steps
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
 from marey.storage import FolderStore
+from marey.takes import collect_garbage, delete
+from marey.tenants import DEFAULT_TENANT
+from marey.tenants import tables as tenant_tables
 from tests.servers.jobs import let_expire
 from tests.support.evaluations import (
     CLIPS,
@@ -248,23 +250,23 @@ def put(conn: sa.Connection, evaluation: UUID, state: EvaluationState) -> None:
     """Set a state and what must go with it, so that the transition alone decides."""
     over = state in (S.DONE, S.FAILED, S.CANCELLED)
     values = {"finished_at": sa.func.now() if over else None, "summary": {} if state is S.DONE else sa.null()}
-    table = schema.evaluation
+    table = evaluation_tables.evaluation
     conn.execute(sa.update(table).where(table.c.id == evaluation).values(state=state, **values))
 
 
 def test_an_evaluation_begins_planned(engine: sa.Engine) -> None:
     new_evaluation(engine)
     with engine.connect() as conn:
-        row = dict(conn.execute(sa.select(schema.evaluation)).mappings().one())
+        row = dict(conn.execute(sa.select(evaluation_tables.evaluation)).mappings().one())
         row |= {"id": UUID(int=1), "state": "failed", "finished_at": row["created_at"]}
         with pytest.raises(sa.exc.DBAPIError, match="an evaluation begins planned, not failed"):
-            conn.execute(sa.insert(schema.evaluation).values(row))
+            conn.execute(sa.insert(evaluation_tables.evaluation).values(row))
 
 
 def test_a_foreign_tenant_sees_and_changes_nothing(engine: sa.Engine) -> None:
     evaluation = new_evaluation(engine)
     with transaction(engine) as conn:
-        conn.execute(sa.insert(schema.tenant).values(id="other"))
+        conn.execute(sa.insert(tenant_tables.tenant).values(id="other"))
     with transaction(engine) as conn:
         assert list_evaluations(conn, "other").rows == ()
         for act in (get_evaluation, cancel_evaluation):

@@ -13,11 +13,9 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.jobs import (
-    EvaluationState,
-    transaction,
-)
-from marey.settings import REPOSITORY, Settings
+from marey.core.settings import REPOSITORY, Settings
+from marey.db import transaction
+from marey.evaluations import EvaluationState
 from marey.storage import FolderStore
 from tests.support.evaluations import (
     ToyEvaluator,

@@ -10,9 +10,10 @@ from zoneinfo import ZoneInfo
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput, NotFound
-from marey.jobs import (
-    DEFAULT_TENANT,
+from marey.core.errors import InvalidInput, NotFound
+from marey.core.settings import Settings
+from marey.db import transaction
+from marey.evaluations import (
     EvaluationRequest,
     EvaluationState,
     NewEvaluation,
@@ -26,12 +27,10 @@ from marey.jobs import (
     list_evaluations,
     list_schedules,
     run_schedule,
-    schema,
-    transaction,
 )
-from marey.jobs.cron import next_time
+from marey.evaluations.cron import next_time
 from marey.scheduler.evaluations import Evaluations
-from marey.settings import Settings
+from marey.tenants import DEFAULT_TENANT, tables
 from tests.support.evaluations import (
     GENERATOR,
     at_once,
@@ -269,7 +268,7 @@ def test_the_runs_of_a_deleted_schedule_stay_and_go_on(engine: sa.Engine, schedu
 def test_a_foreign_tenant_sees_and_changes_nothing(engine: sa.Engine) -> None:
     schedule = new_schedule(engine)
     with transaction(engine) as conn:
-        conn.execute(sa.insert(schema.tenant).values(id="other"))
+        conn.execute(sa.insert(tables.tenant).values(id="other"))
     with transaction(engine) as conn:
         assert list_schedules(conn, "other").rows == ()
         acts: list[Callable[[], object]] = [

@@ -9,9 +9,9 @@ import redis
 
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.runtime.embedded import EmbeddedServer
+from marey.core.settings import Settings
+from marey.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
 from tests.servers.ports import free_ports
 from tests.servers.receiver import Authority
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift

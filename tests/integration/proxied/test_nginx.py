@@ -14,7 +14,7 @@ from marey.cli import client as client_module
 from marey.cli.client import Client
 from marey.cli.live.link import Link
 from marey.cli.place import Server
-from marey.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
+from marey.core.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
 from tests.servers.nginx import PROGRAM, Nginx
 from tests.servers.ports import free_ports
 from tests.servers.receiver import Authority

@@ -12,8 +12,8 @@ import pytest
 from marey.cli.client import Client
 from marey.cli.live.link import Link
 from marey.cli.place import Server
-from marey.errors import Unreachable
-from marey.settings import Settings
+from marey.core.errors import Unreachable
+from marey.core.settings import Settings
 from tests.servers.receiver import Authority
 from tests.servers.swift import Swift
 from tests.servers.tls_front import TlsFront

@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import InvalidInput
-from marey.jobs import EVENT_CHANNEL, Listener, check_listening, create_engine, get_job, transaction, upgrade
-from marey.jobs.deadlines import BULK, ORDINARY
+from marey.core.errors import InvalidInput
+from marey.db import EVENT_CHANNEL, Listener, check_listening, create_engine, transaction, upgrade
+from marey.db.deadlines import BULK, ORDINARY
+from marey.jobs import get_job
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.servers.pooler import PROGRAM, pooler

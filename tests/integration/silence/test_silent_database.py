@@ -11,10 +11,10 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import EVENT_CHANNEL, Deadline, Listener, create_engine, outages, transaction
-from marey.jobs.connections import HEARD_LATELY, SilentConnection
-from marey.jobs.deadlines import (
+from marey.core.errors import Unreachable
+from marey.db import EVENT_CHANNEL, Deadline, Listener, create_engine, outages, transaction
+from marey.db.connections import HEARD_LATELY, SilentConnection
+from marey.db.deadlines import (
     BULK,
     CONNECT_SECONDS,
     HEARTBEAT,
@@ -224,7 +224,7 @@ def test_a_living_server_raises_no_alarm_and_keeps_what_it_answers(proxied: str,
 def test_a_connection_that_lets_a_byte_through_now_and_then_is_given_up(
     behind: sa.Engine, proxy: StallingProxy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("marey.jobs.connections.in_all", lambda limit: limit)
+    monkeypatch.setattr("marey.db.connections.in_all", lambda limit: limit)
 
     def ask() -> None:
         with transaction(behind) as conn:
@@ -314,7 +314,7 @@ def test_a_process_that_was_stopped_itself_raises_no_alarm(behind: sa.Engine, mo
     with transaction(behind) as conn:
         conn.execute(sa.text("SELECT 1"))
         jumps = iter(range(0, 1_000_000, 1000))
-        monkeypatch.setattr("marey.jobs.connections.time.monotonic", lambda: float(next(jumps)))
+        monkeypatch.setattr("marey.db.connections.time.monotonic", lambda: float(next(jumps)))
         conn.execute(sa.text("SELECT 2"))
     monkeypatch.undo()
     assert outages(behind) == 0
@@ -332,7 +332,7 @@ def test_a_listener_finds_its_connection_silent(proxied: str, proxy: StallingPro
 
 
 def test_a_probe_loses_no_notification(database_url: str, engine: sa.Engine, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("marey.jobs.listener.PROBE_EVERY", 0.0)
+    monkeypatch.setattr("marey.db.listener.PROBE_EVERY", 0.0)
     with Listener(database_url, (EVENT_CHANNEL,)) as listener:
         for number in range(50):
             with transaction(engine) as conn:

@@ -11,13 +11,13 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from marey.errors import Unreachable
-from marey.jobs import StreamState
-from marey.mogo.bundle import random_bundle
-from marey.mogo.generate import Generator
-from marey.mogo.live import LiveRoom
+from marey.core.errors import Unreachable
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.live import LiveRoom
 from marey.runtime.live.main import REDIS_SECONDS
 from marey.runtime.queue import SOCKET_SCHEME, redis_client
+from marey.streams import StreamState
 from marey.streams.frames import Frame
 from marey.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy

@@ -13,8 +13,8 @@ import sqlalchemy as sa
 
 from marey.api import tailer as tailer_module
 from marey.cli.watching import watch_job
-from marey.jobs import create_engine, outages
-from marey.runtime.embedded import EmbeddedServer
+from marey.db import create_engine, outages
+from marey.embedded import EmbeddedServer
 from tests.servers.stalling_proxy import StallingProxy
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.runtime import Loop

@@ -13,10 +13,10 @@ import kombu.utils.functional
 import pytest
 import redis
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
+from marey.embedded import EmbeddedServer
 from marey.runtime import app as queue_app
 from marey.runtime.app import RECONNECT_MAX, create_app
-from marey.runtime.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
 from marey.streams.redis import FrameStream
 from tests.servers.stalling_proxy import StallingProxy

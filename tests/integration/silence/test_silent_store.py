@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
 from marey.jobs import asset_key
 from marey.storage import NewObject, deadlines
 from marey.storage.s3 import S3Store

@@ -8,9 +8,9 @@ import httpx2
 import pytest
 import redis
 
-from marey.runtime.embedded import EmbeddedServer
+from marey.core.settings import Settings
+from marey.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
 from tests.support.live_api import LiveApi, running_api, settings_of
 from tests.support.live_streams import PATIENCE, Hand, add_mogo
 from tests.support.streams_api import begin, new_key

@@ -9,9 +9,9 @@ import httpx2
 import pytest
 
 from marey.api.streams import messages, session
-from marey.runtime.embedded import start_valkey
+from marey.core.settings import Settings
+from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
 from marey.streams.control import Control
 from marey.streams.redis import FrameStream
 from tests.support.live_api import ApiThread, LiveApi

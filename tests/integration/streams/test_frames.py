@@ -9,9 +9,9 @@ import pytest
 import redis
 
 from marey.api.streams import protocol
-from marey.jobs import StreamState
+from marey.core.settings import Settings
 from marey.motion.skeleton import HUMANML3D
-from marey.settings import Settings
+from marey.streams import StreamState
 from marey.streams.control import Control
 from marey.streams.reads import ReadAs
 from marey.streams.watch import Watch

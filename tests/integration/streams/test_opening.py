@@ -12,7 +12,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 
 from marey.api import stream_hub as hub
-from marey.settings import Settings
+from marey.core.settings import Settings
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import PATIENCE, watching
 from tests.support.streams_api import WALK, beside, close_code, new_key, refused

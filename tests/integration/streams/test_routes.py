@@ -11,9 +11,12 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from marey.jobs import schema, take_stream, transaction
+from marey.db import transaction
 from marey.motion.skeleton import HUMANML3D
+from marey.streams import tables as stream_tables
+from marey.streams import take_stream
 from marey.streams.control import Control, ControlQueue
+from marey.tenants import tables as tenant_tables
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import BUNDLE, PATIENCE, Hand
 from tests.support.streams_api import WALK, begin, close_code, new_key, refused, until, waiting_for_a_row
@@ -116,7 +119,7 @@ def test_a_worker_that_takes_a_stream_while_it_is_deleted_has_it_and_hears_of_th
 
 def test_the_stream_of_another_tenant_is_404_over_http_and_over_the_socket(api: LiveApi, stream: str) -> None:
     with transaction(api.engine) as conn:
-        conn.execute(sa.insert(schema.tenant).values(id="other"))
+        conn.execute(sa.insert(tenant_tables.tenant).values(id="other"))
     foreign = new_key(api, "admin", tenant="other")
     with httpx2.Client(base_url=api.url, headers={"Authorization": f"Bearer {foreign}"}) as http:
         refused(http.get(f"/v1/streams/{stream}"), 404, "not-found")
@@ -136,7 +139,11 @@ def test_beginning_and_ending_want_submit_and_looking_wants_read(api: LiveApi, s
 
 def test_a_stream_outlives_its_bundle(api: LiveApi, http: httpx2.Client, stream: str) -> None:
     with transaction(api.engine) as conn:
-        conn.execute(sa.update(schema.stream).values(bundle="gone@0123456789ab").where(schema.stream.c.id == stream))
+        conn.execute(
+            sa.update(stream_tables.stream)
+            .values(bundle="gone@0123456789ab")
+            .where(stream_tables.stream.c.id == stream)
+        )
     found = http.get(f"/v1/streams/{stream}").json()
     assert (found["licence"], found["fps"], found["skeleton"]) == (None, None, None)
     assert stream in [row["id"] for row in http.get("/v1/streams").json()["items"]]

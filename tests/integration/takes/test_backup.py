@@ -13,9 +13,9 @@ import pytest
 import sqlalchemy as sa
 
 from marey.cli.backup import Manifest, export_tenant, import_tenant
-from marey.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, NotFound
+from marey.db import transaction
 from marey.jobs import (
-    GarbageReport,
     ItemFailure,
     JobRow,
     NewMotion,
@@ -23,20 +23,17 @@ from marey.jobs import (
     asset_key,
     begin_assets,
     cancel,
-    collect_garbage,
     commit_motions,
     events_after,
     fail_items,
     get_job,
     list_items,
     list_jobs,
-    reroll,
     retry,
-    review,
-    transaction,
 )
 from marey.jobs.types import EventRow, ItemRow
 from marey.storage import FolderStore
+from marey.takes import GarbageReport, collect_garbage, reroll, review
 from tests.servers.audit import audit
 from tests.servers.jobs import PROBLEM, claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.marey import Marey

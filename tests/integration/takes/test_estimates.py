@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 import sqlalchemy as sa
 
+from marey.db import transaction
 from marey.jobs import (
     NewMotion,
     WorkerBeat,
@@ -17,10 +18,9 @@ from marey.jobs import (
     estimate,
     pause,
     place_of,
-    set_quotas,
-    transaction,
 )
-from marey.jobs.quotas import EXPECTED_BYTES
+from marey.tenants import set_quotas
+from marey.tenants.quotas import EXPECTED_BYTES
 from tests.servers.jobs import claim_some, motion_of, new_item, parse_texts, submit_items
 from tests.support.command import Command
 from tests.support.live_api import LiveApi

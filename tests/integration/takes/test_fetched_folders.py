@@ -14,7 +14,7 @@ from marey.cli.client import Client
 from marey.cli.commands.fetch import fetch_job
 from marey.cli.manifest import RECORD, remove_left, write_manifest
 from marey.cli.place import Server
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

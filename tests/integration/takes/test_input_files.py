@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.characters import find_forbidden
 from marey.cli.csv_cells import restore
 from marey.cli.manifest import NAME, RAW_COLUMNS
-from marey.jobs import schema, transaction
+from marey.core.characters import find_forbidden
+from marey.db import transaction
+from marey.jobs import tables
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 
@@ -188,10 +189,10 @@ def test_rows_of_earlier_releases_are_shown_escaped_and_told_as_they_are(
     job = marey("submit", "a person walks").ok().out.strip()
     api.work()
     with transaction(api.engine) as conn:  # the edge takes no such text any more
-        conn.execute(sa.update(schema.job).values(name=text, comment=text))
-        conn.execute(sa.update(schema.item).values(name=text, prompt=f"walk {text}", tags=[text]))
+        conn.execute(sa.update(tables.job).values(name=text, comment=text))
+        conn.execute(sa.update(tables.item).values(name=text, prompt=f"walk {text}", tags=[text]))
         conn.execute(
-            sa.update(schema.motion).values(
+            sa.update(tables.motion).values(
                 review="kept", review_comment=text, reviewed_by=text, reviewed_at=sa.func.now()
             )
         )

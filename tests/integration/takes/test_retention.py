@@ -11,44 +11,40 @@ import httpx2
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, NotFound
+from marey.core.errors import Conflict, NotFound
+from marey.db import transaction
 from marey.jobs import (
-    DEFAULT_TENANT,
-    KEPT,
     AssetDigest,
-    GarbageReport,
     ItemFailure,
     JobState,
     NewMotion,
-    NewStream,
     Problem,
-    StreamChunk,
-    add_chunk,
     asset_key,
     begin_assets,
     cancel,
-    collect_garbage,
     commit_motions,
-    create_key,
-    create_stream,
-    delete_expired,
-    end_stream,
-    erase,
     fail_items,
     get_job,
-    get_stream,
     list_items,
     retry,
-    rewrite_files,
     submit,
-    take_stream,
-    told_prompts,
-    transaction,
 )
 from marey.jobs.types import NewJob
 from marey.motion.clip import parse_npz, without_prompt
 from marey.storage import FolderStore
+from marey.streams import (
+    NewStream,
+    StreamChunk,
+    add_chunk,
+    create_stream,
+    end_stream,
+    get_stream,
+    take_stream,
+    told_prompts,
+)
 from marey.streams.reads import ReadAs
+from marey.takes import KEPT, GarbageReport, collect_garbage, delete_expired, erase, rewrite_files
+from marey.tenants import DEFAULT_TENANT, create_key
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 from tests.support.command import Command

@@ -16,7 +16,7 @@ import psutil
 import pytest
 from PIL import Image
 
-from marey.motion.overview import GAP, MARGIN, TILE
+from marey.viz.overview import GAP, MARGIN, TILE
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 from tests.support.walker import walker

@@ -9,27 +9,22 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput, NotFound
+from marey.core.errors import Conflict, InvalidInput, NotFound
+from marey.db import transaction
 from marey.jobs import (
     SEED_LIMIT,
     ItemRow,
     JobState,
-    MotionFilter,
     NewItem,
-    Reroll,
     Review,
     cancel,
-    delete,
     events_after,
     get_job,
     get_motion,
     list_items,
-    list_motions,
     pause,
-    reroll,
-    review,
-    transaction,
 )
+from marey.takes import MotionFilter, Reroll, delete, list_motions, reroll, review
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, new_item, parse_texts, submit_items
 

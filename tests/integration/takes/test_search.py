@@ -8,7 +8,9 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.jobs import MotionFilter, MotionRow, Review, list_motions, review, searching, transaction
+from marey.db import transaction
+from marey.jobs import MotionRow, Review
+from marey.takes import MotionFilter, list_motions, review, searching
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, new_item, parse_texts, submit_items
 
@@ -29,7 +31,7 @@ FILTERS = {
 
 @pytest.fixture(scope="module")
 def engine(module_database_url: str) -> Iterator[sa.Engine]:
-    from marey.jobs import create_engine, upgrade
+    from marey.db import create_engine, upgrade
 
     engine = create_engine(module_database_url)
     upgrade(engine)

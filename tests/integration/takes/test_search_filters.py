@@ -13,20 +13,9 @@ import sqlalchemy as sa
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from marey.jobs import (
-    MotionFilter,
-    Review,
-    create_engine,
-    delete,
-    erase,
-    list_motions,
-    listings,
-    reroll,
-    review,
-    searching,
-    transaction,
-    upgrade,
-)
+from marey.db import create_engine, transaction, upgrade
+from marey.jobs import Review, listings
+from marey.takes import MotionFilter, delete, erase, list_motions, reroll, review, searching
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, new_item, new_tenant, parse_texts, submit_items
 

@@ -11,7 +11,8 @@ from uuid import uuid4
 
 import pytest
 
-from marey.jobs import create_key, create_tenant, transaction
+from marey.db import transaction
+from marey.tenants import create_key, create_tenant
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

@@ -9,7 +9,7 @@ import pytest
 import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 
-from marey.jobs import downgrade, upgrade
+from marey.db import downgrade, upgrade
 from tests.support.marey import MIGRATIONS
 
 REVISIONS = [s.revision for s in ScriptDirectory(str(MIGRATIONS)).walk_revisions()][::-1]

@@ -11,7 +11,8 @@ import pytest
 import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 
-from marey.jobs import check_revision, create_engine, downgrade, schema, transaction, upgrade
+from marey.db import check_revision, create_engine, downgrade, transaction, upgrade
+from marey.jobs import tables
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, parse_texts, submit_items
 from tests.support.filled import STATES, fill
@@ -124,4 +125,4 @@ def test_work_goes_on_after_a_step_down_and_up_again(filled: sa.Engine) -> None:
     assert len(commit_all(filled, found)) == 3
     with transaction(filled) as conn:
         assert [problem for problem in audit(conn) if "webhook" not in problem] == []
-        assert conn.execute(sa.select(schema.job.c.state).where(schema.job.c.id == job)).scalar_one() == "succeeded"
+        assert conn.execute(sa.select(tables.job.c.state).where(tables.job.c.id == job)).scalar_one() == "succeeded"

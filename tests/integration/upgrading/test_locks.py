@@ -10,8 +10,8 @@ import sqlalchemy as sa
 from alembic.script import ScriptDirectory
 from sqlalchemy import event
 
-from marey.errors import Conflict
-from marey.jobs import check_revision, downgrade, migrate, upgrade
+from marey.core.errors import Conflict
+from marey.db import check_revision, downgrade, migrate, upgrade
 from tests.support.marey import MIGRATIONS
 
 REVISIONS = [s.revision for s in ScriptDirectory(str(MIGRATIONS)).walk_revisions()][::-1]

@@ -18,9 +18,10 @@ from marey.cli import checkup
 from marey.cli import checkup_backing as backing
 from marey.cli.checkup import models
 from marey.cli.findings import Check
-from marey.jobs import WorkerBeat, beat, beat_scheduler, downgrade, transaction
+from marey.core.settings import Settings
+from marey.db import downgrade, transaction
+from marey.jobs import WorkerBeat, beat, beat_scheduler
 from marey.runtime.queue import redis_client
-from marey.settings import Settings
 from marey.storage import FolderStore
 from tests.servers.jobs import claim_some, parse_texts, submit_items
 from tests.support.live_api import BUNDLE, write_bundle

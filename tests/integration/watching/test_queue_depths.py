@@ -7,9 +7,10 @@ from dataclasses import replace
 import sqlalchemy as sa
 
 from marey.api.health.metrics import bounded
-from marey.jobs import QueueDepth, get_job, outbox_state, pause, queue_depths, transaction
-from marey.jobs.schema import tenant
-from marey.metrics import OTHER_TENANTS
+from marey.core.metrics import OTHER_TENANTS
+from marey.db import transaction
+from marey.jobs import QueueDepth, get_job, outbox_state, pause, queue_depths
+from marey.tenants.tables import tenant
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 import sqlalchemy as sa
 
-from marey import versions
 from marey.cli import checkup_backing as backing
-from marey.errors import Conflict
-from marey.jobs import check_revision, upgrade
+from marey.core import versions
+from marey.core.errors import Conflict
+from marey.db import check_revision, upgrade
 from marey.runtime.queue import check_queue
 from marey.scheduler import servers
 

@@ -13,9 +13,9 @@ import pytest
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
-from marey import tracing
-from marey.jobs import transaction
-from marey.jobs.schema import item, job, motion
+from marey.core import tracing
+from marey.db import transaction
+from marey.jobs.tables import item, job, motion
 from tests.chaos.driver import Cluster
 from tests.servers.collector import Collector, Spanned
 from tests.servers.ports import free_ports

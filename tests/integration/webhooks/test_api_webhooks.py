@@ -13,12 +13,13 @@ import pytest
 from standardwebhooks.webhooks import Webhook
 from structlog.testing import capture_logs
 
-from marey.addresses import Allowed
 from marey.cli.ports import try_port
-from marey.jobs import EventKind, transaction
-from marey.runtime.embedded import EmbeddedServer
+from marey.core.addresses import Allowed
+from marey.db import transaction
+from marey.embedded import EmbeddedServer
 from marey.scheduler.sending import Sender
 from marey.scheduler.webhooks import Deliverer
+from marey.webhooks import EventKind
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.command import Command
 from tests.support.evaluations import GENERATOR, wait

@@ -17,20 +17,14 @@ import sqlalchemy as sa
 from cryptography.fernet import Fernet
 from standardwebhooks.webhooks import Webhook
 
-from marey.addresses import Allowed
-from marey.jobs import (
-    DEFAULT_TENANT,
-    Attempt,
-    DeliveryState,
-    cancel,
-    claim_deliveries,
-    rotate_secret,
-    send_test,
-    transaction,
-)
+from marey.core.addresses import Allowed
+from marey.core.settings import REPOSITORY
+from marey.db import transaction
+from marey.jobs import cancel
 from marey.scheduler.sending import Sender
 from marey.scheduler.webhooks import EACH, Deliverer
-from marey.settings import REPOSITORY
+from marey.tenants import DEFAULT_TENANT
+from marey.webhooks import Attempt, DeliveryState, claim_deliveries, rotate_secret, send_test
 from marey.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status

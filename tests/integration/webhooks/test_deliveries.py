@@ -7,15 +7,16 @@ from uuid import UUID, uuid4
 import pytest
 import sqlalchemy as sa
 
-from marey.errors import Conflict, InvalidInput, NotFound
-from marey.jobs import (
-    DEFAULT_TENANT,
+from marey.core.errors import Conflict, InvalidInput, NotFound
+from marey.db import transaction
+from marey.jobs import cancel, sweep
+from marey.tenants import DEFAULT_TENANT, list_audit
+from marey.webhooks import (
     Attempt,
     DeliveryState,
     DueDelivery,
     NewWebhook,
     WebhookChange,
-    cancel,
     change_webhook,
     claim_deliveries,
     create_webhook,
@@ -23,18 +24,15 @@ from marey.jobs import (
     get_delivery,
     get_webhook,
     give_back_deliveries,
-    list_audit,
     list_deliveries,
     list_webhooks,
     record_attempt,
     replay_delivery,
     rotate_secret,
     send_test,
-    sweep,
-    transaction,
 )
-from marey.jobs.deliveries import DELAYS, JITTER, MAX_WAIT
-from marey.jobs.webhooks import MAX_WEBHOOKS
+from marey.webhooks.deliveries import DELAYS, JITTER, MAX_WAIT
+from marey.webhooks.repository import MAX_WEBHOOKS
 from tests.servers.jobs import submit_items
 from tests.support.webhooks import deliveries, errors, events_written, new_webhook, time_passes, told
 

@@ -9,31 +9,12 @@ from uuid import UUID
 import pytest
 import sqlalchemy as sa
 
-from marey.jobs import (
-    DEFAULT_TENANT,
-    EvaluationState,
-    EventKind,
-    ItemFailure,
-    NewStream,
-    Policy,
-    Problem,
-    abandoned_streams,
-    cancel,
-    cancel_evaluation,
-    create_key,
-    create_stream,
-    delete_webhook,
-    end_stream,
-    fail_items,
-    lock_evaluation,
-    move_evaluation,
-    pause,
-    resume,
-    retry,
-    schema,
-    sweep,
-    transaction,
-)
+from marey.db import transaction
+from marey.evaluations import EvaluationState, cancel_evaluation, lock_evaluation, move_evaluation
+from marey.jobs import ItemFailure, Policy, Problem, cancel, fail_items, pause, resume, retry, sweep
+from marey.streams import NewStream, abandoned_streams, create_stream, end_stream
+from marey.tenants import DEFAULT_TENANT, create_key, tables
+from marey.webhooks import EventKind, delete_webhook
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation, wait
 from tests.support.webhooks import deliveries, events_written, new_webhook, told
@@ -100,7 +81,7 @@ def test_what_is_rolled_back_is_not_told(engine: sa.Engine) -> None:
 
 def test_one_event_serves_every_webhook_that_wants_it_and_nobody_else(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
-        conn.execute(sa.insert(schema.tenant).values(id="other"))
+        conn.execute(sa.insert(tables.tenant).values(id="other"))
     finish(engine, submit_items(engine, 1))
     assert events_written(engine) == 0  # nobody wants to know
     both = [new_webhook(engine), new_webhook(engine, "https://b.example/", EventKind.JOB_ENDED)]

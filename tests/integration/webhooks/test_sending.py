@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from marey.addresses import Allowed
-from marey.jobs import Attempt
+from marey.core.addresses import Allowed
 from marey.scheduler.sending import Sender
+from marey.webhooks import Attempt
 from tests.servers.receiver import LOOPBACK, Authority, Receiver, drip, endless, hang, stalling, status
 
 BODY = b'{"type":"job.ended"}'

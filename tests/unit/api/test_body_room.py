@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import Overloaded
+from marey.core.errors import Overloaded
 from marey.http import body_room
 from marey.http.body_room import BodyRoom
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from marey.api import documents
 from marey.api.documents import Document
-from marey.errors import InvalidInput, TooLarge
+from marey.core.errors import InvalidInput, TooLarge
 
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

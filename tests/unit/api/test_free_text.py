@@ -9,15 +9,15 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from marey.api.app import create_app
-from marey.characters import LINE_PATTERN, TEXT_PATTERN
+from marey.core.characters import LINE_PATTERN, TEXT_PATTERN
+from marey.core.settings import Settings
 from marey.http.schemas import MAX_COMMENT, MAX_NAME, Comment, Name, Reason
-from marey.settings import Settings
 
 READ_BY_HAND = {
-    "NewItemBody": {"prompt", "tags", "name", "model"},  # marey.items
-    "EvaluationPromptBody": {"prompt", "expected"},  # marey.evaluation_prompts
-    "NewStreamBody": {"prompt", "name", "model"},  # marey.items
-    "ParseBody": {"prompts"},  # marey.prompts
+    "NewItemBody": {"prompt", "tags", "name", "model"},  # marey.items.item
+    "EvaluationPromptBody": {"prompt", "expected"},  # marey.items.evaluation_prompts
+    "NewStreamBody": {"prompt", "name", "model"},  # marey.items.item
+    "ParseBody": {"prompts"},  # marey.items.prompts
 }
 NOT_STORED = {"cursor", "reference", "Range", "If-Range", "If-None-Match", "Last-Event-ID"}
 """Parsed into something else, or only compared."""

@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from marey.api.app import create_app
-from marey.settings import Settings
+from marey.core.settings import Settings
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,10 @@ import marey.api.live
 from marey.api.catalogue import Catalogue
 from marey.api.live.routes import MOST_EXAMPLES, router
 from marey.bundles import find_bundle
-from marey.mogo.examples import LEAST, SETS, act_of
-from marey.motion.live_page import live_page
-from marey.settings import Settings
-from marey.training.checks.prompts import evaluation_prompts
+from marey.checks.prompts import evaluation_prompts
+from marey.core.settings import Settings
+from marey.models.mogo.examples import LEAST, SETS, act_of
+from marey.viz.live_page import live_page
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 from starlette.types import Receive, Scope, Send
 
 from marey.api.app import create_app
+from marey.core.origins import check_origins, origin_of
+from marey.core.settings import Settings
 from marey.http.guards import HostGuard
-from marey.origins import check_origins, origin_of
-from marey.settings import Settings
 
 APP, STRANGER = "https://app.example.com", "https://evil.example"
 

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.api.jobs.events import EventStream
-from marey.errors import Busy
+from marey.core.errors import Busy
 from marey.http.places import Places, Shares
-from marey.jobs import ApiKey
+from marey.tenants import ApiKey
 
 SHARES = Shares(total=12, tenant=7, key=4)
 TENANTS = ("ann", "bob", "cat")

@@ -24,10 +24,10 @@ from marey.api.reference import EXAMPLES
 from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
 from marey.api.streams.schemas import NewStreamBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
-from marey.expected import read_expected
+from marey.core.settings import Settings
 from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
-from marey.items import MAX_TAG_LENGTH, SETTINGS, read_item
-from marey.settings import Settings
+from marey.items.expected import read_expected
+from marey.items.item import MAX_TAG_LENGTH, SETTINGS, read_item
 from marey.text_service.routes import ParseBody
 
 BODIES = {

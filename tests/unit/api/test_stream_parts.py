@@ -10,7 +10,7 @@ from marey.api.streams.door import first_frame, key_of
 from marey.api.streams.messages import Rate
 from marey.api.streams.slow import BEHIND_FRAMES, Lag
 from marey.api.streams.wire import close_code
-from marey.errors import Busy, InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.core.errors import Busy, InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 
 
 def test_a_header_wins_over_a_subprotocol_and_another_scheme_is_no_key() -> None:

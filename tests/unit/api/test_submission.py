@@ -13,10 +13,10 @@ from marey.api.catalogue import Catalogue
 from marey.api.jobs import service
 from marey.api.jobs.schemas import JobFields
 from marey.api.jobs.service import MAX_MODELS, Submission, read_document, read_ndjson
-from marey.errors import NotFound, TooLarge
-from marey.items import MAX_UNKNOWN, InvalidItems
-from marey.offers import Offer
-from marey.settings import Settings
+from marey.core.errors import NotFound, TooLarge
+from marey.core.settings import Settings
+from marey.items.item import MAX_UNKNOWN, InvalidItems
+from marey.jobs.offers import Offer
 from tests.support.live_api import write_bundle
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import Busy
+from marey.core.errors import Busy
 from marey.text_service.limits import Ticket, WordLimit
 
 LIMIT = 100

@@ -13,9 +13,9 @@ import pytest
 
 from marey.api.models.schemas import ModelsView
 from marey.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
-from marey.errors import InvalidBundle, MareyError
-from marey.offers import offers
-from marey.settings import Settings
+from marey.core.errors import InvalidBundle, MareyError
+from marey.core.settings import Settings
+from marey.jobs.offers import offers
 
 GOOD, BAD = "a-good", "b-broken"
 

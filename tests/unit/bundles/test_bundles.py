@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from marey.bundles import Bundle, BundleWriter, find_bundle, list_bundles
-from marey.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused
-from marey.settings import Settings
+from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused
+from marey.core.settings import Settings
 
 
 def write(path: Path, *, licence: str = "MIT", max_shard_bytes: int = 2**20, overwrite: bool = False) -> Bundle:

@@ -16,7 +16,7 @@ from safetensors.numpy import save
 
 from marey.bundles import Bundle, BundleWriter, DataSource, TextSpec
 from marey.bundles.manifest import DESCRIPTIVE, BundleManifest, parse_manifest
-from marey.errors import InvalidBundle, MareyError
+from marey.core.errors import InvalidBundle, MareyError
 from marey.text.keys import PIPELINE_VERSION, feature_key
 from tests.support.marey import REPOSITORY
 

@@ -9,9 +9,9 @@ import pytest
 
 from marey.bundles import Bundle, choose_evaluator
 from marey.bundles.reference import reference_prompts
-from marey.errors import InvalidBundle, NotFound
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.settings import Settings
+from marey.core.errors import InvalidBundle, NotFound
+from marey.core.settings import Settings
+from marey.items.evaluation_prompts import EvaluationPrompt
 from tests.support.evaluations import CLIPS, JUDGE, write_evaluator, write_generator
 
 

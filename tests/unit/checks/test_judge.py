@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.training.checks.judge import Expectation, judge, straightness
-from marey.training.checks.rates import ALL_EXPECTATIONS, RealClip, name_of, rates
+from marey.checks.judge import Expectation, judge, straightness
+from marey.checks.rates import ALL_EXPECTATIONS, RealClip, name_of, rates
 from tests.support.bodies import FPS, Body, bower, lift, raiser, runner, steady, walker, waver
 
 MOTIONS = {

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from marey.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
+from marey.checks.quality import quality
 from marey.motion.feet import runs
-from marey.training.checks.kinematics import gait, hand, heading, lean, smooth, turning_points
-from marey.training.checks.quality import quality
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
 
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.training.checks.judge import Expectation, judge
-from marey.training.checks.strikes import is_lively, kicks, punches, slashes
+from marey.checks.judge import Expectation, judge
+from marey.checks.strikes import is_lively, kicks, punches, slashes
 from tests.support.bodies import FPS, Body, bower, raiser, runner, steady, walker, waver
 
 

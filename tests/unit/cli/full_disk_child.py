@@ -20,13 +20,13 @@ from marey.cli.fetching import Download, download_all
 from marey.cli.lines import Lines
 from marey.cli.manifest import COLUMNS, write_manifest
 from marey.cli.place import Server
-from marey.errors import MareyError
-from marey.hashing import sha256_of
-from marey.motion.bvh import read_bvh
-from marey.motion.bvh_live import LiveBVH
+from marey.core.errors import MareyError
+from marey.core.hashing import sha256_of
+from marey.core.spool import IN_MEMORY
 from marey.motion.files import write_atomically
+from marey.motion.io.bvh import read_bvh
+from marey.motion.io.bvh_live import LiveBVH
 from marey.motion.skeleton import HUMANML3D
-from marey.spool import IN_MEMORY
 from marey.storage import FolderStore, NewObject
 
 FOLDER, LIMIT = Path(sys.argv[1]), int(sys.argv[2])

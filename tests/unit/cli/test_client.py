@@ -13,8 +13,8 @@ import pytest
 from marey.cli import client as client_module
 from marey.cli.client import Client
 from marey.cli.place import Server
-from marey.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
-from marey.items import InvalidItems
+from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
+from marey.items.item import InvalidItems
 
 
 @dataclass

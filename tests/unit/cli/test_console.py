@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from marey.characters import LINES, find_forbidden
 from marey.cli import console
 from marey.cli.live.screen import Screen
 from marey.cli.main import app
+from marey.core.characters import LINES, find_forbidden
 
 TEXT = st.text(st.characters(), max_size=40)
 ATTACK = "a\x1b[2J\x1b]8;;http://evil\x07b\x9b31m\x7f\u202egnp.\u2066x\udc80\r"

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.characters import find_forbidden
 from marey.cli import manifest
 from marey.cli.csv_cells import join_tags, protect, restore, split_tags, write_csv
 from marey.cli.manifest import COLUMNS, NAME, NUMBERS, RAW_COLUMNS, row_of, write_manifest
 from marey.cli.rows import items_from_file
-from marey.items import Item, read_item
+from marey.core.characters import find_forbidden
+from marey.items.item import Item, read_item
 
 TEXT = st.text(st.one_of(st.sampled_from("=+-@\t\r\n'\",;x "), st.characters(exclude_categories=["Cs"])), max_size=20)
 FORMULAS = ("=", "+", "-", "@", "\t", "\r")

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from marey.cli.commands import schedules
 from marey.cli.evaluating import Asked, check_evaluation, repeats_of
 from marey.cli.roles.serving import default_roles, parse_roles
-from marey.errors import InvalidInput, ItemsFailed, NotFound, Regressed
-from marey.settings import Settings
+from marey.core.errors import InvalidInput, ItemsFailed, NotFound, Regressed
+from marey.core.settings import Settings
 from tests.support.evaluations import write_evaluator, write_generator
 
 

@@ -13,7 +13,7 @@ import pytest
 from marey.cli.client import Client
 from marey.cli.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
 from marey.cli.place import Server
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 
 ITEM: dict[str, Any] = {
     "id": "i",

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from marey.cli.lines import PIECE, Lines
-from marey.errors import InvalidInput
-from marey.spool import IN_MEMORY
+from marey.core.errors import InvalidInput
+from marey.core.spool import IN_MEMORY
 
 
 @pytest.mark.parametrize("count", [1, 3, 2 * IN_MEMORY // 30])

@@ -15,7 +15,7 @@ from marey.cli.live.link import Link
 from marey.cli.live.pace import Pace
 from marey.cli.live.steering import message_of
 from marey.cli.place import Server
-from marey.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 from marey.streams.frames import Frame, encode_frame
 from tests.support.stream_server import KEY, STREAM, Plan, StreamServer
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from marey.cli.commands import models
-from marey.settings import settings
+from marey.core.settings import settings
 from tests.support.live_api import BUNDLE, write_bundle
 
 

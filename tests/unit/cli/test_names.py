@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.characters import find_forbidden
 from marey.cli.names import (
     DEFAULT_TEMPLATE,
     FileNames,
@@ -18,8 +17,9 @@ from marey.cli.names import (
     safe_component,
     slug,
 )
-from marey.errors import InvalidInput
-from marey.items import NAME, RESERVED, read_item
+from marey.core.characters import find_forbidden
+from marey.core.errors import InvalidInput
+from marey.items.item import NAME, RESERVED, read_item
 
 
 def naming(name: str = "wave") -> Naming:

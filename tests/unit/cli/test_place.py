@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from marey.cli.place import Server, find_server
-from marey.errors import InvalidFile, Unauthenticated
+from marey.core.errors import InvalidFile, Unauthenticated
 
 URL = "https://marey.example.com"
 

@@ -14,7 +14,7 @@ from marey.cli.client import ATTEMPTS, Client
 from marey.cli.live import link as link_module
 from marey.cli.live.link import Link
 from marey.cli.place import Server
-from marey.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
+from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
 from tests.servers.receiver import Authority
 from tests.support.proxied import receive_until_refused
 

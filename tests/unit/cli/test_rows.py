@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.cli.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
-from marey.errors import InvalidFile, InvalidInput, NotFound
-from marey.evaluation_prompts import EvaluationPrompt
-from marey.items import InvalidItems, Item
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.items.item import InvalidItems, Item
 
 
 def write(folder: Path, name: str, content: str | bytes) -> str:

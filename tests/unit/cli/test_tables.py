@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from marey.cli.rows import read_file, right_items
 from marey.cli.tables import ExtraColumns, csv_rows, delimiter_of
-from marey.items import COLUMNS, InvalidItems, Item, Unreadable
+from marey.items.item import COLUMNS, InvalidItems, Item, Unreadable
 
 
 def items(path: Path, extra: ExtraColumns = "refuse", **options: Any) -> list[Item]:

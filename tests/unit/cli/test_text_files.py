@@ -13,8 +13,8 @@ import pytest
 from marey.cli import rows
 from marey.cli.rows import evaluation_prompts_from_file, items_from_file
 from marey.cli.text_files import MAX_LINE
-from marey.errors import InvalidFile, InvalidInput, MareyError, TooLarge
-from marey.items import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
+from marey.core.errors import InvalidFile, InvalidInput, MareyError, TooLarge
+from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
 
 CSV = b"prompt,seed\na person walks,1\na person bows,2\n"
 PACKED = gzip.compress(CSV, mtime=0)
@@ -26,7 +26,7 @@ MEASURED = """
 import re, sys
 from pathlib import Path
 from marey.cli.rows import items_from_file
-from marey.errors import TooLarge
+from marey.core.errors import TooLarge
 def peak():  # of this program alone: ru_maxrss begins at what the parent had
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
 before = peak()

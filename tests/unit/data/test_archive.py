@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from marey.errors import InvalidFile, NotFound, TooLarge
-from marey.training.data import archive
-from marey.training.data.archive import bvh_files
+from marey.core.errors import InvalidFile, NotFound, TooLarge
+from marey.data import archive
+from marey.data.archive import bvh_files
 
 
 def tar(path: Path, members: dict[str, bytes], *, links: dict[str, str] | None = None) -> Path:

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.errors import Conflict, InvalidFile, NotFound
-from marey.training.checks.judge import Expectation, judge
-from marey.training.checks.rates import RealClip
-from marey.training.data import compose
-from marey.training.data.build import LAYOUT, build, swap_sides, windows
-from marey.training.data.compose import Counts
-from marey.training.data.inspect import summarize
-from marey.training.data.pack import JointsPack, PackClip
-from marey.training.data.prepared import PreparedData
-from marey.training.data.retime import held_longer
-from marey.training.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
+from marey.checks.judge import Expectation, judge
+from marey.checks.rates import RealClip
+from marey.core.errors import Conflict, InvalidFile, NotFound
+from marey.data import compose
+from marey.data.build import LAYOUT, build, swap_sides, windows
+from marey.data.compose import Counts
+from marey.data.inspect import summarize
+from marey.data.pack import JointsPack, PackClip
+from marey.data.prepared import PreparedData
+from marey.data.retime import held_longer
+from marey.data.sampling import ACT_WEIGHT, SEQUENCE_SHARE, sampling_weights
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
 
 MOTIONS = {
@@ -312,7 +312,7 @@ def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
 
 
 def test_a_failed_build_leaves_no_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr("marey.training.data.build.compose", lambda *_: 1 / 0)
+    monkeypatch.setattr("marey.data.build.compose", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         build([synthetic_pack()], tmp_path / "out")
     assert list(tmp_path.iterdir()) == []

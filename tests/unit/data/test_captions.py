@@ -6,12 +6,12 @@ from typing import get_args
 
 import pytest
 
-from marey.training.checks.prompts import PromptSet, evaluation_prompts
-from marey.training.data.captions import captions, joined_caption, long_caption, seeded, short_caption
-from marey.training.data.describe import ACTS, STYLE_NAMES, describe
-from marey.training.data.english import conjugate, gerund, third, with_adjective
-from marey.training.data.grammar import grammar
-from marey.training.data.phrases import PAIR
+from marey.checks.prompts import PromptSet, evaluation_prompts
+from marey.data.captions import captions, joined_caption, long_caption, seeded, short_caption
+from marey.data.describe import ACTS, STYLE_NAMES, describe
+from marey.data.english import conjugate, gerund, third, with_adjective
+from marey.data.grammar import grammar
+from marey.data.phrases import PAIR
 from tests.support.bodies import Body, bower, raiser, runner, steady, walker, waver
 
 FPS = 20.0

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marey.errors import InvalidFile
-from marey.hashing import sha256_of
-from marey.training.data import manifest as names
-from marey.training.data.prepared import PreparedData
+from marey.core.errors import InvalidFile
+from marey.core.hashing import sha256_of
+from marey.data import manifest as names
+from marey.data.prepared import PreparedData
 from marey.training.texts import CaptionTexts
 from tests.support.prepared import write_prepared
 

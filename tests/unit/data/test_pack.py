@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.errors import InvalidFile, NotFound
-from marey.training.data.pack import JointsPack, PackClip
+from marey.core.errors import InvalidFile, NotFound
+from marey.data.pack import JointsPack, PackClip
 from tests.support.bodies import runner, walker
 
 FAR = np.array([40.0, 0.0, -30.0])  # float16 of world positions would be off by centimetres there

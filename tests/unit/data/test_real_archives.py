@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marey.checks.quality import quality
+from marey.checks.rates import RealClip, mean_quality, rates
+from marey.data.build import parts_of
+from marey.data.compose import Composer
+from marey.data.pack import JointsPack
+from marey.data.prepare import Splits, pack_bandai_namco, pack_cmu
 from marey.motion.kinematics import bone_lengths
 from marey.motion.skeleton import HUMANML3D
-from marey.training.checks.quality import quality
-from marey.training.checks.rates import RealClip, mean_quality, rates
-from marey.training.data.build import parts_of
-from marey.training.data.compose import Composer
-from marey.training.data.pack import JointsPack
-from marey.training.data.prepare import Splits, pack_bandai_namco, pack_cmu
 
 DATA = Path(os.environ.get("MAREY_DATA", Path(__file__).resolve().parents[4] / "shared" / "data"))
 pytestmark = [

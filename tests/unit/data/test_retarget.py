@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.errors import InvalidFile
-from marey.motion.bvh import parse_bvh
+from marey.checks.kinematics import gait
+from marey.core.errors import InvalidFile
+from marey.data.retarget import read_source, resample_points, retarget
+from marey.data.rigs import BANDAI_NAMCO, ICLONE
+from marey.motion.io.bvh import parse_bvh
 from marey.motion.kinematics import bone_lengths
 from marey.motion.skeleton import HUMANML3D
-from marey.training.checks.kinematics import gait
-from marey.training.data.retarget import read_source, resample_points, retarget
-from marey.training.data.rigs import BANDAI_NAMCO, ICLONE
 from tests.support.bodies import LENGTH, Body, bandai_bvh, lift, steady, walker, waver
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.training.data.soundness import is_broken
+from marey.data.soundness import is_broken
 from tests.support.bodies import FPS, bower, runner, walker, waver
 
 

@@ -7,9 +7,9 @@ from typing import get_args
 
 import pytest
 
-from marey.training.checks.prompts import PromptSet, evaluation_prompts
-from marey.training.data.captions import caption, seeded
-from marey.training.data.told import told, told_caption, told_sequence
+from marey.checks.prompts import PromptSet, evaluation_prompts
+from marey.data.captions import caption, seeded
+from marey.data.told import told, told_caption, told_sequence
 from tests.support.bodies import bower, raiser, runner, walker, waver
 from tests.unit.data.test_captions import facts, plain
 

@@ -10,10 +10,10 @@ import typer
 from marey.cli import children
 from marey.cli.main import app
 from marey.cli.roles.serving import HANDLERS, parse_roles
+from marey.core.settings import Settings
 from marey.runtime import worker
 from marey.runtime.live import main as live
 from marey.scheduler import main as scheduler
-from marey.settings import Settings
 from tests.support.compose import Service, image_environment, read_compose, services
 
 ALL = services()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.settings import BY_FILE, Settings
+from marey.core.settings import BY_FILE, Settings
 from tests.support.units import COMMON, PROGRAM, S3, SERVICES, environment_file, read_unit, replaced
 
 ANALYZE = shutil.which("systemd-analyze")

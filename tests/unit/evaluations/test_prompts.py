@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput, TooLarge
-from marey.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
-from marey.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
-from marey.items import InvalidItems
-from marey.training.checks.judge import Act, Side
+from marey.checks.judge import Act, Side
+from marey.core.errors import InvalidInput, TooLarge
+from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, prompts_of, prompts_sha256, read_prompts
+from marey.items.expected import ACTS, SIDED, TRAVELS, ExpectedAct, format_expected, read_expected
+from marey.items.item import InvalidItems
 
 acts = st.one_of(
     st.builds(ExpectedAct, st.sampled_from(TRAVELS), st.just(""), st.booleans()),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from marey.bundles import Bundle
+from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import assemble
 from marey.evaluator.config import TINY
 from marey.evaluator.reference import Reference
 from marey.evaluator.tmr import TMREvaluator
 from marey.evaluator.train import train_stage
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.staging import TrainOptions
 from tests.support.prepared import write_prepared
 

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.comparing import Earlier, alarms, changes
 from marey.evaluator.report import Baseline, Metric, MotionScore
 from marey.measures.comparing import OBEYED, RETRIEVED

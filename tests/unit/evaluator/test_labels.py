@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from marey.data.manifest import Clip, Measured
 from marey.evaluator.labels import label_ids, label_of
-from marey.training.data.manifest import Clip, Measured
 
 MEASURED = Measured(seconds=1, path=1, turn=0, speed=1, steps=1, side="")
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import sqrtm
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.intervals import redraw, repeated
 from marey.measures.bootstrap import paired_bootstrap
 

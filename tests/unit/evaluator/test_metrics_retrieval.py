@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.intervals import redraw
 from marey.evaluator.metrics.retrieval import all_ranks, clip_score, label_ceiling, matching_score, r_precision
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.config import CONFIGS, STARTER, TINY, EvaluatorConfig
 from marey.evaluator.model import TMR, Gaussian, MotionDecoder, MotionEncoder, SentenceEncoder
 

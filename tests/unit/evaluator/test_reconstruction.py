@@ -12,17 +12,17 @@ from typer.testing import CliRunner
 
 from marey.bundles import Bundle
 from marey.cli.commands.train import app
-from marey.errors import InvalidFile, InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput
+from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import renew_reference
 from marey.evaluator.measuring import check
 from marey.evaluator.reconstruction import find_reconstruction, reconstruct
 from marey.evaluator.reference import Reference
 from marey.evaluator.rows import Ruler, truth_row
 from marey.evaluator.tmr import TMREvaluator
-from marey.hgm3.bundle import random_bundle
+from marey.models.hgm3.bundle import random_bundle
 from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.nn.quantizer import Quantized
-from marey.training.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
 
 GENERATOR = "perfect@0123456789ab"

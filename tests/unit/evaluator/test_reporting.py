@@ -11,29 +11,21 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.data.prepared import PreparedData
+from marey.evaluations import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem
 from marey.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
 from marey.evaluator.reference import Reference, ReferenceSplit
 from marey.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
 from marey.evaluator.scoring import REPEATS, label_ceilings
 from marey.evaluator.tmr import TMREvaluator
-from marey.jobs import (
-    AssetDigest,
-    EarlierRun,
-    EvaluationJob,
-    EvaluationRequest,
-    ItemState,
-    JobState,
-    MadeItem,
-    Problem,
-)
+from marey.jobs import AssetDigest, ItemState, JobState, Problem
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.motion.features import HUMANML3D_263
 from marey.motion.finish import finish_motion
 from marey.runtime.scoring import ScoreInput
-from marey.training.data.prepared import PreparedData
 
 NOON = datetime(2026, 11, 2, 12, tzinfo=UTC)
 

@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 
 from marey.bundles import Bundle
-from marey.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
+from marey.core.errors import Conflict, InvalidBundle, InvalidFile, InvalidInput
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.t2m import T2MEvaluator
 from marey.evaluator.t2m_import import import_t2m, main

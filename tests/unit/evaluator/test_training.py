@@ -13,7 +13,9 @@ import torch
 from safetensors.numpy import save
 
 from marey.bundles import Bundle, TextSpec
-from marey.errors import InvalidBundle, InvalidFile, InvalidInput, NotFound
+from marey.core.errors import InvalidBundle, InvalidFile, InvalidInput, NotFound
+from marey.core.hashing import sha256_of
+from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import assemble
 from marey.evaluator.bundle import load_networks
 from marey.evaluator.config import TINY, EvaluatorConfig
@@ -25,10 +27,8 @@ from marey.evaluator.sentences import open_encoder
 from marey.evaluator.stage_tmr import TMRStage
 from marey.evaluator.tmr import TMREvaluator
 from marey.evaluator.train import train_stage
-from marey.hashing import sha256_of
 from marey.text.encoders import TextEncoder
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.motions import MotionData
 from marey.training.parts import load_part
 from marey.training.staging import TrainOptions

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import InvalidFile, InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput
 from marey.evaluator.report import Change, Exhibit, Report, Value, from_json, to_json
 from tests.support.reports import sample_report
 

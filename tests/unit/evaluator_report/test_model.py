@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.report import (
     Baseline,
     Change,

@@ -28,7 +28,7 @@ from marey.evaluator.report import (
     to_json,
 )
 from marey.evaluator.report.page import PACKAGE
-from marey.motion.pages import asset
+from marey.viz.pages import asset
 from tests.support.reports import UNMEASURED, sample_report
 from tests.support.walker import walker
 
@@ -157,7 +157,7 @@ def test_no_mark_of_the_template_is_left(page: Page) -> None:
     assert not re.search(r"%[A-Z]{4,}%", page.html)
 
 
-@pytest.mark.parametrize(("name", "package"), [("report.js", PACKAGE), ("small_players.js", "marey.motion")])
+@pytest.mark.parametrize(("name", "package"), [("report.js", PACKAGE), ("small_players.js", "marey.viz")])
 def test_no_text_is_ever_read_as_html_or_as_code(name: str, package: str) -> None:
     code = asset(name, package)
     assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function", code)

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 
 from marey.bundles import Bundle
-from marey.errors import InvalidFile, InvalidInput
-from marey.generating.handler import GeneratorHandler
-from marey.hgm3 import bundle as hgm3
-from marey.hgm3.generate import Generator as Hgm3Generator
+from marey.core.errors import InvalidFile, InvalidInput
+from marey.core.settings import Settings
+from marey.generation.handler import GeneratorHandler
 from marey.jobs import Claim, ClaimedItem, Stage
-from marey.mogo import bundle as mogo
-from marey.mogo.config import TINY
-from marey.mogo.generate import Generator as MogoGenerator
-from marey.motion.bvh import parse_bvh
+from marey.models.hgm3 import bundle as hgm3
+from marey.models.hgm3.generate import Generator as Hgm3Generator
+from marey.models.mogo import bundle as mogo
+from marey.models.mogo.config import TINY
+from marey.models.mogo.generate import Generator as MogoGenerator
 from marey.motion.clip import MotionClip, parse_npz
+from marey.motion.io.bvh import parse_bvh
 from marey.runtime.handler import Batch, Done, Export, Failed, Outcome
-from marey.settings import Settings
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from marey.hgm3.bundle import random_bundle
-from marey.hgm3.generate import Generator
-from marey.training.data.prepared import PreparedData
+from marey.data.prepared import PreparedData
+from marey.models.hgm3.bundle import random_bundle
+from marey.models.hgm3.generate import Generator
 from tests.support.prepared import write_prepared
 
 

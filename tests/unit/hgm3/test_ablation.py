@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from marey.bundles import find_bundle
-from marey.hgm3.ablation import table, train_variant
-from marey.hgm3.assembly import assemble
-from marey.hgm3.config import TINY
-from marey.hgm3.train import train_stage
+from marey.data.prepared import PreparedData
+from marey.models.hgm3.ablation import table, train_variant
+from marey.models.hgm3.assembly import assemble
+from marey.models.hgm3.config import TINY
+from marey.models.hgm3.train import train_stage
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.staging import TrainOptions
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import torch
 
-from marey.errors import InvalidBundle, InvalidInput
-from marey.generating.port import Request
-from marey.hgm3.bundle import random_bundle
-from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from marey.hgm3.config import InferenceConfig
-from marey.hgm3.decoding import condition_level
-from marey.hgm3.generate import Generated, Generator, Settings
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.generation.port import Request
+from marey.models.hgm3.bundle import random_bundle
+from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from marey.models.hgm3.config import InferenceConfig
+from marey.models.hgm3.decoding import condition_level
+from marey.models.hgm3.generate import Generated, Generator, Settings
 from tests.support.prepared import text_features
 from tests.support.processors import packs_bfloat16
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
-from marey.hgm3.config import PAPER, STARTER, TINY, named_config
-from marey.hgm3.data import CaptionData
-from marey.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
-from marey.hgm3.tokenizer import Tokenizer
+from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC, Condition, GraphAttention, graph_batch
+from marey.models.hgm3.config import PAPER, STARTER, TINY, named_config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.model import LossPredictor, MaskedTransformer, ResidualTransformer
+from marey.models.hgm3.tokenizer import Tokenizer
 from marey.motion.features import HUMANML3D_263
 from marey.nn.motion_tokenizer import biased_std
 from marey.nn.sampling import guide
@@ -287,7 +287,7 @@ def test_paper_sizes_are_the_published_ones() -> None:
 
 
 def test_the_starter_bundle_fits_in_16_megabytes() -> None:
-    from marey.hgm3.bundle import Networks
+    from marey.models.hgm3.bundle import Networks
     from marey.nn.bundling import stored
 
     networks = Networks.build(STARTER).parts()
@@ -296,7 +296,7 @@ def test_the_starter_bundle_fits_in_16_megabytes() -> None:
 
 
 def test_every_configuration_builds() -> None:
-    from marey.hgm3.bundle import Networks
+    from marey.models.hgm3.bundle import Networks
 
     for name in ("starter", "tiny"):
         Networks.build(named_config(name))

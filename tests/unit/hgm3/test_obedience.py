@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from marey.errors import InvalidInput
-from marey.hgm3.bundle import random_bundle
-from marey.hgm3.obedience import main
+from marey.core.errors import InvalidInput
+from marey.models.hgm3.bundle import random_bundle
+from marey.models.hgm3.obedience import main
 
 
 def test_a_report_counts_each_prompt_and_seed(tmp_path: Path) -> None:

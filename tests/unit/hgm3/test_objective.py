@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 import torch
 
-from marey.hgm3 import decoding
-from marey.hgm3.conditions import ACTION, MOTION, SPECIFIC
-from marey.hgm3.config import TINY, HGM3Config
-from marey.hgm3.data import CaptionData
-from marey.hgm3.decoding import DecodeOptions, Items
-from marey.hgm3.generate import Generator
-from marey.hgm3.model import MaskedTransformer
-from marey.hgm3.stage_masked import MaskedStage, Sample
-from marey.hgm3.stage_residual import ResidualStage
-from marey.hgm3.tokenizer import Tokenizer
-from marey.training.data.prepared import PreparedData
+from marey.data.prepared import PreparedData
+from marey.models.hgm3 import decoding
+from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from marey.models.hgm3.config import TINY, HGM3Config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.decoding import DecodeOptions, Items
+from marey.models.hgm3.generate import Generator
+from marey.models.hgm3.model import MaskedTransformer
+from marey.models.hgm3.stage_masked import MaskedStage, Sample
+from marey.models.hgm3.stage_residual import ResidualStage
+from marey.models.hgm3.tokenizer import Tokenizer
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData, TokenData
 from marey.training.texts import CaptionTexts
@@ -178,7 +178,7 @@ def test_the_commitment_pulls_the_encoder_towards_the_codes() -> None:
 
 def test_without_guidance_the_null_branch_alone_decides_and_reads_no_prompt(generator: Generator) -> None:
     """Guidance 0 is the null branch: its tokens are the same whatever was asked for."""
-    from marey.generating.port import Request
+    from marey.generation.port import Request
 
     unguided = replace(generator.settings({}), guidance=0.0, residual_guidance=0.0)
     made = [generator.generate([Request(text_features(k, 2, 3), 7, 40)], unguided)[0] for k in (0, 5)]

@@ -10,20 +10,20 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.errors import InvalidFile
-from marey.hgm3 import practice
-from marey.hgm3.assembly import take_apart
-from marey.hgm3.bundle import random_bundle
-from marey.hgm3.config import TINY, HGM3Config
-from marey.hgm3.data import CaptionData
-from marey.hgm3.generate import Generator
-from marey.hgm3.practice import practise
-from marey.hgm3.stage_masked import MaskedStage
-from marey.hgm3.tokenizer import Tokenizer
-from marey.hgm3.train import train_stage
+from marey.checks.judge import Expectation, Verdict
+from marey.core.errors import InvalidFile
+from marey.data.prepared import PreparedData
+from marey.models.hgm3 import practice
+from marey.models.hgm3.assembly import take_apart
+from marey.models.hgm3.bundle import random_bundle
+from marey.models.hgm3.config import TINY, HGM3Config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.generate import Generator
+from marey.models.hgm3.practice import practise
+from marey.models.hgm3.stage_masked import MaskedStage
+from marey.models.hgm3.tokenizer import Tokenizer
+from marey.models.hgm3.train import train_stage
 from marey.training.budget import Budget
-from marey.training.checks.judge import Expectation, Verdict
-from marey.training.data.prepared import PreparedData
 from marey.training.drawn import FILE, Drawn, load_drawn
 from marey.training.motions import MotionData, TokenData
 from marey.training.staging import TrainOptions

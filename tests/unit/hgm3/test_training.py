@@ -11,18 +11,18 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.errors import InvalidInput, NotFound
-from marey.generating.port import Request
-from marey.hgm3.assembly import assemble, take_apart
-from marey.hgm3.config import TINY, HGM3Config, named_config
-from marey.hgm3.data import CaptionData
-from marey.hgm3.generate import Generator
-from marey.hgm3.stage_masked import MaskedStage
-from marey.hgm3.tokenizer import Tokenizer
-from marey.hgm3.train import train_stage
+from marey.core.errors import InvalidInput, NotFound
+from marey.data.prepared import PreparedData
+from marey.generation.port import Request
+from marey.models.hgm3.assembly import assemble, take_apart
+from marey.models.hgm3.config import TINY, HGM3Config, named_config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.generate import Generator
+from marey.models.hgm3.stage_masked import MaskedStage
+from marey.models.hgm3.tokenizer import Tokenizer
+from marey.models.hgm3.train import train_stage
 from marey.nn.devices import fast_bf16
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.loop import RunOptions, StepContext, train
 from marey.training.motions import MotionData, TokenData
 from marey.training.parts import load_part

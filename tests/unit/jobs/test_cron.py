@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
-from marey.jobs.cron import check_cron, check_zone, last_time, next_time
+from marey.core.errors import InvalidInput
+from marey.evaluations.cron import check_cron, check_zone, last_time, next_time
 
 BERLIN = "Europe/Berlin"
 SPRING, AUTUMN = (2026, 3, 29), (2026, 10, 25)

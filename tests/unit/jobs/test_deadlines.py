@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from marey.jobs import deadlines
-from marey.jobs.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
-from marey.settings import Settings
+from marey.core.settings import Settings
+from marey.db import deadlines
+from marey.db.deadlines import HEARTBEAT, KINDS, ORDINARY, PING_SECONDS, PROBE_EVERY, Deadline
 
 ROOT = Path(__file__).resolve().parents[3]
 BAR = 15.0
@@ -19,7 +19,7 @@ BAR = 15.0
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_every_kind_of_call_is_used(kind: Deadline) -> None:
     (constant,) = [name for name, value in vars(deadlines).items() if value is kind]
-    uses = re.compile(rf"(transaction\([^\n]*, (jobs\.)?|deadline(=|\()(jobs\.)?|: Deadline = ){constant}\b")
+    uses = re.compile(rf"(transaction\([^\n]*, (db\.)?|deadline(=|\()(db\.)?|: Deadline = ){constant}\b")
     files = [path for folder in ("shared", "services") for path in (ROOT / folder).rglob("*.py")]
     assert any(uses.search(path.read_text(encoding="utf-8")) for path in files)
 

@@ -3,7 +3,7 @@
 import time
 from uuid import RFC_4122
 
-from marey.jobs.ids import new_id
+from marey.db.ids import new_id
 
 
 def test_an_id_is_a_uuid_of_version_7_that_holds_the_time() -> None:

@@ -7,15 +7,13 @@ from itertools import product
 
 import pytest
 
+from marey.evaluations.states import EVALUATION_TRANSITIONS, OPEN_EVALUATIONS, EvaluationState
 from marey.jobs.states import (
     ENDED,
-    EVALUATION_TRANSITIONS,
     OPEN,
-    OPEN_EVALUATIONS,
     RETRYABLE,
     TRANSITIONS,
     Cause,
-    EvaluationState,
     ItemState,
     JobControl,
     JobState,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.evaluator.report import to_json
 from marey.measures.scores import read_scores
 from tests.support.reports import sample_report

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from marey.training.data.prepared import PreparedData
+from marey.data.prepared import PreparedData
 from tests.support.prepared import write_prepared
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import torch
 
-from marey.mogo.config import TINY, InferenceConfig, MOGOConfig
-from marey.mogo.model import RQHCTransformer
-from marey.mogo.packed_model import PackedModel
-from marey.mogo.streaming import Streams
+from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.models.mogo.model import RQHCTransformer
+from marey.models.mogo.packed_model import PackedModel
+from marey.models.mogo.streaming import Streams
 
 
 def transformer(config: MOGOConfig = TINY) -> RQHCTransformer:

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 import torch
 
-from marey.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
-from marey.mogo.assembly import assemble
-from marey.mogo.config import TINY
-from marey.mogo.train import train_stage
+from marey.data.prepared import PreparedData
+from marey.models.mogo.ablation import VARIANTS, LevelToken, train_tokenizer, train_transformer
+from marey.models.mogo.assembly import assemble
+from marey.models.mogo.config import TINY
+from marey.models.mogo.train import train_stage
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.motions import TOKENS
 from marey.training.staging import TrainOptions
 

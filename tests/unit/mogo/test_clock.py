@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.mogo.clock import UNTOLD, Clock
-from marey.mogo.config import TINY
-from marey.mogo.packed_model import PackedModel
-from marey.mogo.plan import STOPS
-from marey.mogo.streaming import Streams
+from marey.models.mogo.clock import UNTOLD, Clock
+from marey.models.mogo.config import TINY
+from marey.models.mogo.packed_model import PackedModel
+from marey.models.mogo.plan import STOPS
+from marey.models.mogo.streaming import Streams
 from marey.streams.acts import Begun
 
 from .networks import columns, prompts, transformer

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle, InvalidInput
-from marey.generating.port import Request
-from marey.hgm3.bundle import random_bundle as hgm3_bundle
-from marey.mogo.assembly import assemble
-from marey.mogo.bundle import random_bundle
-from marey.mogo.config import TINY
-from marey.mogo.generate import Generator, Settings
-from marey.mogo.train import train_stage
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.generation.port import Request
+from marey.models.hgm3.bundle import random_bundle as hgm3_bundle
+from marey.models.mogo.assembly import assemble
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.config import TINY
+from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.train import train_stage
 from marey.training.budget import Budget
 from marey.training.staging import TrainOptions
 from tests.support.prepared import text_features, write_prepared
@@ -39,7 +39,7 @@ def test_a_motion_does_not_depend_on_those_beside_it(generator: Generator) -> No
 def test_more_requests_than_sessions_are_all_made(generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     requests = [Request(text_features(0), seed=k, frames=16) for k in range(5)]
     wanted = [made.tokens for made in generator.generate(requests)]
-    monkeypatch.setattr("marey.mogo.generate.MAX_SESSIONS", 2)
+    monkeypatch.setattr("marey.models.mogo.generate.MAX_SESSIONS", 2)
     found = [made.tokens for made in generator.generate(requests)]
     assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
 
@@ -110,7 +110,7 @@ class Dropper:
 def test_a_dropped_request_ends_and_its_neighbours_stay_the_same(
     generator: Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("marey.mogo.generate.MAX_SESSIONS", 2)
+    monkeypatch.setattr("marey.models.mogo.generate.MAX_SESSIONS", 2)
     requests = [Request(text_features(k), seed=k, frames=20) for k in range(4)]
     whole = generator.generate(requests)
     control = Dropper()

@@ -8,10 +8,10 @@ import pytest
 import torch
 import torch.nn.functional as F
 
-from marey.mogo.config import TINY
-from marey.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
-from marey.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
-from marey.mogo.tokenizer import Tokenizer
+from marey.models.mogo.config import TINY
+from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums, scale_penalty
+from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from marey.models.mogo.tokenizer import Tokenizer
 from marey.training.tokenizing import tokenizer_loss
 
 from .networks import columns, opened, prompts, transformer

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
-from marey.mogo.bundle import random_bundle
-from marey.mogo.config import TINY
-from marey.mogo.generate import Generator, Settings
-from marey.mogo.live import LiveRoom
+from marey.core.errors import InvalidInput
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.config import TINY
+from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.live import LiveRoom
 from marey.motion.live import LiveMotion
 from marey.runtime.live.port import LiveFrame
 from marey.streams.acts import Begun

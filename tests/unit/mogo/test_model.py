@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.errors import InvalidInput
-from marey.mogo.attention import RelativeAttention
-from marey.mogo.config import PAPER, STARTER, TINY, MOGOConfig
-from marey.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
+from marey.core.errors import InvalidInput
+from marey.models.mogo.attention import RelativeAttention
+from marey.models.mogo.config import PAPER, STARTER, TINY, MOGOConfig
+from marey.models.mogo.model import NOT_ASKED, Pace, RQHCTransformer, Trunk, corrupt, in_force, next_targets
 
 from .networks import columns, prompts, transformer
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.mogo import obedience
-from marey.mogo.bundle import random_bundle
-from marey.mogo.obedience import main, pairs_of, steered
-from marey.training.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.models.mogo import obedience
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.obedience import main, pairs_of, steered
 from tests.support.bodies import bower, walker
 
 FPS = 20.0

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import torch
 
-from marey.mogo import train
-from marey.mogo.config import TINY, MOGOConfig
-from marey.mogo.losses import LevelSums
-from marey.mogo.stage_transformer import TransformerStage
-from marey.mogo.tokenizer import Tokenizer
+from marey.data.prepared import PreparedData
+from marey.models.mogo import train
+from marey.models.mogo.config import TINY, MOGOConfig
+from marey.models.mogo.losses import LevelSums
+from marey.models.mogo.stage_transformer import TransformerStage
+from marey.models.mogo.tokenizer import Tokenizer
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData, TokenData
 from marey.training.sentences import SentenceData

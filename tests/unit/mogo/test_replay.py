@@ -10,13 +10,13 @@ import pytest
 import structlog
 import torch
 
-from marey.mogo.bundle import random_bundle
-from marey.mogo.config import TINY
-from marey.mogo.generate import Generator
-from marey.mogo.live import LiveRoom
-from marey.mogo.packed_model import PackedModel
-from marey.mogo.replay import Replayed
-from marey.mogo.streaming import Streams
+from marey.models.mogo.bundle import random_bundle
+from marey.models.mogo.config import TINY
+from marey.models.mogo.generate import Generator
+from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.packed_model import PackedModel
+from marey.models.mogo.replay import Replayed
+from marey.models.mogo.streaming import Streams
 from tests.support.prepared import text_features
 
 from .networks import columns, opened, prompts, transformer

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 import torch
 
-from marey.errors import InvalidInput
-from marey.mogo.config import TINY, InferenceConfig, MOGOConfig
-from marey.mogo.model import RQHCTransformer
-from marey.mogo.streaming import Streams
+from marey.core.errors import InvalidInput
+from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
+from marey.models.mogo.model import RQHCTransformer
+from marey.models.mogo.streaming import Streams
 from marey.nn.sampling import guide
 from marey.streams.acts import Begun
 from tests.support.processors import PACKED_TYPES

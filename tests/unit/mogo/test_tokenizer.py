@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from marey.mogo.config import TINY
-from marey.mogo.tokenizer import DecoderState, Tokenizer
+from marey.models.mogo.config import TINY
+from marey.models.mogo.tokenizer import DecoderState, Tokenizer
 
 LEVELS = TINY.tokenizer.levels
 

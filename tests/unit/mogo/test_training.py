@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 import torch
 
-from marey.errors import InvalidInput, NotFound
-from marey.mogo import steers
-from marey.mogo.assembly import assemble, take_apart
-from marey.mogo.config import TINY, MOGOConfig
-from marey.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
-from marey.mogo.rollouts import Rollouts
-from marey.mogo.samples import MIN_FRAMES, Stretch
-from marey.mogo.stage_transformer import TransformerStage
-from marey.mogo.steers import LEAST_ENTERED, load_steers
-from marey.mogo.tokenizer import Tokenizer
-from marey.mogo.train import train_stage
+from marey.core.errors import InvalidInput, NotFound
+from marey.data.prepared import PreparedData
+from marey.models.mogo import steers
+from marey.models.mogo.assembly import assemble, take_apart
+from marey.models.mogo.config import TINY, MOGOConfig
+from marey.models.mogo.model import NOT_ASKED, RQHCTransformer, next_targets
+from marey.models.mogo.rollouts import Rollouts
+from marey.models.mogo.samples import MIN_FRAMES, Stretch
+from marey.models.mogo.stage_transformer import TransformerStage
+from marey.models.mogo.steers import LEAST_ENTERED, load_steers
+from marey.models.mogo.tokenizer import Tokenizer
+from marey.models.mogo.train import train_stage
 from marey.training.budget import Budget
-from marey.training.data.prepared import PreparedData
 from marey.training.motions import MotionData, TokenData
 from marey.training.pairs import Pairs
 from marey.training.parts import load_part

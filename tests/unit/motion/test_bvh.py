@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
-from marey.motion import bvh, bvh_header
-from marey.motion.bvh import format_bvh, parse_bvh, read_bvh, write_bvh
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from marey.motion.clip import MotionClip
+from marey.motion.io import bvh, bvh_header
+from marey.motion.io.bvh import format_bvh, parse_bvh, read_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import about, angle_between, multiply, to_euler
 from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS

@@ -17,11 +17,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from marey.errors import Conflict, InvalidInput, TooLarge
-from marey.motion import bvh_live
-from marey.motion.bvh import format_bvh, parse_bvh, read_bvh
-from marey.motion.bvh_live import COUNT_WIDTH, PAGE, LiveBVH
+from marey.core.errors import Conflict, InvalidInput, TooLarge
 from marey.motion.clip import MotionClip
+from marey.motion.io import bvh_live
+from marey.motion.io.bvh import format_bvh, parse_bvh, read_bvh
+from marey.motion.io.bvh_live import COUNT_WIDTH, PAGE, LiveBVH
 from marey.motion.rotations import angle_between, slerp
 from marey.motion.skeleton import HUMANML3D, SKELETONS
 from tests.support.exported import tumbling
@@ -160,7 +160,7 @@ def test_neither_a_row_nor_the_count_lies_across_a_page(recorded: list[Write], t
 def test_a_process_that_is_killed_leaves_a_whole_file(tmp_path: Path) -> None:
     script = """
 import sys
-from marey.motion.bvh_live import LiveBVH
+from marey.motion.io.bvh_live import LiveBVH
 from tests.support.walker import walker
 clip = walker(seconds=20)
 with LiveBVH.open(sys.argv[1], clip.skeleton, clip.fps) as live:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
 from marey.motion import clip as clips
 from marey.motion.clip import KEYS, MotionClip, load_npz, parse_npz
 from marey.motion.kinematics import forward_kinematics

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 from marey.motion.features import (
     HUMANML3D_263,
     KIT_251,

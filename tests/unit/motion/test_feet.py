@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.feet import FLOOR_BAND, clean_feet, find_contacts, floor_height, runs, skate
 from marey.motion.filters import smooth_above
 from marey.motion.kinematics import bone_lengths

@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.features import HUMANML3D_263
 from marey.motion.finish import finish_motion
 from marey.motion.kinematics import forward_kinematics

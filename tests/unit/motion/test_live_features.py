@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.features import HUMANML3D_263, KIT_251
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.live_features import LiveDecoder, RootState

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.feet import RELEASE, find_contacts
 from marey.motion.kinematics import bone_lengths
 from marey.motion.legs import two_bone_knee

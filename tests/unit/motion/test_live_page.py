@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from marey.motion import live_page as module
-from marey.motion.body import dress
-from marey.motion.live_page import live_page
-from marey.motion.pages import fill
 from marey.motion.skeleton import HUMANML3D
+from marey.viz import live_page as module
+from marey.viz.body import dress
+from marey.viz.live_page import live_page
+from marey.viz.pages import fill
 
 ASSETS = Path(module.__file__).parent / "assets"
 

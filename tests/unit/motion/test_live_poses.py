@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
-from marey.motion.bvh import read_bvh, write_bvh
+from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
+from marey.motion.io.bvh import read_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.live_poses import LivePoses, PoseState
 from marey.motion.pose import solve_pose

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
-from marey.motion import player
+from marey.core.errors import InvalidInput
 from marey.motion.kinematics import forward_kinematics
-from marey.motion.pages import script_json
-from marey.motion.player import html_player
 from marey.motion.rotations import normalize
+from marey.viz import player
+from marey.viz.pages import script_json
+from marey.viz.player import html_player
 from tests.support.walker import walker
 
 ASSETS = Path(player.__file__).parent / "assets"

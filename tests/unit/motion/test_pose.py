@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.features import mirror_joints
 from marey.motion.kinematics import bone_lengths, forward_kinematics
 from marey.motion.pose import measure_offsets, solve_pose

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.motion.bvh import BvhClip, format_bvh, parse_bvh
-from marey.motion.convert import clip_from_bvh, steady
+from marey.data.retarget import read_source, retarget
+from marey.data.rigs import BANDAI_NAMCO, ICLONE
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
+from marey.motion.io.bvh import BvhClip, format_bvh, parse_bvh
+from marey.motion.io.convert import clip_from_bvh, steady
 from marey.motion.kinematics import bone_lengths, facing
 from marey.motion.pose import solve_pose
 from marey.motion.rotations import angle_between, normalize
 from marey.motion.skeleton import HUMANML3D
-from marey.training.data.retarget import read_source, retarget
-from marey.training.data.rigs import BANDAI_NAMCO, ICLONE
 from tests.support.archives import first_files
 
 pytestmark = pytest.mark.data

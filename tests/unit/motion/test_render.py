@@ -11,15 +11,15 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from marey.errors import InvalidInput
-from marey.motion.body import dress, dress_clip, forward_of, part_of
+from marey.core.errors import InvalidInput
 from marey.motion.clip import MotionClip
 from marey.motion.kinematics import global_rotations
-from marey.motion.paper import THEMES, Paper, one_line
-from marey.motion.raster import Camera, shade
-from marey.motion.render import CELL, GAP, MARGIN, PLAN, contact_sheet, facts_of
 from marey.motion.rotations import conjugate, multiply, normalize, rotate, to_matrix
 from marey.motion.skeleton import HUMANML3D, KIT, SKELETONS, SNAPMOGEN, Skeleton
+from marey.viz.body import dress, dress_clip, forward_of, part_of
+from marey.viz.paper import THEMES, Paper, one_line
+from marey.viz.raster import Camera, shade
+from marey.viz.render import CELL, GAP, MARGIN, PLAN, contact_sheet, facts_of
 from tests.support.walker import walker
 
 STRIP = 60  # pixels from the sheet's top to the first strip of a sheet with one line of caption and no title

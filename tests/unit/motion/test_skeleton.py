@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.kinematics import bone_lengths, facing, forward_kinematics
 from marey.motion.rotations import IDENTITY, about
 from marey.motion.skeleton import (

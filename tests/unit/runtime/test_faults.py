@@ -4,7 +4,7 @@ import time
 import pytest
 import torch
 
-from marey.errors import InvalidInput, Unreachable
+from marey.core.errors import InvalidInput, Unreachable
 from marey.runtime.faults import HandlerError, OutOfMemory, as_problem, is_device_lost, is_out_of_memory, patiently
 
 

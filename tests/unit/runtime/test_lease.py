@@ -5,7 +5,7 @@ from uuid import UUID, uuid4
 
 import pytest
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
 from marey.jobs import Claim, ClaimedItem, Stage
 from marey.jobs import Heartbeat as Answer
 from marey.runtime.lease import Heartbeat, HeldLease

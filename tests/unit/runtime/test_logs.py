@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 import structlog
 
-from marey.characters import LINES, find_forbidden
+from marey.core.characters import LINES, find_forbidden
 from marey.runtime.logs import configure_logging, logger
 
 

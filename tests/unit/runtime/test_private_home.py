@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from marey.errors import InvalidInput
-from marey.private_home import is_open, make_private, open_private
+from marey.core.errors import InvalidInput
+from marey.core.private_home import is_open, make_private, open_private
 from marey.runtime.status import WorkerStatus, status_file, write_status
 
 

@@ -5,7 +5,7 @@ import threading
 import time
 from pathlib import Path
 
-from marey.errors import Unreachable
+from marey.core.errors import Unreachable
 from marey.runtime.status import (
     FRESH,
     TICK_LIMIT,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import angle_between, from_rotvec
 from marey.motion.skeleton import HUMANML3D

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.streams.recording import Recording
 from tests.support.prepared import text_features
 

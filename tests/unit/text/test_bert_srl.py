@@ -12,7 +12,7 @@ import torch
 from transformers import BertConfig, BertModel
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle, InvalidFile
+from marey.core.errors import InvalidBundle, InvalidFile
 from marey.text.bert_srl import BertLabeller
 from marey.text.convert import convert_encoder, import_bert_srl, main
 from marey.text.roles import Frame

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from marey.labeller.fit import crf_loss
 from marey.text.bio import start_scores, transition_scores, viterbi
 from marey.text.roles import Argument, spans_to_arguments
-from marey.training.labeller_fit import crf_loss
 
 TAGS = ("O", "B-ARG0", "I-ARG0", "B-ARGM-DIR", "I-ARGM-DIR")
 

@@ -10,8 +10,8 @@ import pytest
 import torch
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidBundle, InvalidFile, NotFound
-from marey.settings import Settings
+from marey.core.errors import InvalidBundle, InvalidFile, NotFound
+from marey.core.settings import Settings
 from marey.text.encoders import Encoding, find_weights, weights_sha256
 from marey.text.loading import load_encoder
 from marey.text.minilm import MiniLM

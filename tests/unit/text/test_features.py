@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.text.features import TextFeatures
 from marey.text.graph import build_graph
 from marey.text.roles import Argument, Frame

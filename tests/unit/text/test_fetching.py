@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from marey.cli.commands import models as command
-from marey.errors import InvalidFile, NotFound, Unreachable
-from marey.settings import Settings
+from marey.core.errors import InvalidFile, NotFound, Unreachable
+from marey.core.settings import Settings
 from marey.text import encoders, fetching
 from marey.text.encoders import find_weights, weights_sha256
 from marey.text.fetching import MINILM, Wheel, fetch, need_weights

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from marey.bundles import BundleWriter, TextSpec
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.jobs import Claim, ClaimedItem, Stage
 from marey.runtime.handler import Batch, Failed, TextDone
 from marey.text.features import TextFeatures

@@ -8,20 +8,20 @@ import pytest
 import torch
 
 from marey.bundles import Bundle
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
+from marey.labeller.adapter import AdaptedMiniLM, token_batch
+from marey.labeller.fit import FitConfig, encode, fit, roles_of, tag_set
+from marey.labeller.grammar import Example
+from marey.labeller.pack import pack
+from marey.labeller.pools import CaptionPool, frequent_roles, propbank_batches, with_roles
+from marey.labeller.propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
+from marey.labeller.recipe import Recipe
+from marey.labeller.weights import Weights
 from marey.text.encoders import find_weights
 from marey.text.light import LightLabeller, WordStates
 from marey.text.light_network import LightConfig
 from marey.text.minilm import MiniLM
 from marey.text.roles import Argument, Frame
-from marey.training.labeller_adapter import AdaptedMiniLM, token_batch
-from marey.training.labeller_fit import FitConfig, encode, fit, roles_of, tag_set
-from marey.training.labeller_grammar import Example
-from marey.training.labeller_pack import pack
-from marey.training.labeller_pools import CaptionPool, frequent_roles, propbank_batches, with_roles
-from marey.training.labeller_propbank import SKELETONS, WORDS, Token, agree, glue, joined, read_propbank, spans
-from marey.training.labeller_recipe import Recipe
-from marey.training.labeller_weights import Weights
 
 WAVING = [
     ("Anna", "NNP", "-", "(ARG0*)", ""),

@@ -12,20 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.bundles import Bundle
-from marey.errors import InvalidFile, InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput
+from marey.labeller.card import card
+from marey.labeller.data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
+from marey.labeller.fit import FitConfig, roles_of, tag_set
+from marey.labeller.grammar import Example, sentence
+from marey.labeller.pack import pack
+from marey.labeller.pools import CaptionPool, caption_batches
+from marey.labeller.recipe import Recipe
+from marey.labeller.score import Scores
+from marey.labeller.train import cross_validate, main
 from marey.text.encoders import find_weights
 from marey.text.light import LightLabeller
 from marey.text.light_network import LightConfig
 from marey.text.roles import Argument, Frame
-from marey.training.labeller import cross_validate, main
-from marey.training.labeller_card import card
-from marey.training.labeller_data import Augmenter, corrected, distinct, fold_of, group, read_gold, replace, typo
-from marey.training.labeller_fit import FitConfig, roles_of, tag_set
-from marey.training.labeller_grammar import Example, sentence
-from marey.training.labeller_pack import pack
-from marey.training.labeller_pools import CaptionPool, caption_batches
-from marey.training.labeller_recipe import Recipe
-from marey.training.labeller_score import Scores
 
 WALK = Example(
     ("A", "person", "slowly", "walks", "forward."),
@@ -213,7 +213,7 @@ def test_cross_validation_never_scores_a_caption_it_trained_on(recipe: Recipe, m
         trained.append({example.words for example in examples})
         return caption_batches(examples, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("marey.training.labeller_recipe.caption_batches", spy)
+    monkeypatch.setattr("marey.labeller.recipe.caption_batches", spy)
     lost = Example(("Someone", "waves."), ())  # the parser found no verb
     short = replace_fields(recipe, config=FitConfig(steps=1, batch=8, rank=2))
     result = cross_validate([*gold[:3], gold[0]], [*gold[2:], lost], short, 2)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.bundles import Bundle, find_bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.text.encoders import find_weights
 from marey.text.light import LightLabeller, WordStates, segments
 from marey.text.light_network import LightConfig, LightNetwork, sentence_dropout

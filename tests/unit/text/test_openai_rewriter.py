@@ -10,8 +10,8 @@ import pytest
 from pydantic import SecretStr
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidInput
-from marey.settings import Settings
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
 from marey.text import openai_rewriter
 from marey.text.features import TextFeatures
 from marey.text.keys import as_served, feature_key

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidBundle, InvalidInput, NotFound
+from marey.core.errors import InvalidBundle, InvalidInput, NotFound
 from marey.text import pipeline as pipelines
 from marey.text.keys import feature_key, resolve
 from marey.text.pipeline import TextPipeline
@@ -135,7 +135,7 @@ def test_a_key_needs_hashes() -> None:
 
 def test_keys_and_limits_need_no_torch() -> None:
     code = (
-        "import sys; from marey.bundles import TextSpec; import marey.text.pipeline, marey.prompts; "
+        "import sys; from marey.bundles import TextSpec; import marey.text.pipeline, marey.items.prompts; "
         "from marey.text.keys import resolve; resolve(TextSpec()); "
         "print([m for m in ('torch', 'transformers', 'tokenizers') if m in sys.modules])"
     )

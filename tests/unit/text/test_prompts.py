@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.errors import InvalidInput
-from marey.prompts import MAX_WORDS, check_prompt
+from marey.core.errors import InvalidInput
+from marey.items.prompts import MAX_WORDS, check_prompt
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.text.graph import build_graph
 from marey.text.guard import changed_meaning
 from marey.text.loading import load_rewriter

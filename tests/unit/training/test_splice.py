@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.data.splice import join_clips, turned
 from marey.motion import rotations
 from marey.motion.kinematics import bone_lengths, forward_kinematics
 from marey.motion.skeleton import HUMANML3D
-from marey.training.data.splice import join_clips, turned
 from tests.support.walker import walker
 
 FPS = 20.0

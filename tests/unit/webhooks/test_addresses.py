@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from marey.addresses import Allowed
-from marey.errors import InvalidInput, Refused
+from marey.core.addresses import Allowed
+from marey.core.errors import InvalidInput, Refused
 from marey.webhooks.addresses import check_url, choose_address
 
 DEFAULT = Allowed.of(["public"])

@@ -13,11 +13,11 @@ from cryptography.fernet import Fernet
 from pydantic import SecretStr
 from standardwebhooks.webhooks import Webhook, WebhookVerificationError
 
-from marey.errors import InvalidInput, Refused
-from marey.jobs import DueDelivery
-from marey.jobs.deliveries import DELAYS, HOLD, JITTER, delay_after
+from marey.core.errors import InvalidInput, Refused
+from marey.core.settings import Settings
 from marey.scheduler.sending import asked_to_wait
-from marey.settings import Settings
+from marey.webhooks import DueDelivery
+from marey.webhooks.deliveries import DELAYS, HOLD, JITTER, delay_after
 from marey.webhooks.message import headers_of, message_of
 from marey.webhooks.vault import Vault, key_file, new_signing_secret
 

@@ -6,9 +6,9 @@ from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_add
 
 import pytest
 
-from marey.addresses import Allowed, is_public
-from marey.errors import Refused
-from marey.special_addresses import SPECIAL_4, SPECIAL_6, purpose_of
+from marey.core.addresses import Allowed, is_public
+from marey.core.errors import Refused
+from marey.core.special_addresses import SPECIAL_4, SPECIAL_6, purpose_of
 from marey.webhooks.addresses import choose_address
 
 REGISTRY = (

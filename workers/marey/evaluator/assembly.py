@@ -9,7 +9,8 @@ import numpy as np
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
+from marey.data.prepared import PreparedData
 from marey.evaluator.bundle import load_networks, write_bundle
 from marey.evaluator.card import card_of
 from marey.evaluator.config import EvaluatorConfig
@@ -18,7 +19,6 @@ from marey.evaluator.reference import SPLITS, Reference, ReferenceClip, Referenc
 from marey.evaluator.sentences import open_encoder, spec_of
 from marey.evaluator.tmr import embed_motions
 from marey.training.assembly import gather
-from marey.training.data.prepared import PreparedData
 from marey.training.staging import Recipe
 
 RECIPE = Recipe(

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from marey.configs import ModelConfig, named
-from marey.errors import InvalidInput
+from marey.core.configs import ModelConfig, named
+from marey.core.errors import InvalidInput
 from marey.motion.features import layout
 from marey.training.optimisation import StageConfig
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from marey.bundles import Bundle, find_bundle
-from marey.errors import MareyError, NotFound, Unreachable
+from marey.core.errors import MareyError, NotFound, Unreachable
+from marey.core.settings import settings
 from marey.evaluator.loading import load_evaluator
 from marey.evaluator.measuring import check_measured, measure
 from marey.evaluator.port import Evaluator
@@ -17,7 +18,6 @@ from marey.evaluator.reporting import report_of, summary_of
 from marey.jobs import EVALUATOR_QUEUE, ClaimedItem
 from marey.runtime.handler import Batch, BatchControl, ExportedFile, Failed, Handler, Outcome, Scored
 from marey.runtime.scoring import ScoreInput
-from marey.settings import settings
 
 
 @dataclass(frozen=True)

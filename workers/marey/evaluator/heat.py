@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 from marey.evaluator.report import HeatCell
-from marey.expected import JOIN
+from marey.items.expected import JOIN
 
 
 def heat_of(rows: Iterable[tuple[str | None, str, bool | None]]) -> tuple[HeatCell, ...]:

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.training.data.describe import STYLE_NAMES
-from marey.training.data.manifest import Clip
+from marey.data.describe import STYLE_NAMES
+from marey.data.manifest import Clip
 
 FREE_TEXT = "cmu"
 """Act of clips whose captions are their source's own words: their content is what tells them apart."""

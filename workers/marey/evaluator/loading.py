@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from marey.bundles import Bundle, find_bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.evaluator.port import Evaluator
 
 

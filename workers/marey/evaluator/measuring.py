@@ -14,15 +14,15 @@ from typing import TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.checks.judge import Act, Expectation, Side, Verdict, judge
+from marey.checks.quality import Quality, quality
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.evaluations import MAX_MISSING, MadeItem
 from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
-from marey.expected import read_expected
-from marey.jobs import MAX_MISSING, MadeItem
+from marey.items.expected import read_expected
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.features import FeatureLayout, layout
 from marey.motion.resample import resample
-from marey.training.checks.judge import Act, Expectation, Side, Verdict, judge
-from marey.training.checks.quality import Quality, quality
 
 Piece = TypeVar("Piece")
 TOGETHER = 64
@@ -155,7 +155,7 @@ def check_measured(measured: Measured, asked: int) -> None:
 
 
 def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Checked:
-    """Judge a motion (T, 22, 3) in metres by what is expected of it, as `marey.expected` reads it, and measure it."""
+    """Measure a motion (T, 22, 3) in metres, and judge it by what is expected (`marey.items.expected`)."""
     verdict = None
     if expected is not None:
         acts = read_expected(expected)

@@ -9,7 +9,7 @@ import torch
 from torch import nn
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.nn.bundling import fill
 
 KIND = "evaluator"

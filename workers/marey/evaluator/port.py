@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.retrieval import Distance
 
 Beat = Callable[[], None]

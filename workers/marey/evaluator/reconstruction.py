@@ -20,18 +20,18 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from marey.bundles import Bundle
 from marey.bundles.reference import expected_of
-from marey.documents import read_json
-from marey.errors import InvalidFile, InvalidInput, NotFound
+from marey.core.documents import read_json
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.data.prepared import PreparedData
+from marey.evaluations import BUNDLE_SOURCES
 from marey.evaluator.heat import heat_of, style_of
 from marey.evaluator.measuring import Checked, check
 from marey.evaluator.port import Embeddings, Evaluator
 from marey.evaluator.reference import Reference, ReferenceSplit
 from marey.evaluator.report import HeatCell, Value
 from marey.evaluator.rows import Ruler, real_side
-from marey.jobs import BUNDLE_SOURCES
 from marey.motion.features import FeatureLayout, layout
 from marey.nn.motion_tokenizer import MotionTokenizer
-from marey.training.data.prepared import PreparedData
 
 FOLDER = "reconstructions"
 BATCH = 32

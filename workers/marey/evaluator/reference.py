@@ -13,11 +13,11 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from marey.bundles import Bundle, BundleWriter
 from marey.bundles.reference import FILE, PART, expected_of
-from marey.errors import InvalidBundle, NotFound
+from marey.checks.quality import Quality
+from marey.core.errors import InvalidBundle, NotFound
+from marey.data.manifest import Clip
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.measuring import check
-from marey.training.checks.quality import Quality
-from marey.training.data.manifest import Clip
 
 SPLITS = ("val", "test", "compositional")
 """`test` judges; `val` is to choose by; `compositional` are pairs of act and style that training never saw."""

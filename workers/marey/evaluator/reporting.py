@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.evaluations import TEST_SPLIT, EarlierRun
 from marey.evaluator.comparing import Earlier, alarms, changes
 from marey.evaluator.heat import heat_of, style_of
 from marey.evaluator.measuring import Measured, Motion
@@ -34,7 +35,6 @@ from marey.evaluator.report import (
 from marey.evaluator.report.model import MOST_EXHIBITS, Against
 from marey.evaluator.rows import Ruler, generated_rows, reconstruction_row, sides_of, truth_row
 from marey.evaluator.scoring import REPEATS, Side, metrics_of, retrieved
-from marey.jobs import TEST_SPLIT, EarlierRun
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.runtime.scoring import ScoreInput

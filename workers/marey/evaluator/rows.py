@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.checks.quality import Quality
+from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.measuring import Measured, embed_prompts
 from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from marey.evaluator.reference import Reference, ReferenceSplit
@@ -25,9 +27,7 @@ from marey.evaluator.scoring import (
     retrieval,
     several,
 )
-from marey.jobs import COMPOSITIONAL, TEST_SPLIT
 from marey.measures.comparing import OBEYED, RETRIEVED
-from marey.training.checks.quality import Quality
 
 UNMEASURED = "nobody measured this generator's tokenizer on real motion (`marey train evaluator reconstruct`)"
 OLD_BUNDLE = "the evaluator's bundle was made before it carried what the joints of real clips say"

@@ -12,7 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.errors import InvalidInput
+from marey.checks.quality import Quality
+from marey.core.errors import InvalidInput
+from marey.evaluations import COMPOSITIONAL
 from marey.evaluator.measuring import Measured
 from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
 from marey.evaluator.metrics.intervals import redraw, repeated
@@ -25,9 +27,7 @@ from marey.evaluator.metrics.retrieval import (
 )
 from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
 from marey.evaluator.report import Metric, Value
-from marey.jobs import COMPOSITIONAL
 from marey.measures.comparing import OBEYED
-from marey.training.checks.quality import Quality
 
 REPEATS = 20
 POOLS = (32, 100)

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from marey.bundles import TextSpec
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.text.encoders import TextEncoder
 from marey.text.keys import NO_LABELLER
 from marey.text.loading import load_encoder

@@ -11,7 +11,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from marey.errors import InvalidFile, InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput
+from marey.data.sampling import sampling_weights
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.losses import divergences, info_nce, latent_distance, reconstruction
@@ -20,7 +21,6 @@ from marey.evaluator.scores import EmbeddedSplit, retrieval_scores
 from marey.evaluator.sentences import CaptionStates
 from marey.nn.convolution import frame_mask
 from marey.text.encoders import TextEncoder
-from marey.training.data.sampling import sampling_weights
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData
 from marey.training.pairs import pieces_of

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle, InvalidInput
+from marey.core.errors import InvalidBundle, InvalidInput
 from marey.evaluator.metrics.retrieval import Distance
 from marey.evaluator.networks import Loaded, open_networks
 from marey.evaluator.port import Embeddings, Motion, check_motions

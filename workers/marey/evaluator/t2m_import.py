@@ -27,10 +27,10 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from marey.arrays import read_npy
 from marey.bundles import Bundle, BundleWriter, DataSource
-from marey.characters import escape
-from marey.errors import InvalidFile, MareyError
+from marey.core.arrays import read_npy
+from marey.core.characters import escape
+from marey.core.errors import InvalidFile, MareyError
 from marey.evaluator.t2m import MODEL, WORDS_FILE, WORDS_PART
 from marey.evaluator.t2m_model import MotionEncoder, T2MConfig, TextEncoder
 from marey.evaluator.t2m_words import END, START, UNKNOWN

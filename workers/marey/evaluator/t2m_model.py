@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from marey.configs import ModelConfig
+from marey.core.configs import ModelConfig
 
 FRAMES = 196
 """The public code pads every normalised motion with zeros to so many frames. It matters: the two convolutions reach two

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from marey.bundles import Bundle
-from marey.errors import InvalidBundle
+from marey.core.errors import InvalidBundle
 from marey.evaluator.bundle import load_networks
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.metrics.retrieval import Distance
@@ -17,8 +17,8 @@ from marey.evaluator.model import MotionEncoder, SentenceEncoder
 from marey.evaluator.networks import Loaded
 from marey.evaluator.port import Embeddings, Motion, check_motions
 from marey.evaluator.sentences import check_encoder, open_encoder, padded, token_states
+from marey.items.prompts import check_prompt
 from marey.nn.devices import choose_device
-from marey.prompts import check_prompt
 from marey.text.encoders import TextEncoder
 
 BATCH = 64

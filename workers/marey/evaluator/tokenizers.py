@@ -7,6 +7,8 @@ from importlib.metadata import version
 
 import torch
 
+from marey.data.prepared import PreparedData
+from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.port import Evaluator
 from marey.evaluator.reconstruction import Rebuilt
 from marey.evaluator.reference import Reference as RealClips
@@ -15,8 +17,6 @@ from marey.evaluator.report.model import RECONSTRUCTION
 from marey.evaluator.reporting import bundle_of
 from marey.evaluator.rows import Ruler, reconstruction_row, truth_row
 from marey.evaluator.scoring import REPEATS, metrics_of
-from marey.jobs import COMPOSITIONAL, TEST_SPLIT
-from marey.training.data.prepared import PreparedData
 
 
 def tokenizer_report(

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from statistics import mean, stdev
 
-from marey.generating.port import Generator, S
+from marey.checks.prompts import evaluation_prompts
+from marey.checks.rates import mean_quality
+from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
-from marey.training.checks.prompts import evaluation_prompts
-from marey.training.checks.rates import mean_quality
 from marey.training.obedience import measure
 
 

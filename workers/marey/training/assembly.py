@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 from torch import Tensor
 
 from marey.bundles import Bundle, DataSource, TextSpec
-from marey.errors import InvalidInput
-from marey.training.data.prepared import PreparedData
+from marey.core.errors import InvalidInput
+from marey.data.prepared import PreparedData
 from marey.training.parts import Part, save_part
 from marey.training.staging import ModelConfig, Recipe
 from marey.training.texts import CaptionTexts

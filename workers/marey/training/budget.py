@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from marey.documents import read_json
-from marey.errors import InvalidFile, NotFound
+from marey.core.documents import read_json
+from marey.core.errors import InvalidFile, NotFound
 from marey.nn.ema import WeightAverage
 
 FORMAT = 1

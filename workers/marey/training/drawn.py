@@ -14,10 +14,10 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
+from marey.data.manifest import Clip
+from marey.data.prepared import PreparedData
 from marey.nn.motion_tokenizer import MotionTokenizer
-from marey.training.data.manifest import Clip
-from marey.training.data.prepared import PreparedData
 from marey.training.motions import TokenData
 from marey.training.sentences import SentenceData
 
@@ -77,7 +77,7 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
     except (SafetensorError, OSError) as error:
         raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Remove it.") from error
     if key != _key(tokenizer, prepared):
-        hint = "Remove it, or draw again (`python -m marey.hgm3.practice`)."
+        hint = "Remove it, or draw again (`python -m marey.models.hgm3.practice`)."
         raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)
     values = load_file(file)
     return Drawn(values["clips"].numpy(), values["lengths"], values["tokens"].long())

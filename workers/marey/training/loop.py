@@ -24,7 +24,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 from torch import Tensor, nn
 from torch.utils.tensorboard import SummaryWriter
 
-from marey.errors import InvalidInput, MareyError
+from marey.core.errors import InvalidInput, MareyError
 from marey.nn import distributed
 from marey.nn.devices import fast_bf16
 from marey.nn.ema import WeightAverage

@@ -15,11 +15,11 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor, nn
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
+from marey.data.manifest import Clip
+from marey.data.prepared import PreparedData
 from marey.nn import distributed
 from marey.nn.motion_tokenizer import MotionTokenizer
-from marey.training.data.manifest import Clip
-from marey.training.data.prepared import PreparedData
 
 TOKENS = "tokens.safetensors"
 

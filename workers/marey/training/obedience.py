@@ -1,7 +1,7 @@
 """Does a bundle do what the prompt says? The 200 evaluation prompts, several seeds, judged on the exported joints.
 
-    python -m marey.hgm3.obedience models/hgm3-starter --seeds 3 -o report
-    python -m marey.mogo.obedience models/mogo-starter --seeds 3 -o report
+    python -m marey.models.hgm3.obedience models/hgm3-starter --seeds 3 -o report
+    python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 -o report
 
 What is chosen by looking at numbers (steps, guidance, temperature) is chosen with `--captions DATA`, the captions of a
 prepared folder's validation clips, or `--prompts development`, never on the evaluation prompts. `--prompts blind` asks
@@ -23,16 +23,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from marey.errors import InvalidBundle, InvalidInput
-from marey.generating.export import finish
-from marey.generating.port import Generator, Request, S
+from marey.checks.judge import judge, straightness
+from marey.checks.prompts import EvaluationPrompt, PromptSet, evaluation_prompts
+from marey.checks.quality import Quality, quality
+from marey.checks.rates import Rate, expectations, mean_quality, name_of
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.data.prepared import PreparedData
+from marey.generation.export import finish
+from marey.generation.port import Generator, Request, S
 from marey.text.features import TextFeatures
 from marey.text.pipeline import TextPipeline
-from marey.training.checks.judge import judge, straightness
-from marey.training.checks.prompts import EvaluationPrompt, PromptSet, evaluation_prompts
-from marey.training.checks.quality import Quality, quality
-from marey.training.checks.rates import Rate, expectations, mean_quality, name_of
-from marey.training.data.prepared import PreparedData
 
 
 @dataclass(frozen=True)

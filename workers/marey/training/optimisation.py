@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
-from marey.configs import ModelConfig
-from marey.errors import InvalidInput
+from marey.core.configs import ModelConfig
+from marey.core.errors import InvalidInput
 
 C = TypeVar("C", bound=ModelConfig)
 

@@ -9,8 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from marey.training.data.manifest import Clip
-from marey.training.data.sampling import sampling_weights
+from marey.data.manifest import Clip
+from marey.data.sampling import sampling_weights
 from marey.training.motions import TokenData
 from marey.training.sentences import SentenceData
 

@@ -11,8 +11,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from marey.documents import read_json
-from marey.errors import InvalidFile, NotFound
+from marey.core.documents import read_json
+from marey.core.errors import InvalidFile, NotFound
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.training.texts import CaptionTexts
 
 

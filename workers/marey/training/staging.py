@@ -16,7 +16,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import torch
 from torch import nn
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.nn import distributed
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, Stage, train

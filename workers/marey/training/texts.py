@@ -19,15 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from marey.arrays import check_array, read_npz, text_of
 from marey.bundles import TextSpec
-from marey.documents import parse_json
-from marey.errors import InvalidFile, NotFound
-from marey.hashing import sha256_of
+from marey.core.arrays import check_array, read_npz, text_of
+from marey.core.documents import parse_json
+from marey.core.errors import InvalidFile, NotFound
+from marey.core.hashing import sha256_of
+from marey.data.manifest import CLIPS, TEXTS
+from marey.data.prepared import PreparedData
 from marey.text.graph import EDGE_TYPES, LEVELS, MA, OTHERS, SemanticGraph
 from marey.text.pipeline import TextPipeline
-from marey.training.data.manifest import CLIPS, TEXTS
-from marey.training.data.prepared import PreparedData
 
 CHUNK = 256
 MAX_BYTES = 8 * 2**30

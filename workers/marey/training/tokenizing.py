@@ -11,11 +11,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from marey.data.manifest import Clip
+from marey.data.sampling import sampling_weights
 from marey.nn.convolution import frame_mask
 from marey.nn.motion_tokenizer import MotionTokenizer, biased_std
 from marey.nn.quantizer import Quantized
-from marey.training.data.manifest import Clip
-from marey.training.data.sampling import sampling_weights
 from marey.training.joints import heading_joints, world_joints
 from marey.training.loop import StepContext
 from marey.training.motions import MotionData, dataset_of

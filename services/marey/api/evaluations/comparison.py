@@ -7,9 +7,9 @@ from uuid import UUID
 
 from pydantic import Field
 
-from marey import jobs
+from marey import db, evaluations, jobs
 from marey.api.context import Context
-from marey.errors import NotFound
+from marey.core.errors import NotFound
 from marey.http.schemas import View
 from marey.measures.comparing import MetricChange, compare
 from marey.measures.scores import MotionScore, read_scores
@@ -64,12 +64,12 @@ def compare_runs(shared: Context, tenant: str, before: UUID, after: UUID) -> Com
         InvalidFile: a report cannot be read.
         Unreachable: the store does not answer.
     """
-    with jobs.transaction(shared.engine) as conn:
-        rows = [jobs.get_evaluation(conn, tenant, each) for each in (before, after)]
+    with db.transaction(shared.engine) as conn:
+        rows = [evaluations.get_evaluation(conn, tenant, each) for each in (before, after)]
     earlier, later = rows
     prompts, evaluator = later.prompts, later.request.evaluator
-    jobs.check_comparable(later, prompts=prompts, evaluator=evaluator, where="evaluation")
-    jobs.check_comparable(earlier, prompts=prompts, evaluator=evaluator, where="before")
+    evaluations.check_comparable(later, prompts=prompts, evaluator=evaluator, where="evaluation")
+    evaluations.check_comparable(earlier, prompts=prompts, evaluator=evaluator, where="before")
     scores = [_scores(shared, tenant, row) for row in rows]
     found = compare(*scores, seed=later.request.seed, where=f"evaluation {before}")
     return ComparisonView(
@@ -81,7 +81,7 @@ def compare_runs(shared: Context, tenant: str, before: UUID, after: UUID) -> Com
     )
 
 
-def _scores(shared: Context, tenant: str, row: jobs.EvaluationRow) -> tuple[MotionScore, ...]:
+def _scores(shared: Context, tenant: str, row: evaluations.EvaluationRow) -> tuple[MotionScore, ...]:
     where = f"evaluation {row.id}"
     report = next((file for file in row.reports if file.format == "json"), None)
     if report is None:
@@ -89,7 +89,7 @@ def _scores(shared: Context, tenant: str, row: jobs.EvaluationRow) -> tuple[Moti
     return read_scores(shared.store.get(jobs.asset_key(tenant, report.sha256)), where)
 
 
-def _compared(row: jobs.EvaluationRow, scores: tuple[MotionScore, ...]) -> ComparedView:
+def _compared(row: evaluations.EvaluationRow, scores: tuple[MotionScore, ...]) -> ComparedView:
     return ComparedView(id=row.id, name=row.name, bundle=row.request.bundle, motions=len(scores))
 
 
@@ -97,7 +97,9 @@ def _change(change: MetricChange) -> MetricChangeView:
     return MetricChangeView(**{name: getattr(change, name) for name in MetricChangeView.model_fields})
 
 
-def _others(earlier: jobs.EvaluationRow, later: jobs.EvaluationRow, paired: set[str]) -> list[MetricPairView]:
+def _others(
+    earlier: evaluations.EvaluationRow, later: evaluations.EvaluationRow, paired: set[str]
+) -> list[MetricPairView]:
     old, new = earlier.summary or {}, later.summary or {}
     pairs = ((metric, old.get(metric), value) for metric, value in new.items() if metric not in paired)
     return [

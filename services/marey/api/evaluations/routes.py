@@ -7,7 +7,7 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Request, Response
 
-from marey import jobs
+from marey import db, evaluations
 from marey.api.audit import note
 from marey.api.auth import Operator, Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
@@ -15,7 +15,7 @@ from marey.api.evaluations import service
 from marey.api.evaluations.comparison import ComparisonView, compare_runs
 from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
 from marey.api.files import FILE_RESPONSES, AskedPart, file_response
-from marey.errors import NotFound
+from marey.core.errors import NotFound
 from marey.http.bodies import kept_body
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, IdempotencyKey, Limit, PageView
@@ -47,31 +47,31 @@ async def begin_evaluation(
 
 
 @router.get("")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def list_evaluations(
     conn: Connection,
     key: Reader,
-    state: Annotated[list[jobs.EvaluationState] | None, Query(description="Only those in these states.")] = None,
+    state: Annotated[list[evaluations.EvaluationState] | None, Query(description="Only those in these states.")] = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[EvaluationView]:
     """Evaluations, newest first."""
-    page = jobs.list_evaluations(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
+    page = evaluations.list_evaluations(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
     return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{evaluation}")
 def get_evaluation(evaluation: UUID, conn: Connection, key: Reader) -> EvaluationDetailView:
     """One evaluation, with its history."""
-    return service.detail(conn, jobs.get_evaluation(conn, key.tenant, evaluation))
+    return service.detail(conn, evaluations.get_evaluation(conn, key.tenant, evaluation))
 
 
 @router.delete("/{evaluation}", status_code=202)
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> EvaluationDetailView:
     """Cancel an evaluation and the job that runs for it. One that is over stays as it is."""
     note(conn, key, "evaluation.cancel", evaluation)
-    return service.detail(conn, jobs.cancel_evaluation(conn, key.tenant, evaluation))
+    return service.detail(conn, evaluations.cancel_evaluation(conn, key.tenant, evaluation))
 
 
 @router.head("/{evaluation}/report/{format}", include_in_schema=False)
@@ -85,7 +85,7 @@ def get_report(
     part: AskedPart,
 ) -> Response:
     """The report of an evaluation that is done; its ETag is its sha256."""
-    row = jobs.get_evaluation(conn, key.tenant, evaluation)
+    row = evaluations.get_evaluation(conn, key.tenant, evaluation)
     file = next((f for f in EvaluationView.of(row).reports if f.format == format), None)
     if file is None:
         message = f"there is no such report: the evaluation is {row.state}"

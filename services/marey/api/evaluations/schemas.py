@@ -10,18 +10,18 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.files import FileView
-from marey.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
+from marey.evaluations import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
 from marey.http.fields import EXPECTED, PROMPT, SAMPLING
 from marey.http.schemas import MAX_NAME, Comment, FreeText, Name, View
-from marey.items import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
-from marey.jobs import EvaluationEvent, EvaluationJob, EvaluationRequest, EvaluationRow, EvaluationState
+from marey.items.evaluation_prompts import MAX_PROMPTS, MIN_PROMPTS
+from marey.items.item import MAX_SECONDS, MAX_SEED, MAX_VARIANTS, MIN_SECONDS, MODEL
 from marey.jobs.states import JobState
 
 BUNDLE = rf"^{MODEL.pattern}$"
 
 
 class EvaluationPromptBody(BaseModel):
-    """One prompt. For the documentation: `marey.evaluation_prompts` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.items.evaluation_prompts` is what checks it, and says more."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -8,17 +8,17 @@ from typing import Any, BinaryIO
 
 import sqlalchemy as sa
 
-from marey import jobs
+from marey import db, evaluations, tenants
 from marey.api.audit import note
 from marey.api.context import Context
 from marey.api.documents import Document
 from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationFields, NewEvaluationBody
 from marey.api.jobs.service import Fields, read_fields, request_sha256
-from marey.errors import InvalidInput, NotFound
-from marey.evaluating import Plan, plan_evaluation
-from marey.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
-from marey.items import CHECKS, InvalidItems, Problem
-from marey.settings import Settings
+from marey.core.errors import InvalidInput, NotFound
+from marey.core.settings import Settings
+from marey.evaluations.requests import Plan, plan_evaluation
+from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_prompts
+from marey.items.item import CHECKS, InvalidItems, Problem
 
 OWN_PROMPTS = "prompts"
 """What prompts are called that came without a name."""
@@ -29,7 +29,7 @@ HINT = 'Write {"bundle": "hgm3", "split": "test"}, or "prompts": [{"prompt": "â€
 class Asked:
     """What is to be measured, as it was asked for."""
 
-    request: jobs.EvaluationRequest
+    request: evaluations.EvaluationRequest
     prompts: tuple[EvaluationPrompt, ...] | None
     """None = those of the evaluator's bundle."""
 
@@ -72,7 +72,7 @@ def read_asked(model: type[Fields], values: Mapping[str, Any], document: Documen
 
 
 def create(
-    shared: Context, key: jobs.ApiKey, body: BinaryIO, idempotency_key: str | None
+    shared: Context, key: tenants.ApiKey, body: BinaryIO, idempotency_key: str | None
 ) -> tuple[EvaluationDetailView, bool]:
     """Plan an evaluation, or answer the one that an earlier request with this key and body has planned; whether so.
 
@@ -83,9 +83,9 @@ def create(
     document = prompts_document(body)
     fields, asked = read_asked(NewEvaluationBody, document.fields(), document)
     plan = asked.planned(shared.config)
-    with jobs.transaction(shared.engine) as conn:
+    with db.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
-        new = jobs.NewEvaluation(
+        new = evaluations.NewEvaluation(
             key.tenant,
             plan.request,
             sha256,
@@ -94,12 +94,12 @@ def create(
             idempotency_key=idempotency_key,
             body_sha256=request_sha256("evaluations", body) if idempotency_key else None,
         )
-        made = jobs.create_evaluation(conn, new)
+        made = evaluations.create_evaluation(conn, new)
         assert made is not None  # only one of a schedule can be there already
         replayed = made != new.id
         if not replayed:
             note(conn, key, "evaluation.begin", made, bundle=plan.request.bundle)
-        return detail(conn, jobs.get_evaluation(conn, key.tenant, made)), replayed
+        return detail(conn, evaluations.get_evaluation(conn, key.tenant, made)), replayed
 
 
 def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
@@ -108,14 +108,16 @@ def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
     Raises:
         InvalidInput: it cannot be compared with that baseline.
     """
-    sha256 = jobs.store_prompts(conn, tenant, plan.prompts)
-    jobs.check_baseline(conn, tenant, plan.request, sha256)
+    sha256 = evaluations.store_prompts(conn, tenant, plan.prompts)
+    evaluations.check_baseline(conn, tenant, plan.request, sha256)
     return sha256
 
 
-def detail(conn: sa.Connection, row: jobs.EvaluationRow) -> EvaluationDetailView:
+def detail(conn: sa.Connection, row: evaluations.EvaluationRow) -> EvaluationDetailView:
     """An evaluation with its history."""
-    return EvaluationDetailView.detail(row, jobs.evaluation_events(conn, row.id), jobs.evaluation_waits_for(conn, row))
+    return EvaluationDetailView.detail(
+        row, evaluations.evaluation_events(conn, row.id), evaluations.evaluation_waits_for(conn, row)
+    )
 
 
 def _asked(fields: EvaluationFields, document: Document) -> Asked:
@@ -124,9 +126,9 @@ def _asked(fields: EvaluationFields, document: Document) -> Asked:
         raise InvalidInput(f"an evaluation has a split or prompts, and {what}", where="split, prompts", hint=HINT)
     prompts = read_prompts(document.elements(), where="prompts") if fields.split is None else None
     source = (fields.split if prompts is None else fields.source) or OWN_PROMPTS
-    if prompts is not None and source in jobs.BUNDLE_SOURCES:
+    if prompts is not None and source in evaluations.BUNDLE_SOURCES:
         raise InvalidInput(f"{source!r} is what the evaluator's own prompts are called", where="source")
-    request = jobs.EvaluationRequest(
+    request = evaluations.EvaluationRequest(
         bundle=fields.bundle,
         evaluator=fields.evaluator,
         source=source,

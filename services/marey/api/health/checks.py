@@ -5,10 +5,11 @@ from __future__ import annotations
 import sqlalchemy as sa
 
 from marey.api.readiness import Check
-from marey.errors import Unreachable
-from marey.jobs import TEXT_QUEUE, check_revision, list_schedulers, list_workers, transaction
+from marey.core.errors import Unreachable
+from marey.core.settings import Settings
+from marey.db import check_revision, transaction
+from marey.jobs import TEXT_QUEUE, list_schedulers, list_workers
 from marey.runtime.queue import check_queue
-from marey.settings import Settings
 from marey.storage import AssetStore
 
 

@@ -11,9 +11,10 @@ import sqlalchemy as sa
 from prometheus_client import Gauge, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from marey import metrics
+from marey.core import metrics
+from marey.core.metrics import MAX_TENANTS, OTHER_TENANTS
+from marey.db import SEARCH, transaction
 from marey.jobs import (
-    SEARCH,
     Outbox,
     QueueDepth,
     list_schedulers,
@@ -21,9 +22,7 @@ from marey.jobs import (
     open_stream_counts,
     outbox_state,
     queue_depths,
-    transaction,
 )
-from marey.metrics import MAX_TENANTS, OTHER_TENANTS
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 """Any other is counted as `other`: a client may make up as many as it likes."""

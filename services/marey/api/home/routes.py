@@ -6,7 +6,7 @@ from functools import cache
 
 from fastapi import APIRouter, Response
 
-from marey.motion.pages import code_hashes, whole_page
+from marey.viz.pages import code_hashes, whole_page
 
 router = APIRouter()
 

@@ -12,10 +12,11 @@ from starlette.types import Receive, Scope, Send
 
 from marey.api.jobs.schemas import EventView
 from marey.api.tailer import Tailer
-from marey.errors import Busy, InvalidInput
+from marey.core.errors import Busy, InvalidInput
 from marey.http.places import Places
 from marey.http.problems import problem_response
-from marey.jobs import ApiKey, EventRow
+from marey.jobs import EventRow
+from marey.tenants import ApiKey
 
 PING_SECONDS = 15.0
 RETRY_MILLISECONDS = 1000

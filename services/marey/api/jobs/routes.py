@@ -8,7 +8,7 @@ from uuid import UUID
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from marey import jobs, metrics, tracing
+from marey import db, jobs, takes, tenants
 from marey.api.audit import note
 from marey.api.auth import Operator, Reader, Submitter
 from marey.api.context import Connection, Context, Shared, deadline
@@ -29,7 +29,8 @@ from marey.api.jobs.schemas import (
 )
 from marey.api.motions.routes import Found
 from marey.api.motions.schemas import MotionView
-from marey.errors import InvalidInput
+from marey.core import metrics, tracing
+from marey.core.errors import InvalidInput
 from marey.http import schemas
 from marey.http.bodies import kept_body
 from marey.http.problems import RESPONSES, QuotaBody
@@ -109,10 +110,10 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
     )
 
 
-def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) -> JSONResponse:
+def _check(shared: Context, key: tenants.ApiKey, submission: service.Submission) -> JSONResponse:
     by_bundle = submission.by_bundle
-    with jobs.transaction(shared.engine, jobs.SEARCH) as conn:
-        rooms = jobs.check_room(conn, key.tenant, submission.count)
+    with db.transaction(shared.engine, db.SEARCH) as conn:
+        rooms = tenants.check_room(conn, key.tenant, submission.count)
         estimate = jobs.estimate(conn, by_bundle)
         waiting = jobs.waiting_items(conn)
     checked = CheckedView(
@@ -127,7 +128,11 @@ def _check(shared: Context, key: jobs.ApiKey, submission: service.Submission) ->
 
 
 def _write(
-    shared: Context, key: jobs.ApiKey, submission: service.Submission, idempotency_key: str | None, sha256: str | None
+    shared: Context,
+    key: tenants.ApiKey,
+    submission: service.Submission,
+    idempotency_key: str | None,
+    sha256: str | None,
 ) -> JSONResponse:
     new = jobs.NewJob(
         items=submission.new_items(),
@@ -138,7 +143,7 @@ def _write(
         body_sha256=sha256,
         **submission.fields.model_dump(),
     )
-    with tracing.span("submit", tenant=key.tenant) as span, jobs.transaction(shared.engine, jobs.BULK) as conn:
+    with tracing.span("submit", tenant=key.tenant) as span, db.transaction(shared.engine, db.BULK) as conn:
         submitted = jobs.submit(conn, new)
         row = jobs.get_job(conn, key.tenant, submitted.id)
         if not submitted.replayed:
@@ -152,7 +157,7 @@ def _write(
 
 
 @router.get("")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def list_jobs(
     conn: Connection,
     key: Reader,
@@ -172,14 +177,14 @@ def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
 
 
 @router.get("/{job}/queue")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
     """What comes before the job's items, and when it may be done: from what was measured here, or no number."""
     return QueueView.of(jobs.place_of(conn, key.tenant, job))
 
 
 @router.patch("/{job}")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Change the priority, the comment or the share of failed items that ends the job early.
 
@@ -200,15 +205,15 @@ def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reaso
 
 
 @router.delete("/{job}", status_code=204, response_class=Response)
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
     """Delete a job that has ended, with its motions."""
-    jobs.delete(conn, key.tenant, job)
+    takes.delete(conn, key.tenant, job)
     note(conn, key, "job.delete", job)
 
 
 @router.post("/{job}/pause")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Give out no more items; those being made are finished."""
     note(conn, key, "job.pause", job, reason=reason)
@@ -216,7 +221,7 @@ def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None)
 
 
 @router.post("/{job}/resume")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Go on with a paused job."""
     note(conn, key, "job.resume", job, reason=reason)
@@ -224,7 +229,7 @@ def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 
 
 @router.post("/{job}/cancel")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Cancel what is not done yet."""
     before = jobs.get_job(conn, key.tenant, job).cancelled
@@ -235,7 +240,7 @@ def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 
 
 @router.post("/{job}/retry")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def retry_job(
     job: UUID,
     conn: Connection,
@@ -250,20 +255,20 @@ def retry_job(
 
 
 @router.post("/{job}/erase")
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
     """Forget the prompts of a job that has ended; motions, names and tags stay.
 
     What the database holds of them goes at once. Files that hold them are given to nobody any more, and written anew
     within minutes: `files_left` says how many are still to be. There is no way back.
     """
-    erased = jobs.erase(conn, key.tenant, job, by=key.name)
+    erased = takes.erase(conn, key.tenant, job, by=key.name)
     note(conn, key, "job.erase", job)
     return ErasureView(**vars(erased))
 
 
 @router.get("/{job}/items")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def list_items(
     job: UUID,
     conn: Connection,
@@ -279,12 +284,12 @@ def list_items(
 
 
 @router.get("/{job}/motions")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def list_job_motions(
     job: UUID, conn: Connection, key: Reader, found: Found, cursor: Cursor = None, limit: Limit = 100
 ) -> PageView[MotionView]:
     """Motions of a job that fit everything given, in the order they were made."""
-    page = jobs.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
+    page = takes.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
 
 

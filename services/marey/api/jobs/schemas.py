@@ -13,14 +13,14 @@ from marey.api.motions.schemas import MotionView
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
 from marey.http.problems import QuotaBody
 from marey.http.schemas import Comment, Name, View
-from marey.items import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
+from marey.items.item import MAX_ITEMS, MAX_SECONDS, MAX_SEED, MAX_TAGS, MAX_VARIANTS, MIN_SECONDS
 from marey.jobs import MAX_KEEP_DAYS, EventRow, ItemRow, ItemState, JobControl, JobRow, JobState, Problem, Stage
 
 MAX_PRIORITY = 1000
 
 
 class NewItemBody(BaseModel):
-    """One prompt. For the documentation: `marey.items.read_item` is what checks it, and says more."""
+    """One prompt. For the documentation: `marey.items.item.read_item` is what checks it, and says more."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -13,10 +13,10 @@ from pydantic import BaseModel, ValidationError
 from marey.api.catalogue import Catalogue
 from marey.api.documents import MAX_VALUE, Document
 from marey.api.jobs.schemas import JobFields
-from marey.errors import InvalidInput, MareyError, TooLarge
-from marey.items import InvalidItems, Problem, read_items, read_json
+from marey.core.errors import InvalidInput, MareyError, TooLarge
+from marey.items.item import InvalidItems, Problem, read_items, read_json
 from marey.jobs import NewItem
-from marey.offers import Offer, new_items
+from marey.jobs.offers import Offer, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100

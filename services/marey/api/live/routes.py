@@ -11,9 +11,9 @@ from fastapi import APIRouter, Request, Response
 
 from marey.api.catalogue import Catalogue
 from marey.api.streams.schemas import MODEL
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 from marey.http.pages import page_response
-from marey.motion.live_page import live_page
+from marey.viz.live_page import live_page
 
 router = APIRouter()
 
@@ -28,7 +28,7 @@ def _measured() -> dict[str, list[dict[str, Any]]]:
 def examples(catalogue: Catalogue) -> tuple[str, ...]:
     """Prompts that this server's model was measured to obey while it streams; none for a bundle without measurements.
 
-    `python -m marey.mogo.examples` measures them.
+    `python -m marey.models.mogo.examples` measures them.
     """
     try:
         reference = catalogue.offer(MODEL).bundle.reference

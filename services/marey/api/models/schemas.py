@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from marey.bundles import BrokenBundle
 from marey.http.schemas import View
-from marey.offers import Offer, Offers
+from marey.jobs.offers import Offer, Offers
 
 
 class DataView(View):

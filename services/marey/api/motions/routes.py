@@ -9,7 +9,8 @@ from uuid import UUID
 from fastapi import APIRouter, Depends, Path, Query, Response
 from pydantic import Field
 
-from marey import jobs
+from marey import db, jobs
+from marey import takes as takes_store
 from marey.api.audit import note
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
@@ -24,10 +25,10 @@ from marey.api.motions.schemas import (
     ReviewFilter,
 )
 from marey.api.motions.service import file_stem, made_again
-from marey.errors import NotFound
+from marey.core.errors import NotFound
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
-from marey.items import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
+from marey.items.item import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
 
 router = APIRouter(prefix="/v1/motions", tags=["motions"], responses=RESPONSES)
 
@@ -46,10 +47,10 @@ def motion_filter(
         Query(description='Words of the prompt in any form; `"a phrase"`, `or`, `-not`.'),
     ] = None,
     review: Annotated[list[ReviewFilter] | None, Query(description="One of these was said of it.")] = None,
-) -> jobs.MotionFilter:
+) -> takes_store.MotionFilter:
     """Which motions a listing shows: those that fit everything given."""
     said = review or []
-    return jobs.MotionFilter(
+    return takes_store.MotionFilter(
         tags=tag or (),
         name=name and unicodedata.normalize("NFC", name),  # as names and prompts are stored
         text=text and unicodedata.normalize("NFC", text),
@@ -58,11 +59,11 @@ def motion_filter(
     )
 
 
-Found = Annotated[jobs.MotionFilter, Depends(motion_filter)]
+Found = Annotated[takes_store.MotionFilter, Depends(motion_filter)]
 
 
 @router.get("")
-@deadline(jobs.SEARCH)
+@deadline(db.SEARCH)
 def list_motions(
     conn: Connection,
     key: Reader,
@@ -72,7 +73,7 @@ def list_motions(
     limit: Limit = 50,
 ) -> PageView[MotionView]:
     """Motions that fit everything given, newest first."""
-    page = jobs.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
+    page = takes_store.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
 
 
@@ -80,19 +81,19 @@ def list_motions(
 def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> list[MotionView]:
     """Keep or reject motions, all or none; said again, nothing changes. Answers them in the order given."""
     verdict = None if body.verdict is None else jobs.Review(body.verdict)
-    rows = jobs.review(conn, key.tenant, body.motions, verdict, by=key.name, comment=body.comment)
+    rows = takes_store.review(conn, key.tenant, body.motions, verdict, by=key.name, comment=body.comment)
     note(conn, key, "motion.review", rows[0].id, verdict=verdict, motions=len(rows))
     return [MotionView.of(row) for row in rows]
 
 
 @router.post("/reroll", status_code=202)
-@deadline(jobs.BULK)
+@deadline(db.BULK)
 def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: Submitter) -> RerollsView:
     """Make motions again with the next seeds, all or none: new items in their jobs, linked to what they replace.
 
     A motion has one take after it; asked again, the same one is answered. To go on, re-roll that take.
     """
-    takes = jobs.reroll(
+    takes = takes_store.reroll(
         conn,
         key.tenant,
         body.motions,

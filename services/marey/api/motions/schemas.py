@@ -11,7 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.files import FileView
 from marey.http.schemas import Comment, View
-from marey.jobs import MAX_REVIEWED, ItemState, MotionRow, Reroll, Review
+from marey.jobs import ItemState, MotionRow, Review
+from marey.takes import MAX_REVIEWED, Reroll
 
 
 class ReviewFilter(StrEnum):

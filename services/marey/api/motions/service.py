@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 
 from marey.api.catalogue import Catalogue
-from marey.errors import Conflict, MareyError
-from marey.items import Item
+from marey.core.errors import Conflict, MareyError
+from marey.items.item import Item
 from marey.jobs import ItemRow, MotionRow, NewItem
-from marey.offers import new_items
+from marey.jobs.offers import new_items
 
 WORDS = 48
 """Characters of the prompt in the name of a file."""

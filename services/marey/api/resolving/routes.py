@@ -9,12 +9,12 @@ from uuid import UUID
 from fastapi import APIRouter, Query
 from pydantic import Field
 
-from marey import jobs
+from marey import takes
 from marey.api.auth import Reader
 from marey.api.context import Connection
 from marey.http.problems import RESPONSES
 from marey.http.schemas import View
-from marey.jobs.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
+from marey.takes.references import MAX_REFERENCE, ReferenceKind, ReferenceMatch
 
 router = APIRouter(prefix="/v1/resolve", tags=["references"], responses=RESPONSES)
 
@@ -65,5 +65,5 @@ def resolve(
     webhook: Annotated[UUID | None, Query(description="Whose delivery.")] = None,
 ) -> ResolutionView:
     """Resolve a reference that a person typed, within the key's tenant."""
-    found = jobs.resolve_reference(conn, key.tenant, ReferenceKind(kind), reference, webhook=webhook)
+    found = takes.resolve_reference(conn, key.tenant, ReferenceKind(kind), reference, webhook=webhook)
     return ResolutionView(matches=[MatchView.of(match) for match in found])

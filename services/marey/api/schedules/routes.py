@@ -6,7 +6,7 @@ from uuid import UUID
 
 from fastapi import APIRouter, Request, Response
 
-from marey import jobs
+from marey import evaluations
 from marey.api.audit import note
 from marey.api.auth import Operator, Reader, Submitter
 from marey.api.context import Connection, Shared
@@ -34,14 +34,14 @@ async def create_schedule(request: Request, response: Response, shared: Shared, 
 @router.get("")
 def list_schedules(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[ScheduleView]:
     """Schedules, newest first."""
-    page = jobs.list_schedules(conn, key.tenant, cursor=cursor, limit=limit)
+    page = evaluations.list_schedules(conn, key.tenant, cursor=cursor, limit=limit)
     return PageView[ScheduleView](items=[ScheduleView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{schedule}")
 def get_schedule(schedule: UUID, conn: Connection, key: Reader) -> ScheduleView:
     """One schedule."""
-    return ScheduleView.of(jobs.get_schedule(conn, key.tenant, schedule))
+    return ScheduleView.of(evaluations.get_schedule(conn, key.tenant, schedule))
 
 
 @router.patch("/{schedule}", openapi_extra=body_of("SchedulePatch"))
@@ -54,17 +54,17 @@ async def change_schedule(schedule: UUID, request: Request, shared: Shared, key:
 @router.delete("/{schedule}", status_code=204)
 def delete_schedule(schedule: UUID, conn: Connection, key: Operator) -> None:
     """Remove a schedule. Its evaluations stay, and one that runs goes on."""
-    jobs.delete_schedule(conn, key.tenant, schedule)
+    evaluations.delete_schedule(conn, key.tenant, schedule)
     note(conn, key, "schedule.delete", schedule)
 
 
 @router.post("/{schedule}/run", status_code=202)
 def run_schedule(schedule: UUID, response: Response, conn: Connection, key: Submitter) -> EvaluationDetailView:
     """Plan an evaluation now, beside its times; also while it is paused."""
-    made = jobs.run_schedule(conn, key.tenant, schedule)
+    made = evaluations.run_schedule(conn, key.tenant, schedule)
     note(conn, key, "schedule.run", schedule, evaluation=str(made))
     response.headers["Location"] = f"/v1/evaluations/{made}"
-    return detail(conn, jobs.get_evaluation(conn, key.tenant, made))
+    return detail(conn, evaluations.get_evaluation(conn, key.tenant, made))
 
 
 @router.get("/{schedule}/evaluations")
@@ -72,8 +72,8 @@ def list_runs(
     schedule: UUID, conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50
 ) -> PageView[EvaluationView]:
     """The evaluations of a schedule, newest first."""
-    jobs.get_schedule(conn, key.tenant, schedule)
-    page = jobs.list_evaluations(conn, key.tenant, schedule=schedule, cursor=cursor, limit=limit)
+    evaluations.get_schedule(conn, key.tenant, schedule)
+    page = evaluations.list_evaluations(conn, key.tenant, schedule=schedule, cursor=cursor, limit=limit)
     return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
 
 

@@ -9,8 +9,8 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.evaluations.schemas import AskedFields, RequestView
+from marey.evaluations import EvaluationState, ScheduleRow
 from marey.http.schemas import FreeText, Name, View
-from marey.jobs import EvaluationState, ScheduleRow
 
 CRON = "Minute, hour, day of the month, month, day of the week: `0 3 * * 1` is every Monday at 03:00."
 ZONE = "Of the tz database, such as `Europe/Berlin`."

@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import BinaryIO
 from uuid import UUID
 
-from marey import jobs
+from marey import db, evaluations, tenants
 from marey.api.audit import note
 from marey.api.context import Context
 from marey.api.evaluations.schemas import AskedFields
 from marey.api.evaluations.service import prompts_document, read_asked, stored
 from marey.api.jobs.service import read_fields
 from marey.api.schedules.schemas import NewScheduleBody, ScheduleFields, ScheduleView
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
 
 
-def create(shared: Context, key: jobs.ApiKey, body: BinaryIO) -> ScheduleView:
+def create(shared: Context, key: tenants.ApiKey, body: BinaryIO) -> ScheduleView:
     """A new schedule.
 
     Raises:
@@ -26,9 +26,9 @@ def create(shared: Context, key: jobs.ApiKey, body: BinaryIO) -> ScheduleView:
     document = prompts_document(body, hint=HINT)
     fields, asked = read_asked(NewScheduleBody, document.fields(), document)
     plan = asked.planned(shared.config)
-    with jobs.transaction(shared.engine) as conn:
+    with db.transaction(shared.engine) as conn:
         sha256 = stored(conn, key.tenant, plan)
-        new = jobs.NewSchedule(
+        new = evaluations.NewSchedule(
             tenant=key.tenant,
             cron=fields.cron,
             time_zone=fields.time_zone,
@@ -36,12 +36,12 @@ def create(shared: Context, key: jobs.ApiKey, body: BinaryIO) -> ScheduleView:
             prompts=None if asked.prompts is None else sha256,
             name=fields.name,
         )
-        made = jobs.create_schedule(conn, new)
+        made = evaluations.create_schedule(conn, new)
         note(conn, key, "schedule.create", made, bundle=asked.request.bundle)
-        return ScheduleView.of(jobs.get_schedule(conn, key.tenant, made))
+        return ScheduleView.of(evaluations.get_schedule(conn, key.tenant, made))
 
 
-def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: BinaryIO) -> ScheduleView:
+def change(shared: Context, key: tenants.ApiKey, schedule: UUID, body: BinaryIO) -> ScheduleView:
     """Change a schedule.
 
     Raises:
@@ -56,11 +56,11 @@ def change(shared: Context, key: jobs.ApiKey, schedule: UUID, body: BinaryIO) ->
     fields = read_fields(ScheduleFields, values)
     asked = None if request is None else read_asked(AskedFields, request, document)[1]
     plan = None if asked is None else asked.planned(shared.config)
-    with jobs.transaction(shared.engine) as conn:
+    with db.transaction(shared.engine) as conn:
         changed = None
         if asked is not None and plan is not None:
             sha256 = stored(conn, key.tenant, plan)
             changed = (asked.request, None if asked.prompts is None else sha256)
-        change = jobs.ScheduleChange(**fields.model_dump(), request=changed)
+        change = evaluations.ScheduleChange(**fields.model_dump(), request=changed)
         note(conn, key, "schedule.change", schedule, fields=sorted(fields.model_fields_set))
-        return ScheduleView.of(jobs.change_schedule(conn, key.tenant, schedule, change))
+        return ScheduleView.of(evaluations.change_schedule(conn, key.tenant, schedule, change))

@@ -16,9 +16,10 @@ from marey.api.context import Context
 from marey.api.streams import service
 from marey.api.streams.session import Session, Visit
 from marey.api.streams.wire import Wire
-from marey.errors import InvalidInput, MareyError, NotFound
+from marey.core.errors import InvalidInput, MareyError, NotFound
+from marey.db import transaction
 from marey.http.problems import public_error
-from marey.jobs import get_stream, told_prompts, transaction
+from marey.streams import get_stream, told_prompts
 
 PROTOCOL = "marey.stream.v1"
 KEY_PREFIX = "marey.key."

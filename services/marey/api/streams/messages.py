@@ -11,10 +11,10 @@ from marey.api.context import Context
 from marey.api.stream_hub import Hub
 from marey.api.streams import service
 from marey.api.streams.wire import Wire
-from marey.errors import Busy, MareyError, TooLarge
-from marey.jobs import ApiKey
-from marey.prompts import check_prompt
+from marey.core.errors import Busy, MareyError, TooLarge
+from marey.items.prompts import check_prompt
 from marey.streams.control import Control
+from marey.tenants import ApiKey
 
 MAX_BYTES = 8 * 1024
 """Of a message; a prompt has at most 2,000 characters."""

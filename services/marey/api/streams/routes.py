@@ -7,7 +7,7 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Response, WebSocket
 
-from marey import jobs
+from marey import db, streams
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared
 from marey.api.streams import service
@@ -40,7 +40,7 @@ def list_streams(
     limit: Limit = 50,
 ) -> PageView[StreamView]:
     """Live streams, newest first."""
-    page = jobs.list_streams(conn, key.tenant, is_open=is_open, cursor=cursor, limit=limit)
+    page = streams.list_streams(conn, key.tenant, is_open=is_open, cursor=cursor, limit=limit)
     made = service.made_by_each(shared, page.rows)
     items = [StreamView.of(row, by) for row, by in zip(page.rows, made, strict=True)]
     return PageView[StreamView](items=items, next=page.cursor)
@@ -49,7 +49,7 @@ def list_streams(
 @router.get("/{stream}")
 def get_stream(stream: UUID, shared: Shared, conn: Connection, key: Reader) -> StreamDetailView:
     """One live stream, with its prompts on record and its skeleton."""
-    return service.detail(conn, shared, jobs.get_stream(conn, key.tenant, stream))
+    return service.detail(conn, shared, streams.get_stream(conn, key.tenant, stream))
 
 
 @router.delete("/{stream}", status_code=202)
@@ -57,7 +57,7 @@ def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailVie
     """Ask a live stream to end; one that still waits is over at once, and one that is over stays as it is."""
     service.hub_of(shared)
     row = service.stop(shared, key, stream)
-    with jobs.transaction(shared.engine) as conn:
+    with db.transaction(shared.engine) as conn:
         return service.detail(conn, shared, row)
 
 

@@ -16,10 +16,10 @@ from marey.bundles import Bundle
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from marey.http.problems import ProblemBody
 from marey.http.schemas import View
-from marey.items import MAX_SEED
-from marey.jobs import StreamPrompt, StreamRow, StreamState
+from marey.items.item import MAX_SEED
 from marey.motion.features import layout
 from marey.motion.skeleton import Skeleton
+from marey.streams import StreamPrompt, StreamRow, StreamState
 
 MODEL = "mogo"
 """The model that makes motion frame by frame."""

@@ -15,22 +15,15 @@ from marey.api.context import Context
 from marey.api.stream_hub import Hub
 from marey.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
 from marey.bundles import named_by
-from marey.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
-from marey.items import MAX_SEED, Item, read_item
-from marey.jobs import (
-    ApiKey,
-    NewStream,
-    StreamRow,
-    create_stream,
-    end_stream,
-    get_stream,
-    told_prompts,
-    transaction,
-)
-from marey.jobs.states import OPEN_STREAMS
-from marey.offers import Offer
+from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
+from marey.db import transaction
+from marey.items.item import MAX_SEED, Item, read_item
+from marey.jobs.offers import Offer
+from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, told_prompts
 from marey.streams.bell import Bell
 from marey.streams.control import Control, ControlQueue
+from marey.streams.states import OPEN_STREAMS
+from marey.tenants import ApiKey
 
 log = structlog.get_logger(__name__)
 

@@ -22,12 +22,14 @@ from marey.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetail
 from marey.api.streams.service import is_over
 from marey.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
 from marey.api.streams.wire import Wire
-from marey.errors import MareyError, Unreachable
-from marey.jobs import ApiKey, StreamPrompt, StreamRow, StreamState, check_key, get_stream, told_prompts, transaction
+from marey.core.errors import MareyError, Unreachable
+from marey.db import transaction
+from marey.streams import StreamPrompt, StreamRow, StreamState, get_stream, told_prompts
 from marey.streams.control import ControlQueue
 from marey.streams.frames import HEADER, LAST
 from marey.streams.redis import FrameStream, Gap, StoredFrame
 from marey.streams.watch import TOUCH_SECONDS, Watch
+from marey.tenants import ApiKey, check_key
 
 BATCH = 20
 """Frames of one read: a second."""

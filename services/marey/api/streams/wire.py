@@ -7,7 +7,7 @@ from anyio import Lock
 from fastapi import WebSocket
 
 from marey.api.streams.schemas import ErrorMessage, SocketMessage
-from marey.errors import MareyError
+from marey.core.errors import MareyError
 from marey.http.problems import problem_body, public_error
 
 log = structlog.get_logger(__name__)

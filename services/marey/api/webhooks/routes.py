@@ -7,8 +7,7 @@ from uuid import UUID
 
 from fastapi import APIRouter, Query, Response
 
-from marey import jobs
-from marey.addresses import Allowed
+from marey import webhooks
 from marey.api.audit import note
 from marey.api.auth import Operator, Reader
 from marey.api.context import Connection, Shared
@@ -20,6 +19,7 @@ from marey.api.webhooks.schemas import (
     WebhookPatch,
     WebhookView,
 )
+from marey.core.addresses import Allowed
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, Limit, PageView
 from marey.webhooks.addresses import check_url
@@ -36,23 +36,23 @@ def create_webhook(
     url = check_url(body.url, Allowed.of(shared.config.webhook_allow))
     secret = new_signing_secret()
     sealed = Vault.of(shared.config).encrypt(secret)
-    made = jobs.create_webhook(conn, jobs.NewWebhook(key.tenant, url, body.events, sealed, body.name))
+    made = webhooks.create_webhook(conn, webhooks.NewWebhook(key.tenant, url, body.events, sealed, body.name))
     note(conn, key, "webhook.create", made, events=list(body.events))
     response.headers["Location"] = f"/v1/webhooks/{made}"
-    return MadeWebhookView.made(jobs.get_webhook(conn, key.tenant, made), secret)
+    return MadeWebhookView.made(webhooks.get_webhook(conn, key.tenant, made), secret)
 
 
 @router.get("")
 def list_webhooks(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[WebhookView]:
     """Webhooks, newest first."""
-    page = jobs.list_webhooks(conn, key.tenant, cursor=cursor, limit=limit)
+    page = webhooks.list_webhooks(conn, key.tenant, cursor=cursor, limit=limit)
     return PageView[WebhookView](items=[WebhookView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{webhook}")
 def get_webhook(webhook: UUID, conn: Connection, key: Reader) -> WebhookView:
     """One webhook."""
-    return WebhookView.of(jobs.get_webhook(conn, key.tenant, webhook))
+    return WebhookView.of(webhooks.get_webhook(conn, key.tenant, webhook))
 
 
 @router.patch("/{webhook}")
@@ -62,7 +62,7 @@ def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Con
     if patch.url is not None:
         fields["url"] = check_url(patch.url, Allowed.of(shared.config.webhook_allow))
     note(conn, key, "webhook.change", webhook, fields=sorted(patch.model_fields_set))
-    return WebhookView.of(jobs.change_webhook(conn, key.tenant, webhook, jobs.WebhookChange(**fields)))
+    return WebhookView.of(webhooks.change_webhook(conn, key.tenant, webhook, webhooks.WebhookChange(**fields)))
 
 
 @router.post("/{webhook}/rotate")
@@ -78,7 +78,7 @@ def rotate_webhook(
     """Sign with another secret. The answer has it, and only this one; meanwhile messages carry two signatures."""
     secret = new_signing_secret()
     sealed = Vault.of(shared.config).encrypt(secret)
-    row = jobs.rotate_secret(conn, key.tenant, webhook, sealed, overlap=3600 * overlap_hours)
+    row = webhooks.rotate_secret(conn, key.tenant, webhook, sealed, overlap=3600 * overlap_hours)
     note(conn, key, "webhook.rotate", webhook, overlap_hours=overlap_hours)
     return MadeWebhookView.made(row, secret)
 
@@ -86,7 +86,7 @@ def rotate_webhook(
 @router.delete("/{webhook}", status_code=204, response_class=Response)
 def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
     """Remove a webhook, with its deliveries and their log."""
-    jobs.delete_webhook(conn, key.tenant, webhook)
+    webhooks.delete_webhook(conn, key.tenant, webhook)
     note(conn, key, "webhook.delete", webhook)
 
 
@@ -94,7 +94,7 @@ def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
 def send_test(webhook: UUID, conn: Connection, key: Operator) -> DeliveryView:
     """Send it a message of the type `webhook.test`, which is tried once."""
     note(conn, key, "webhook.test", webhook)
-    return DeliveryView.of(jobs.send_test(conn, key.tenant, webhook))
+    return DeliveryView.of(webhooks.send_test(conn, key.tenant, webhook))
 
 
 @router.get("/{webhook}/deliveries")
@@ -102,24 +102,24 @@ def list_deliveries(
     webhook: UUID,
     conn: Connection,
     key: Reader,
-    state: Annotated[list[jobs.DeliveryState] | None, Query()] = None,
+    state: Annotated[list[webhooks.DeliveryState] | None, Query()] = None,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[DeliveryView]:
     """What it was told in the last 30 days, newest first."""
-    page = jobs.list_deliveries(conn, key.tenant, webhook, states=state or (), cursor=cursor, limit=limit)
+    page = webhooks.list_deliveries(conn, key.tenant, webhook, states=state or (), cursor=cursor, limit=limit)
     return PageView[DeliveryView](items=[DeliveryView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{webhook}/deliveries/{event}")
 def get_delivery(webhook: UUID, event: UUID, conn: Connection, key: Reader) -> DeliveryDetailView:
     """One delivery with its tries."""
-    row = jobs.get_delivery(conn, key.tenant, webhook, event)
-    return DeliveryDetailView.detail(row, jobs.delivery_attempts(conn, webhook, event))
+    row = webhooks.get_delivery(conn, key.tenant, webhook, event)
+    return DeliveryDetailView.detail(row, webhooks.delivery_attempts(conn, webhook, event))
 
 
 @router.post("/{webhook}/deliveries/{event}/replay", status_code=202)
 def replay_delivery(webhook: UUID, event: UUID, conn: Connection, key: Operator) -> DeliveryView:
     """Deliver it once more, now, under the same id and with all tries; also one that waits for its next try."""
     note(conn, key, "webhook.replay", webhook, event=str(event))
-    return DeliveryView.of(jobs.replay_delivery(conn, key.tenant, webhook, event))
+    return DeliveryView.of(webhooks.replay_delivery(conn, key.tenant, webhook, event))

@@ -9,7 +9,7 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.http.schemas import FreeText, Name, View
-from marey.jobs import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
+from marey.webhooks import AttemptRow, DeliveryRow, DeliveryState, EventKind, WebhookRow
 from marey.webhooks.addresses import MAX_URL
 
 URL = "Where messages are sent: https, at an address that MAREY_WEBHOOK_ALLOW permits."

@@ -18,7 +18,7 @@ from marey.cli.references import FORMS
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from marey.jobs import AuditRow
+    from marey.tenants import AuditRow
 
 app = typer.Typer(help="For the operator of a server, beside its database.", no_args_is_help=True)
 app.add_typer(tenants.app, name="tenants")
@@ -33,7 +33,7 @@ AUDIT_COLUMNS = ("at", "tenant", "actor", "key", "verb", "target", "data")
 def migrate() -> None:
     """Bring the database to the newest revision, and make the bucket of an S3 store where there is none."""
     config = settings_here()
-    from marey.jobs import upgrade
+    from marey.db import upgrade
     from marey.storage import open_store
 
     upgrade(engine_of(config))
@@ -48,8 +48,10 @@ def migrate() -> None:
 def gc(as_json: console.Json = False) -> None:
     """Remove stored files that nothing refers to."""
     config = settings_here()
-    from marey.jobs import DEFAULT_TENANT, audit, collect_garbage, transaction
+    from marey.db import transaction
     from marey.storage import open_store
+    from marey.takes import collect_garbage
+    from marey.tenants import DEFAULT_TENANT, audit
 
     engine = engine_of(config)
     report = collect_garbage(engine, open_store(config))
@@ -109,7 +111,7 @@ def doctor(as_json: console.Json = False) -> None:
 
 def _audited(conn: sa.Connection, size: int, **which: Any) -> Iterator[AuditRow]:
     """The rows, newest first, `size` at a time."""
-    from marey.jobs import list_audit
+    from marey.tenants import list_audit
 
     cursor: str | None = None
     while True:

@@ -46,7 +46,8 @@ def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = 
 
 
 def _note(engine: sa.Engine, tenant: str, verb: str, manifest: Manifest, jobs: int) -> None:
-    from marey.jobs import audit, transaction
+    from marey.db import transaction
+    from marey.tenants import audit
 
     with transaction(engine) as conn:
         audit(conn, tenant, operator(), verb, tenant, jobs=jobs, files=manifest.files)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from marey.cli import console, options
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -51,7 +51,7 @@ def convert(
     from marey.cli.extras import needs_extra
 
     try:
-        from marey.motion.convert import convert as convert_file
+        from marey.motion.io.convert import convert as convert_file
     except ImportError as error:
         raise needs_extra("motion", error) from error
     notes = convert_file(
@@ -82,8 +82,8 @@ def render(
     from marey.cli.extras import needs_extra
 
     try:
-        from marey.motion.player import html_player
-        from marey.motion.render import contact_sheet
+        from marey.viz.player import html_player
+        from marey.viz.render import contact_sheet
     except ImportError as error:
         raise needs_extra("motion", error) from error
     clips = [_read(source, from_unit, from_up) for source in sources]
@@ -99,9 +99,9 @@ def render(
 
 
 def _read(source: Path, unit: Unit, up: Up) -> MotionClip:
-    from marey.motion.bvh import read_bvh
     from marey.motion.clip import load_npz
-    from marey.motion.convert import clip_from_bvh, steady
+    from marey.motion.io.bvh import read_bvh
+    from marey.motion.io.convert import clip_from_bvh, steady
 
     ending = source.suffix.lower()
     if ending == ".npz":

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 app = typer.Typer(help="Training data from capture archives.", no_args_is_help=True)
 

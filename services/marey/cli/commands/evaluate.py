@@ -12,7 +12,7 @@ from marey.cli import console, evaluating, options
 from marey.cli.commands import schedules
 from marey.cli.evaluating import Asked
 from marey.cli.references import FORMS, find, find_all, of_view
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 
 app = typer.Typer(help="Measure models: runs, their reports, schedules.", no_args_is_help=True)
 app.add_typer(schedules.app, name="schedule")

@@ -12,7 +12,7 @@ import typer
 from marey.cli import console, options
 from marey.cli.names import check_template
 from marey.cli.references import FORMS, find_all
-from marey.errors import Conflict, MareyError
+from marey.core.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,14 +13,14 @@ from marey.cli import console, options, rows
 from marey.cli.commands.submit import read_prompts
 from marey.cli.extras import needs_extra
 from marey.cli.names import FileNames, Naming, check_template, slug
-from marey.errors import Conflict, InvalidBundle, InvalidInput, MareyError
-from marey.items import MAX_SEED, Item, Problem
+from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
+from marey.items.item import MAX_SEED, Item, Problem
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.cli.roles.oneshot import Wanted
+    from marey.core.settings import Settings
     from marey.motion.clip import MotionClip
-    from marey.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None
     """
     try:
         from marey.bundles import choose_bundle
-        from marey.settings import settings
+        from marey.core.settings import settings
     except ImportError as error:
         if reader.total:
             raise reader.error() from None
@@ -192,8 +192,8 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
 
 
 def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, overwrite: bool) -> dict[str, Any]:
-    from marey.motion.bvh import format_bvh
     from marey.motion.files import write_atomically
+    from marey.motion.io.bvh import format_bvh
 
     contents = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
     paths = plan.paths

@@ -9,7 +9,7 @@ import typer
 
 from marey.cli import console
 from marey.cli.references import FORMS, find, find_all, listed, named, of_view
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 

@@ -10,12 +10,12 @@ import typer
 from marey.cli import console
 from marey.cli.database import connection, operator
 from marey.cli.references import FORMS, choose, whole_id
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from marey.jobs import ApiKey, NewApiKey
+    from marey.tenants import ApiKey, NewApiKey
 
 app = typer.Typer(help="API keys.", no_args_is_help=True)
 
@@ -50,7 +50,7 @@ def create(
     """Make a key and print it, this once."""
     _confirm_name(tenant, name, yes=allow_duplicate)
     with connection() as conn:
-        from marey.jobs import audit, create_key
+        from marey.tenants import audit, create_key
 
         lifetime = None if days is None else days * DAY
         chosen = scopes or ["read", "submit"]
@@ -67,7 +67,7 @@ def list_them(
 ) -> None:
     """List keys, without their secrets."""
     with connection() as conn:
-        from marey.jobs import get_tenant, list_keys, list_tenants
+        from marey.tenants import get_tenant, list_keys, list_tenants
 
         tenants = list_tenants(conn) if tenant is None else [get_tenant(conn, tenant)]
         rows = [_row(key) for each in tenants for key in list_keys(conn, each.id)]
@@ -90,7 +90,7 @@ def rotate(
 ) -> None:
     """Make a new key in the place of another, and print it, this once."""
     with connection() as conn:
-        from marey.jobs import audit, rotate_key
+        from marey.tenants import audit, rotate_key
 
         wanted = find_key(conn, tenant, key)
         made = rotate_key(conn, tenant, wanted, overlap=hours * 3600)
@@ -104,7 +104,7 @@ def rotate(
 def revoke(key: Key, tenant: Tenant = "default") -> None:
     """Make a key invalid from now on."""
     with connection() as conn:
-        from marey.jobs import audit, revoke_key
+        from marey.tenants import audit, revoke_key
 
         wanted = find_key(conn, tenant, key)
         revoked = revoke_key(conn, tenant, wanted)
@@ -114,7 +114,8 @@ def revoke(key: Key, tenant: Tenant = "default") -> None:
 
 def find_key(conn: sa.Connection, tenant: str | None, key: str) -> UUID:
     """The key that is meant, of a tenant or, with None, of any; raises as `marey.cli.references.find`."""
-    from marey.jobs import ReferenceKind, list_tenants, resolve_reference
+    from marey.takes import ReferenceKind, resolve_reference
+    from marey.tenants import list_tenants
 
     if (identifier := whole_id(key)) is not None:
         return UUID(identifier)
@@ -132,7 +133,7 @@ def _confirm_name(tenant: str, name: str, *, yes: bool) -> None:
     if yes:
         return
     with connection() as conn:
-        from marey.jobs import keys_named
+        from marey.tenants import keys_named
 
         taken = keys_named(conn, tenant, name)
     if taken:

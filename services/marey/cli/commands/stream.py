@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console, options
-from marey.errors import InvalidInput, MareyError, NotFound
+from marey.core.errors import InvalidInput, MareyError, NotFound
 
 if TYPE_CHECKING:
     from marey.cli.client import Client
@@ -85,7 +85,7 @@ def stream(
 
 def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]:
     """The request, checked as far as one can without the server."""
-    from marey.items import read_items
+    from marey.items.item import read_items
 
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
         raise InvalidInput(f"{seconds:g} seconds cannot be", where="--seconds")

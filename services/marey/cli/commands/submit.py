@@ -9,8 +9,8 @@ import typer
 
 from marey.cli import console, options, rows
 from marey.cli.names import check_template
-from marey.errors import InvalidInput, MareyError
-from marey.items import InvalidItems
+from marey.core.errors import InvalidInput, MareyError
+from marey.items.item import InvalidItems
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,12 +9,12 @@ import typer
 
 from marey.cli import console
 from marey.cli.database import connection, operator
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     import sqlalchemy as sa
 
-    from marey.jobs import TenantRow
+    from marey.tenants import TenantRow
 
 app = typer.Typer(help="Who shares this server, and what each may have.", no_args_is_help=True)
 
@@ -45,7 +45,7 @@ def create(
     """Make a tenant. Quotas that are not given are none."""
     chosen = _chosen(queued, running, size, streams)
     with connection() as conn:
-        from marey.jobs import Quotas, audit, create_tenant
+        from marey.tenants import Quotas, audit, create_tenant
 
         row = create_tenant(conn, tenant, Quotas(**chosen))
         audit(conn, tenant, operator(), "tenant.create", tenant, **chosen)
@@ -57,7 +57,7 @@ def create(
 def list_them(as_json: console.Json = False) -> None:
     """List tenants: what each has of what it may have."""
     with connection() as conn:
-        from marey.jobs import list_tenants
+        from marey.tenants import list_tenants
 
         views = [_view(conn, row) for row in list_tenants(conn)]
     if as_json:
@@ -71,7 +71,7 @@ def list_them(as_json: console.Json = False) -> None:
 def show(tenant: Name, as_json: console.Json = False) -> None:
     """Show a tenant, its quotas and what is used of them."""
     with connection() as conn:
-        from marey.jobs import get_tenant
+        from marey.tenants import get_tenant
 
         view = _view(conn, get_tenant(conn, tenant))
     if as_json:
@@ -99,7 +99,7 @@ def change(
             "no quota is given", hint="--queued, --running, --bytes or --streams; `none` takes one away."
         )
     with connection() as conn:
-        from marey.jobs import audit, set_quotas
+        from marey.tenants import audit, set_quotas
 
         row = set_quotas(conn, tenant, chosen)
         audit(conn, tenant, operator(), "tenant.set", tenant, **{name: value or NONE for name, value in chosen.items()})
@@ -114,7 +114,7 @@ def suspend(
 ) -> None:
     """Answer no request of a tenant and begin nothing more of it; what is being made is finished."""
     with connection() as conn:
-        from marey.jobs import audit, suspend_tenant
+        from marey.tenants import audit, suspend_tenant
 
         suspend_tenant(conn, tenant)
         audit(conn, tenant, operator(), "tenant.suspend", tenant, reason=reason)
@@ -125,7 +125,7 @@ def suspend(
 def reinstate(tenant: Name) -> None:
     """End a suspension; the tenant's jobs go on."""
     with connection() as conn:
-        from marey.jobs import audit, reinstate_tenant
+        from marey.tenants import audit, reinstate_tenant
 
         reinstate_tenant(conn, tenant)
         audit(conn, tenant, operator(), "tenant.reinstate", tenant)
@@ -155,7 +155,7 @@ def _quota(name: str, text: str) -> int | None:
 
 
 def _view(conn: sa.Connection, row: TenantRow) -> dict[str, Any]:
-    from marey.jobs import usage
+    from marey.tenants import usage
 
     return {
         "id": row.id,

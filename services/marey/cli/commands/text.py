@@ -11,7 +11,7 @@ import typer
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
 from marey.cli.rows import right_items
-from marey.private_home import UMASK
+from marey.core.private_home import UMASK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,7 +62,7 @@ def serve(
 
 def _graphs(texts: list[str], model: str) -> Iterator[dict[str, Any]]:
     from marey.bundles import choose_bundle
-    from marey.errors import InvalidInput
+    from marey.core.errors import InvalidInput
     from marey.text.keys import as_served
     from marey.text.pipeline import TextPipeline
 

@@ -10,7 +10,7 @@ import typer
 
 from marey.cli import console
 from marey.cli.references import FORMS, find, find_all, listed, named, of_view
-from marey.errors import ItemsFailed, TimedOut
+from marey.core.errors import ItemsFailed, TimedOut
 
 if TYPE_CHECKING:
     from marey.cli.client import Client

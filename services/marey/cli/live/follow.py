@@ -12,7 +12,7 @@ from marey.cli.live.link import Link, Message
 from marey.cli.live.pace import Pace
 from marey.cli.live.screen import Screen
 from marey.cli.live.steering import HELP, Interrupts, Lines, message_of
-from marey.errors import InvalidInput, ItemsFailed, MareyError
+from marey.core.errors import InvalidInput, ItemsFailed, MareyError
 
 if TYPE_CHECKING:
     from rich.text import Text

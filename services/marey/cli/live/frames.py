@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli.extras import needs_extra
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from marey.motion.bvh_live import LiveBVH
+    from marey.motion.io.bvh_live import LiveBVH
 
 HEAD = struct.Struct("<2sBBIHH")
 """The first 12 bytes of a frame, as `marey.streams.frames` has them; that one wants numpy, which a client that
@@ -55,7 +55,7 @@ class Recording:
             hint = "--fetch brings the other formats when the stream is over."
             raise InvalidInput("only a .bvh can grow while it is made", where=str(path), hint=hint)
         try:
-            from marey.motion.bvh_live import check_place
+            from marey.motion.io.bvh_live import check_place
         except ImportError as error:
             raise needs_extra("motion", error) from error
         check_place(path, overwrite=overwrite)
@@ -93,7 +93,7 @@ class Recording:
     def _open(self, stream: dict[str, Any]) -> LiveBVH:
         import numpy as np
 
-        from marey.motion.bvh_live import LiveBVH
+        from marey.motion.io.bvh_live import LiveBVH
         from marey.motion.skeleton import skeleton_of
 
         try:

@@ -17,8 +17,8 @@ from marey.cli.client import TYPE_PREFIX
 from marey.cli.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
 from marey.cli.place import Server, ca_file
 from marey.cli.watching import PATIENCE
-from marey.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
-from marey.tls import trusting_context
+from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
+from marey.core.tls import trusting_context
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection

@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from marey.characters import escape
 from marey.cli import console
+from marey.core.characters import escape
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -9,8 +9,8 @@ import sys
 import threading
 from typing import Any
 
-from marey.errors import InvalidInput
-from marey.prompts import check_prompt
+from marey.core.errors import InvalidInput
+from marey.items.prompts import check_prompt
 
 WORDS = {"/pause": "pause", "/resume": "resume", "/stop": "stop"}
 HELP = "Type what the person does next and press Enter; /pause, /resume, /stop; Ctrl-C stops, too."

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli.extras import needs_extra
-from marey.errors import InvalidInput, NotFound
+from marey.core.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from marey.training.data.pack import JointsPack
+    from marey.data.pack import JointsPack
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
         NotFound, InvalidFile, TooLarge: from reading.
     """
     try:
-        from marey.training.data.pack import JointsPack
-        from marey.training.data.prepare import pack_bandai_namco, pack_cmu
+        from marey.data.pack import JointsPack
+        from marey.data.prepare import pack_bandai_namco, pack_cmu
     except ImportError as error:
         raise needs_extra("worker", error) from error
     options = {"processes": sources.processes}
@@ -80,7 +80,7 @@ def prepare_data(sources: CaptureSources, output: Path, progress: Callable[[str,
         Conflict: the folder is in use.
     """
     packs = read_captures(sources, progress)
-    from marey.training.data.build import build
+    from marey.data.build import build
 
     manifest = build(packs, output, progress=partial(progress, "building"))
     return ", ".join(f"{split} {count} clips" for split, count in manifest.splits.items())
@@ -93,8 +93,8 @@ def inspect_data(folder: Path, clip: str | None) -> dict[str, Any]:
         NotFound, InvalidFile: no such folder or clip, or a changed file.
     """
     try:
-        from marey.training.data.inspect import summarize
-        from marey.training.data.prepared import PreparedData
+        from marey.data.inspect import summarize
+        from marey.data.prepared import PreparedData
     except ImportError as error:
         raise needs_extra("worker", error) from error
     data = PreparedData.open(folder)
@@ -110,8 +110,8 @@ def encode_captions(folder: Path, model: str | None, progress: Callable[[int, in
     """Write `texts.npz` of a prepared folder; how many captions it holds."""
     try:
         from marey.bundles import TextSpec, choose_bundle
+        from marey.data.prepared import PreparedData
         from marey.text.pipeline import TextPipeline
-        from marey.training.data.prepared import PreparedData
         from marey.training.texts import CaptionTexts
     except ImportError as error:
         raise needs_extra("worker", error) from error

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from marey.cli.extras import needs_extra
 from marey.cli.roles.serving import GENERATORS, threads_of
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
-    from marey.generating.port import Generator
+    from marey.core.settings import Settings
+    from marey.generation.port import Generator
     from marey.motion.clip import MotionClip
-    from marey.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ class OneShot:
         Raises:
             InvalidInput: a length this bundle cannot make; before anything is made.
         """
-        from marey.generating.export import finish, split_settings
-        from marey.generating.port import Request
+        from marey.generation.export import finish, split_settings
+        from marey.generation.port import Request
 
         features = self._text.features([w.prompt for w in wanted])
         fps = self._generator.limits.fps
@@ -88,6 +88,6 @@ class OneShot:
 
 def make_random_bundle(path: Path) -> None:
     """A tiny HGM³ with random weights: it exercises everything and generates nonsense."""
-    from marey.hgm3.bundle import random_bundle
+    from marey.models.hgm3.bundle import random_bundle
 
     random_bundle(path)

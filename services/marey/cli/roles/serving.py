@@ -8,24 +8,24 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from marey.core.settings import Settings
     from marey.runtime.handler import Role
-    from marey.settings import Settings
 
 HANDLERS = {
-    "hgm3": "marey.hgm3.handler:create_handler",
-    "mogo": "marey.mogo.handler:create_handler",
+    "hgm3": "marey.models.hgm3.handler:create_handler",
+    "mogo": "marey.models.mogo.handler:create_handler",
     "text": "marey.text_service.handler:create_handler",
     "evaluator": "marey.evaluator.handler:create_handler",
 }
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
 TEXT = "text"
 """The queue of prompts, which computes on no device."""
-SHOWS = {"mogo": "marey.mogo.live:create_show"}
+SHOWS = {"mogo": "marey.models.mogo.live:create_show"}
 """What the live loop of each model that streams serves."""
-GENERATORS = {"hgm3": "marey.hgm3.generate", "mogo": "marey.mogo.generate"}
+GENERATORS = {"hgm3": "marey.models.hgm3.generate", "mogo": "marey.models.mogo.generate"}
 """Where each model's `Generator` is."""
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.cli.extras import needs_extra
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
     from marey.nn.motion_tokenizer import MotionTokenizer
@@ -31,11 +31,11 @@ def reconstruct(
     """
     try:
         from marey.bundles import find_bundle
+        from marey.data.prepared import PreparedData
         from marey.evaluator import report, tokenizers
         from marey.evaluator.loading import load_evaluator
         from marey.evaluator.reconstruction import reconstruct
         from marey.evaluator.reference import Reference
-        from marey.training.data.prepared import PreparedData
     except ImportError as error:
         raise needs_extra("worker", error) from error
     writers = {".html": report.to_html, ".json": report.to_json, ".md": report.to_markdown}
@@ -57,13 +57,13 @@ def reconstruct(
 def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
     """Exact name, licence (None = of a run, which has none yet) and tokenizer, in evaluation mode."""
     from marey.bundles import choose_bundle
-    from marey.hashing import sha256_of
-    from marey.hgm3 import bundle as hgm3
-    from marey.hgm3 import config as hgm3_config
-    from marey.hgm3 import tokenizer as hgm3_tokenizer
-    from marey.mogo import bundle as mogo
-    from marey.mogo import config as mogo_config
-    from marey.mogo import tokenizer as mogo_tokenizer
+    from marey.core.hashing import sha256_of
+    from marey.models.hgm3 import bundle as hgm3
+    from marey.models.hgm3 import config as hgm3_config
+    from marey.models.hgm3 import tokenizer as hgm3_tokenizer
+    from marey.models.mogo import bundle as mogo
+    from marey.models.mogo import config as mogo_config
+    from marey.models.mogo import tokenizer as mogo_tokenizer
     from marey.training.parts import load_part
 
     folder = Path(generator) / "tokenizer" / "part"

@@ -25,10 +25,10 @@ def train_stage(
     try:
         from marey.evaluator import config as evaluator_config
         from marey.evaluator import train as evaluator
-        from marey.hgm3 import config as hgm3_config
-        from marey.hgm3 import train as hgm3
-        from marey.mogo import config as mogo_config
-        from marey.mogo import train as mogo
+        from marey.models.hgm3 import config as hgm3_config
+        from marey.models.hgm3 import train as hgm3
+        from marey.models.mogo import config as mogo_config
+        from marey.models.mogo import train as mogo
         from marey.training.budget import Budget
         from marey.training.optimisation import with_learning_rate
         from marey.training.staging import TrainOptions
@@ -60,10 +60,10 @@ def assemble_bundle(
     try:
         from marey.evaluator import assembly as evaluator
         from marey.evaluator import config as evaluator_config
-        from marey.hgm3 import assembly as hgm3
-        from marey.hgm3 import config as hgm3_config
-        from marey.mogo import assembly as mogo
-        from marey.mogo import config as mogo_config
+        from marey.models.hgm3 import assembly as hgm3
+        from marey.models.hgm3 import config as hgm3_config
+        from marey.models.mogo import assembly as mogo
+        from marey.models.mogo import config as mogo_config
     except ImportError as error:
         raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
@@ -80,8 +80,8 @@ def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) ->
     """Write the parts of a bundle into a run folder; the name of its configuration."""
     try:
         from marey.bundles import find_bundle
-        from marey.hgm3 import assembly as hgm3
-        from marey.mogo import assembly as mogo
+        from marey.models.hgm3 import assembly as hgm3
+        from marey.models.mogo import assembly as mogo
     except ImportError as error:
         raise needs_extra("train", error) from error
     take_apart = hgm3.take_apart if model == "hgm3" else mogo.take_apart

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from marey.jobs import StreamChunk, StreamRow, StreamState
 from marey.runtime.live.port import LiveFrame, Tokens
 from marey.runtime.live.reading import Reading
+from marey.streams import StreamChunk, StreamRow, StreamState
 from marey.streams.acts import Begun
 from marey.streams.control import Control, ControlQueue
 from marey.streams.frames import Frame

@@ -12,23 +12,10 @@ import numpy as np
 import redis
 import sqlalchemy as sa
 
-from marey import metrics
-from marey.errors import InvalidInput, MareyError, Unreachable
-from marey.jobs import (
-    NewItem,
-    Problem,
-    StreamPast,
-    StreamRow,
-    StreamState,
-    WorkerBeat,
-    add_chunk,
-    beat,
-    end_stream,
-    open_streams,
-    retire,
-    take_stream,
-    transaction,
-)
+from marey.core import metrics
+from marey.core.errors import InvalidInput, MareyError, Unreachable
+from marey.db import transaction
+from marey.jobs import NewItem, Problem, WorkerBeat, beat, retire
 from marey.runtime.exposition import measure_gpu
 from marey.runtime.faults import as_problem, patiently
 from marey.runtime.live.held import Held
@@ -36,6 +23,7 @@ from marey.runtime.live.loop import LiveLoop, Over
 from marey.runtime.live.port import Parse, Room
 from marey.runtime.live.reading import Opening, Reading
 from marey.runtime.logs import logger
+from marey.streams import StreamPast, StreamRow, StreamState, add_chunk, end_stream, open_streams, take_stream
 from marey.streams.bell import Bell
 from marey.streams.control import Control, ControlQueue
 from marey.streams.reads import ReadAs

@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from marey import metrics
-from marey.errors import MareyError, Unreachable
-from marey.jobs import StreamState
+from marey.core import metrics
+from marey.core.errors import MareyError, Unreachable
 from marey.runtime.faults import as_problem
 from marey.runtime.live.held import Held
 from marey.runtime.live.port import LiveFrame, Room
 from marey.runtime.logs import logger
+from marey.streams import StreamState
 from marey.streams.frames import encode_frame
 from marey.streams.redis import LeaseLost
 from marey.text.features import TextFeatures

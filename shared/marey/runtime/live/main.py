@@ -9,8 +9,10 @@ import threading
 import time
 from typing import cast
 
-from marey.errors import InvalidInput
-from marey.jobs import WorkerBeat, create_engine
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
+from marey.db import create_engine
+from marey.jobs import WorkerBeat
 from marey.runtime.child import wait_for_database
 from marey.runtime.exposition import expose
 from marey.runtime.live.keeper import QUEUE, Keeper
@@ -20,7 +22,6 @@ from marey.runtime.logs import configure_logging, logger
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
 from marey.runtime.status import Teller
-from marey.settings import Settings
 
 log = logger(__name__)
 

@@ -6,11 +6,11 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from marey.errors import MareyError
-from marey.jobs import StreamPast, StreamRow
+from marey.core.errors import MareyError
 from marey.runtime.faults import as_problem
 from marey.runtime.live.port import Parse
 from marey.runtime.logs import logger
+from marey.streams import StreamPast, StreamRow
 from marey.streams.redis import FrameStream, Lease
 from marey.text.features import TextFeatures
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from marey.errors import Conflict
+from marey.core.errors import Conflict
 from tests.support.marey import REPOSITORY
 from tests.support.streaming import PROMPT, SLOW, environ, frames_of, run
 
@@ -67,7 +67,7 @@ def test_a_file_that_cannot_be_written_any_more_is_2_and_the_stream_is_stopped(
     def add(*_: object, **__: object) -> None:
         raise Conflict("the disk is full", where=str(path))
 
-    monkeypatch.setattr("marey.motion.bvh_live.LiveBVH.add", add)
+    monkeypatch.setattr("marey.motion.io.bvh_live.LiveBVH.add", add)
     ran = run(server, "-o", path, "--json")
     ran.refused(2, "the disk is full")
     assert ran.lines[-1]["file"] is None

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marey.motion.bvh import read_bvh
+from marey.motion.io.bvh import read_bvh
 from tests.support.stream_server import FILES, JOB, STREAM
 from tests.support.streaming import PROMPT, check_frames, frames_of, run
 

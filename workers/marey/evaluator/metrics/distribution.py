@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.measures.inputs import Array, Integers, Numbers, at_least, embeddings
 
 SAMPLES_PER_DIMENSION = 5

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.pools import draw_distinct_pools, draw_pools
 from marey.measures.inputs import Array, Integers, Numbers, integers, pairs
 

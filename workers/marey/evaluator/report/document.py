@@ -18,7 +18,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from marey.errors import InvalidFile
+from marey.core.errors import InvalidFile
 from marey.evaluator.report.model import Report
 from marey.evaluator.report.parts import Exhibit
 from marey.measures.scores import SCHEMA, VERSION, check_document

@@ -11,7 +11,7 @@ from marey.evaluator.report.parts import Exhibit, HeatCell
 from marey.evaluator.report.sections import plain, speed_of
 from marey.evaluator.report.tables import Cell, Heat, Line, Table, heat_of, in_percent, tables_of, trended, weakest_of
 from marey.evaluator.report.words import CHANGES, LEGEND, day, headline, intervals_of, moment, number
-from marey.motion.paper import one_line
+from marey.viz.paper import one_line
 
 ROWS_OF_TREND = 8  # the page has the rest
 # What could begin emphasis, code, a link, a picture, HTML, a column, a formula, an issue or a person's name.

@@ -11,9 +11,9 @@ from marey.evaluator.report.markup import Markup, element, join
 from marey.evaluator.report.model import Report
 from marey.evaluator.report.sections import heat, numbers, repeat, speed, top, verdict
 from marey.evaluator.report.trends import trends
-from marey.motion.pages import asset, fill, script_json, whole_page
-from marey.motion.paper import one_line
-from marey.motion.player import motion_document
+from marey.viz.pages import asset, fill, script_json, whole_page
+from marey.viz.paper import one_line
+from marey.viz.player import motion_document
 
 PACKAGE = "marey.evaluator.report"
 

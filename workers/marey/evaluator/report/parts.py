@@ -14,7 +14,7 @@ from typing import Literal
 
 from pydantic import InstanceOf
 
-from marey.errors import InvalidInput
+from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
 from marey.motion.clip import MotionClip
 

@@ -1,0 +1,139 @@
+"""Reading files and JSON that this process did not write: sizes, nesting and kinds are checked, and whatever is wrong
+is an error of `marey.core.errors`. Standard library only: the small client imports it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import stat
+from pathlib import Path
+from typing import Any, cast
+
+from marey.core.errors import InvalidFile, NotFound
+
+MAX_DEPTH = 64
+"""Levels of nesting. Our own documents have ten; the recursive code behind a parser takes a thousand."""
+MAX_JSON_BYTES = 64 * 2**20
+
+
+def read_bytes(
+    path: Path, *, limit: int, error: type[InvalidFile] = InvalidFile, where: str | None = None, hint: str | None = None
+) -> bytes:
+    """Read a regular file of at most `limit` bytes.
+
+    Args:
+        path: the file.
+        limit: refuse a larger one before it is read.
+        error: what to raise for anything but a missing file.
+        where, hint: for the error; by default the path, and none.
+
+    Raises:
+        NotFound: there is no such file.
+        InvalidFile: a folder, pipe or device, a link that leads in a circle, not readable, or over the limit.
+    """
+    where = str(path) if where is None else where
+    try:
+        # Without O_NONBLOCK the opening of a pipe would wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with os.fdopen(descriptor, "rb") as file:
+            status = os.fstat(descriptor)
+            if not stat.S_ISREG(status.st_mode):
+                raise error("is not a regular file", where=where, hint=hint)
+            if status.st_size <= limit:
+                data = file.read(limit + 1)
+                if len(data) <= limit:
+                    return data
+        raise error(f"is over {limit:,} bytes", where=where, hint=hint)
+    except FileNotFoundError:
+        raise NotFound("there is no such file", where=where, hint=hint) from None
+    except IsADirectoryError:
+        raise error("is a folder, not a file", where=where, hint=hint) from None
+    except OSError as failure:
+        raise error(f"cannot be read: {failure.strerror}", where=where, hint=hint) from None
+    except ValueError:  # a NUL in the path
+        raise NotFound("there is no such file", where=where, hint=hint) from None
+
+
+def parse_json(
+    data: bytes | str,
+    where: str,
+    *,
+    error: type[InvalidFile] = InvalidFile,
+    hint: str | None = None,
+    allow_nan: bool = False,
+    max_depth: int = MAX_DEPTH,
+) -> Any:
+    """Parse JSON in UTF-8.
+
+    Args:
+        data: the document.
+        where, error, hint: for the error.
+        allow_nan: let NaN and infinite numbers pass, which Python writes and JSON does not have.
+        max_depth: levels of nesting.
+
+    Raises:
+        InvalidFile: not JSON, nested too deeply, or with a text that is no Unicode.
+    """
+    try:
+        text = data.decode("utf-8-sig") if isinstance(data, bytes) else data
+        value = json.loads(text)
+        problem = _problem(value, allow_nan, max_depth)
+    except RecursionError:
+        problem = f"is nested more than {max_depth} levels deep"
+    except UnicodeDecodeError:
+        problem = "is not UTF-8"
+    except ValueError as failure:
+        problem = f"is not JSON: {failure}"
+    else:
+        if problem is None:
+            return value
+    raise error(problem, where=where, hint=hint)
+
+
+def read_json(
+    path: Path,
+    *,
+    limit: int = MAX_JSON_BYTES,
+    error: type[InvalidFile] = InvalidFile,
+    hint: str | None = None,
+    allow_nan: bool = False,
+) -> Any:
+    """Read a JSON file.
+
+    Raises:
+        NotFound, InvalidFile: as `read_bytes` and `parse_json`.
+    """
+    data = read_bytes(path, limit=limit, error=error, hint=hint)
+    return parse_json(data, str(path), error=error, hint=hint, allow_nan=allow_nan)
+
+
+def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:
+    """Return why a parsed document cannot be used, or None; works without recursion."""
+    level = [value]
+    for _ in range(max_depth):
+        inner: list[Any] = []
+        for each in level:
+            if isinstance(each, dict):
+                members = cast("dict[str, Any]", each)
+                inner += members
+                inner += members.values()
+            elif isinstance(each, list):
+                inner += cast("list[Any]", each)
+            elif isinstance(each, str):
+                if not each.isascii() and not _is_unicode(each):
+                    return "holds a text that is no Unicode (a lone surrogate)"
+            elif isinstance(each, float) and not allow_nan and not math.isfinite(each):
+                return "holds a number that is not finite"
+        if not inner:
+            return None
+        level = inner
+    return f"is nested more than {max_depth} levels deep"
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

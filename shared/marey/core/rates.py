@@ -1,0 +1,54 @@
+"""Rate limits as they are written: "600/minute", by class of request.
+
+Plain text here, so that keys and settings can be checked without the library that counts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from marey.core.errors import InvalidInput
+
+CLASSES = ("read", "submit", "operate", "parse")
+"""What a request does: look, make something, steer it; `parse` reads prompts, which costs a processor."""
+UNITS = {"second": 1, "minute": 60, "hour": 3600, "day": 86_400}
+FORM = re.compile(r"([1-9][0-9]{0,8})/(second|minute|hour|day)")
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many requests in so many seconds."""
+
+    amount: int
+    seconds: int
+
+    def __str__(self) -> str:
+        unit = next(name for name, seconds in UNITS.items() if seconds == self.seconds)
+        return f"{self.amount}/{unit}"
+
+
+def read_rate(text: str, *, where: str) -> Rate:
+    """A rate limit.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    form = FORM.fullmatch(text)
+    if form is None:
+        raise InvalidInput(f"{text[:40]!r} is not a rate", where=where, hint="Write 600/minute; or second, hour, day.")
+    return Rate(int(form[1]), UNITS[form[2]])
+
+
+def check_rates(rates: Mapping[str, str], *, where: str) -> dict[str, str]:
+    """Rate limits by class of request, checked.
+
+    Raises:
+        InvalidInput: an unknown class, or what is no rate.
+    """
+    for name, text in rates.items():
+        if name not in CLASSES:
+            raise InvalidInput(f"{name[:40]!r} is no class of requests", where=where, hint=f"{', '.join(CLASSES)} are.")
+        read_rate(text, where=f"{where}.{name}")
+    return dict(rates)

@@ -1,0 +1,74 @@
+"""Bytes on their way in or out of a process, kept in a file once they are many: memory does not grow with them."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from typing import BinaryIO, Self, cast
+
+from marey.core.errors import Unreachable
+
+IN_MEMORY = 2**20
+"""Bytes that are kept in memory; more go into a file, which has no name and ends with the process at the latest."""
+
+
+class Spool:
+    """Written once, then read from its beginning as often as it takes.
+
+    A disk takes some bytes when they are written, some when what is buffered goes out and some when the file is closed;
+    whenever it takes no more, the same is said.
+    """
+
+    def __init__(self, where: str, hint: str) -> None:
+        """`where` and `hint` of what is said when there is no room."""
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 (closed by __exit__)
+        self._size = 0
+        self._where = where
+        self._hint = hint
+
+    def write(self, part: bytes) -> None:
+        """Add some bytes.
+
+        Raises:
+            Unreachable: there is no room for them.
+        """
+        with self._room():
+            self._file.write(part)
+        self._size += len(part)
+
+    def rewound(self) -> BinaryIO:
+        """All of it, at its beginning; to be read while the block lasts.
+
+        Raises:
+            Unreachable: there is no room for what was written last.
+        """
+        with self._room():
+            self._file.seek(0)
+        return cast("BinaryIO", self._file)
+
+    def __len__(self) -> int:
+        """Bytes written."""
+        return self._size
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(OSError):  # what found no room is tried once more, and was told already
+            self._file.close()
+
+    @contextmanager
+    def _room(self) -> Generator[None]:
+        try:
+            yield
+        except OSError as error:
+            reason = os.strerror(error.errno or errno.EIO)  # its own words may name folders of this machine
+            raise Unreachable(
+                f"cannot be kept: {reason}",
+                where=self._where,
+                hint=self._hint,
+                public=f"cannot be kept: {reason}",
+            ) from error

@@ -1,0 +1,53 @@
+"""TLS contexts of outgoing connections: the authorities that the machine trusts, and those of `MAREY_CA_FILE`."""
+
+from __future__ import annotations
+
+import ssl
+from pathlib import Path
+
+from marey.core.errors import InvalidInput
+
+VARIABLE = "MAREY_CA_FILE"
+UNTRUSTED_HINT = f"If it belongs to a private certificate authority, set {VARIABLE} to that authority's PEM file."
+
+
+def trusting_context(ca_file: Path | None = None) -> ssl.SSLContext:
+    """Return a client context that verifies certificates and names.
+
+    It trusts what the machine trusts (or `SSL_CERT_FILE`, `SSL_CERT_DIR`), and the authorities of `ca_file` as well.
+
+    Raises:
+        InvalidInput: the file cannot be read or holds no certificate.
+    """
+    import httpx2  # costs 0.1 s of import; commands without a server do without
+
+    context = httpx2.create_ssl_context()
+    if ca_file is not None:
+        try:
+            context.load_verify_locations(cafile=ca_file.expanduser())
+        except ssl.SSLError as error:
+            message = f"{str(ca_file)!r} holds no certificate in PEM format"
+            hint = "It starts with -----BEGIN CERTIFICATE-----."
+            raise InvalidInput(message, where=VARIABLE, hint=hint) from error
+        except OSError as error:
+            message = f"{str(ca_file)!r} cannot be read: {error.strerror}"
+            hint = "It names the PEM file of a certificate authority."
+            raise InvalidInput(message, where=VARIABLE, hint=hint) from error
+    return context
+
+
+def verification_error(error: BaseException) -> str | None:
+    """Return why a certificate was refused, if that is what an error was caused by."""
+    seen: set[int] = set()
+    waiting: list[BaseException | None] = [error]
+    while waiting:
+        cause = waiting.pop()
+        if cause is None or id(cause) in seen:
+            continue
+        seen.add(id(cause))
+        if isinstance(cause, ssl.SSLCertVerificationError):
+            return cause.verify_message or str(cause)
+        reason = getattr(cause, "reason", None)  # of urllib3
+        waiting += [cause.__cause__, cause.__context__, reason if isinstance(reason, BaseException) else None]
+        waiting += [each for each in cause.args if isinstance(each, BaseException)]
+    return None

@@ -1,0 +1,70 @@
+"""The deadlines of calls to Postgres, by kind of call.
+
+Each kind has two limits. The server ends a statement that runs for longer than `statement`; such a statement fails with
+a clean error and its connection stays usable. The client waits a little longer, `answer` seconds without a byte from
+the server, and then treats the connection as silent: it closes it, and every other connection of the process that is
+silent too (`marey.db.connections`). Waiting for a lock counts as running.
+
+`transaction(engine, KIND)` chooses the kind. A process that makes long calls makes short ones beside them (the
+heartbeat of a worker, the LISTEN connections of API and scheduler), and finds a silent server within seconds by those.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """Limits of the calls of one transaction, seconds."""
+
+    name: str
+    statement: float
+    """The server cancels a statement after this long (`statement_timeout`)."""
+    idle: float
+    """The server ends a session that leaves its transaction open and idle for so long
+    (`idle_in_transaction_session_timeout`). The locks of a lost connection last this long at most."""
+    margin: float = 2.0
+
+    @property
+    def answer(self) -> float:
+        """Seconds of silence after which the client gives up the connection."""
+        return self.statement + self.margin
+
+
+CONNECT_SECONDS = 4
+"""For each address of the server, from the first packet to the end of the log-in; whole seconds, libpq's least is 2."""
+PING_SECONDS = 3.0
+"""For the check of a pooled connection before use, and for a probe of a LISTEN connection: no lock, no table."""
+ROLLBACK_SECONDS = 3.0
+"""A rollback writes nothing and waits for no lock."""
+SHORT_SECONDS = 4.0
+"""Round trips with a limit of at most this long have answers of a few bytes: the limit counts the whole of them."""
+SLOWNESS = 3
+"""Others may take this many times their limit as long as bytes come: a large answer on a slow line is no fault, a
+connection that lets a byte through now and then is one."""
+PROBE_EVERY = 3.0
+"""Seconds without a notification after which a LISTEN connection is probed."""
+
+HEARTBEAT = Deadline("heartbeat", statement=3.0, idle=3.0, margin=1.0)
+"""Renewals of leases: several must fit into a lease of 10 s, and a lost one must not lock the next out."""
+ORDINARY = Deadline("ordinary", statement=10.0, idle=8.0)
+"""All calls that name no other kind: milliseconds, or the wait for the lock of a job that somebody else changes."""
+SEARCH = Deadline("search", statement=30.0, idle=8.0)
+"""Listings, searches, aggregates: they read many rows, and hold no locks that others wait for."""
+BULK = Deadline("bulk", statement=60.0, idle=30.0)
+"""Up to 100,000 items in one transaction: submit, cancel, retry, erase, delete, restore. A COPY is fed meanwhile."""
+MAINTENANCE = Deadline("maintenance", statement=60.0, idle=60.0)
+"""Garbage collection and retention: they lock an asset's row while the object store deletes it."""
+BACKUP = Deadline("backup", statement=300.0, idle=120.0)
+"""Export and import of a tenant: whole jobs are read in one snapshot and checked in between."""
+MIGRATION = Deadline("migration", statement=3600.0, idle=600.0)
+"""Indexes over all items. Waits for tables have a limit of their own (`marey.db.migrate`)."""
+
+
+def in_all(limit: float) -> float:
+    """Seconds that one round trip may take in all, of a connection that may be silent for `limit` seconds."""
+    return limit if limit <= SHORT_SECONDS else limit * SLOWNESS
+
+
+KINDS = (HEARTBEAT, ORDINARY, SEARCH, BULK, MAINTENANCE, BACKUP, MIGRATION)

@@ -1,0 +1,115 @@
+"""Bring a database to a revision (Alembic, scripts in `migrations/`)."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psycopg
+import sqlalchemy as sa
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+
+from marey.core.errors import Conflict, Unreachable
+from marey.core.versions import check_postgres
+from marey.db.database import transaction
+from marey.db.deadlines import MIGRATION
+
+LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
+LOCK_SECONDS = 3.0
+"""A statement that waits longer for a table gives up: whoever comes to that table behind it waits as long."""
+PATIENCE = 60.0
+"""Then the migration is tried again, for so long."""
+PAUSE_SECONDS = 2.0
+VERSION = sa.cast(sa.func.current_setting("server_version_num"), sa.Integer)
+
+
+def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATIENCE) -> None:
+    """Migrate up, all or nothing, under an advisory lock: several processes may start at once.
+
+    Raises:
+        Conflict: somebody held a table for `patience` seconds, the database is of a newer version, or its server is too
+            old.
+        Unreachable: the database does not answer.
+    """
+    _migrate(engine, command.upgrade, revision, patience)
+
+
+def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -> None:
+    """Migrate down to a revision ("base" = no tables). What the younger tables and columns held is lost.
+
+    Raises:
+        Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
+        Unreachable: the database does not answer.
+    """
+    _migrate(engine, command.downgrade, revision, patience)
+
+
+def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: str, patience: float) -> None:
+    until = time.monotonic() + patience
+    while True:
+        try:
+            with transaction(engine, MIGRATION) as conn:
+                move(_config(conn), revision)
+            return
+        except Unreachable as error:
+            if not isinstance(getattr(error.__cause__, "orig", None), psycopg.errors.LockNotAvailable):
+                raise
+            if time.monotonic() > until:
+                raise Conflict(
+                    f"a table is in use: the migration gave up after {patience:g} seconds, and changed nothing",
+                    where="database",
+                    hint="See the oldest transaction in `pg_stat_activity` (a backup, a report?); try again after it.",
+                ) from error
+        except CommandError as error:
+            raise Conflict(
+                f"this version of Marey does not know the database's revision ({error})",
+                where="database",
+                hint="The database is of a newer version. Migrate with that version.",
+            ) from error
+        time.sleep(PAUSE_SECONDS)
+
+
+def check_revision(engine: sa.Engine) -> None:
+    """Raise when the database lacks what this version needs.
+
+    A database of a newer version is fine: migrations only add (docs/deployment.md), and an upgrade migrates first.
+
+    Raises:
+        Conflict: it is older, or not migrated at all, or its server is too old.
+        Unreachable: it does not answer.
+    """
+    with transaction(engine) as conn:
+        table, version = conn.execute(sa.select(sa.func.to_regclass("alembic_version"), VERSION)).one()
+        check_postgres(version)
+        found = table and conn.execute(sa.text("SELECT version_num FROM alembic_version")).scalar_one_or_none()
+    scripts = ScriptDirectory(str(_folder()))
+    newest = scripts.get_current_head()
+    older = {script.revision for script in scripts.walk_revisions()} - {newest}
+    if found is None or found in older:
+        raise Conflict(
+            f"the database is at revision {found or 'none'}, this version of Marey needs {newest}",
+            where="database",
+            hint="Run `marey admin migrate`.",
+        )
+
+
+def _folder() -> Path:
+    found = importlib.util.find_spec("marey.migrations")
+    if found is None or found.origin is None:
+        raise RuntimeError("the package `marey.migrations` is part of the distribution")
+    return Path(found.origin).parent
+
+
+def _config(conn: sa.Connection) -> Config:
+    check_postgres(conn.execute(sa.select(VERSION)).scalar_one())
+    conn.execute(sa.select(sa.func.pg_advisory_xact_lock(LOCK)))
+    conn.execute(sa.text(f"SET LOCAL lock_timeout = {int(LOCK_SECONDS * 1000)}"))
+    config = Config()
+    config.set_main_option("script_location", str(_folder()).replace("%", "%%"))
+    config.attributes["connection"] = conn
+    return config

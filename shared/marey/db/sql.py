@@ -1,0 +1,40 @@
+"""SQL expressions and checks that all repositories share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import ARRAY
+
+from marey.core import characters
+
+CLOCK = sa.func.clock_timestamp()
+"""Database time at this statement; `now()` is that of the transaction's begin, before it waited for locks."""
+
+
+def among(column: sa.Column[Any], values: Iterable[object]) -> sa.ColumnElement[bool]:
+    """`column = ANY(array)`: one parameter, however many values."""
+    return column == sa.any_(sa.literal(list(values), ARRAY(column.type)))
+
+
+def interval(seconds: float) -> sa.Function[object]:
+    """A length of time for comparisons with `CLOCK`."""
+    return sa.func.make_interval(0, 0, 0, 0, 0, 0, seconds)
+
+
+def notify(conn: sa.Connection, channel: str, payloads: Iterable[str]) -> None:
+    """NOTIFY when this transaction commits; equal ones are sent once."""
+    for payload in payloads:
+        conn.execute(sa.select(sa.func.pg_notify(channel, payload)))
+
+
+def check_text(text: str | None, where: str) -> None:
+    """Check that Postgres can hold a text; what may come in is checked at the edge (`marey.core.characters`).
+
+    Raises:
+        InvalidInput: it holds NUL or a lone surrogate.
+    """
+    if text is not None:
+        characters.check_text(text, allowed=characters.STORED, where=where)

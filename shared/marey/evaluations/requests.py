@@ -1,0 +1,149 @@
+"""From what an evaluation was asked for to what it runs: exact bundles, prompts, items. For the API, which checks, and
+for the scheduler, which does it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from marey.bundles import Bundle, choose_bundle, choose_evaluator, named_by
+from marey.bundles.choose import unlike
+from marey.bundles.reference import reference_prompts
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
+from marey.evaluations import TEST_SPLIT, EvaluationRequest, EvaluationRow
+from marey.items.evaluation_prompts import EvaluationPrompt
+from marey.items.item import MAX_ITEMS, MAX_PROBLEMS, MAX_SEED, InvalidItems, Item, Problem
+from marey.jobs import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, NewItem, NewJob
+from marey.jobs.offers import Offer, new_items, offer_of
+
+BACKGROUND = -PRIORITY_LIMIT
+"""Priority of the jobs of evaluations: whatever a person waits for goes first."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An evaluation that can run."""
+
+    request: EvaluationRequest
+    """With exact bundles and the model."""
+    offer: Offer
+    prompts: tuple[EvaluationPrompt, ...]
+
+    def generation(self, row: EvaluationRow) -> NewJob:
+        """The job that makes its motions."""
+        return NewJob(
+            items=new_items((item, self.offer) for item in self._items()),
+            tenant=row.tenant,
+            name=f"evaluation {row.label}",
+            comment=f"motions of evaluation {row.id}",
+            priority=BACKGROUND,
+            count=len(self.prompts) * self.request.repeats,
+        )
+
+    def _items(self) -> Iterator[Item]:
+        request = self.request
+        low, high = self.offer.min_seconds, self.offer.max_seconds
+        for number, prompt in enumerate(self.prompts):
+            seconds = prompt.seconds
+            if seconds is not None and request.splits:
+                seconds = min(max(seconds, low), high)  # real clips are as long as they are
+            yield Item(
+                prompt.prompt,
+                seconds=seconds,
+                seed=request.seed + number * request.repeats,
+                variants=request.repeats,
+                settings=request.settings,
+            )
+
+
+def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt, ...] | None, config: Settings) -> Plan:
+    """Look up the bundles of a request, and check that all of it can be made. Loads no model.
+
+    Args:
+        prompts: its own; None = those of the evaluator's bundle.
+
+    Raises:
+        NotFound, InvalidBundle, Refused: of the bundles; `where` is the field that names it.
+        InvalidItems: with every prompt whose length the model cannot make.
+        InvalidInput: a setting that the model has not, too many motions, a seed that is too high.
+    """
+    with named_by("bundle"):
+        offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
+    with named_by("evaluator"):
+        evaluator = choose_evaluator(request.evaluator, generator=offer.bundle, config=config)
+        _check_layout(offer.bundle, evaluator)
+        # Own prompts have real motion beside them too: whether it is there shall not be found out after the last one.
+        captions = tuple(p for split in request.splits or (TEST_SPLIT,) for p in reference_prompts(evaluator, split))
+    prompts = captions if prompts is None else prompts
+    offer.check_settings(request.settings)
+    if not request.splits:
+        _check_seconds(prompts, offer)
+    _check_size(request, len(prompts))
+    exact = replace(
+        request,
+        bundle=offer.bundle.reference,
+        model=offer.bundle.manifest.model,
+        evaluator=evaluator.reference,
+    )
+    return Plan(exact, offer, prompts)
+
+
+def scoring_job(row: EvaluationRow) -> NewJob:
+    """The job of one item that measures what was made."""
+    evaluator = row.request.evaluator
+    assert evaluator is not None  # exact since its motions were asked for
+    item = NewItem(
+        index=0,
+        prompt=f"measure evaluation {row.label}",
+        model=EVALUATOR_QUEUE,
+        bundle=evaluator,
+        batch_key=hashlib.sha256(evaluator.encode()).hexdigest(),
+        text_key=NO_TEXT,
+        text_batch_key=NO_TEXT,
+        seed=row.request.seed,
+    )
+    return NewJob(
+        items=[item],
+        tenant=row.tenant,
+        name=f"evaluation {row.label}",
+        comment=f"score of evaluation {row.id}",
+        priority=BACKGROUND,
+        metered=False,
+    )
+
+
+def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
+    """Better said now than when thousands of motions were made."""
+    found = unlike(generator.manifest, evaluator.manifest)
+    if found is not None:
+        what, made, measured = found
+        raise InvalidInput(
+            f"{evaluator.manifest.name} measures motions of the {what} {measured}; {generator.manifest.name} makes "
+            f"them of {made}",
+            where="evaluator",
+            hint=f"Choose an evaluator of the generator's {what}: to another one its motions have no meaning.",
+        )
+
+
+def _check_seconds(prompts: tuple[EvaluationPrompt, ...], offer: Offer) -> None:
+    problems: list[Problem] = []
+    for line, prompt in enumerate(prompts, 1):
+        try:
+            offer.check_seconds(prompt.seconds)
+        except InvalidInput as error:
+            problems.append(Problem(line, "seconds", error.message))
+    if problems:
+        raise InvalidItems(problems[:MAX_PROBLEMS], total=len(problems))
+
+
+def _check_size(request: EvaluationRequest, prompts: int) -> None:
+    motions = prompts * request.repeats
+    if motions > MAX_ITEMS:
+        raise InvalidInput(
+            f"{prompts} prompts, {request.repeats} times each, are {motions} motions, over the limit of {MAX_ITEMS}",
+            where="repeats",
+        )
+    if request.seed + motions - 1 > MAX_SEED:
+        raise InvalidInput(f"plus {motions - 1} for the last motion is over {MAX_SEED}", where="seed")

@@ -1,0 +1,31 @@
+"""States of evaluations, and the one table of allowed transitions. The database holds it in a trigger, too."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class EvaluationState(StrEnum):
+    """Where an evaluation stands. `DONE`, `FAILED` and `CANCELLED` are final; to try again is a new evaluation."""
+
+    PLANNED = "planned"
+    GENERATING = "generating"
+    """Its motions are made by a job like any other, in the background."""
+    SCORING = "scoring"
+    """They are measured, by a job of one item."""
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
+EVALUATION_TRANSITIONS: dict[EvaluationState, frozenset[EvaluationState]] = {
+    EvaluationState.PLANNED: frozenset({EvaluationState.GENERATING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.GENERATING: frozenset({EvaluationState.SCORING, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.SCORING: frozenset({EvaluationState.DONE, EvaluationState.FAILED, EvaluationState.CANCELLED}),
+    EvaluationState.DONE: frozenset(),
+    EvaluationState.FAILED: frozenset(),
+    EvaluationState.CANCELLED: frozenset(),
+}
+"""Allowed transitions of evaluations; the trigger `evaluation_transition` is the same table."""
+OPEN_EVALUATIONS = frozenset({EvaluationState.PLANNED, EvaluationState.GENERATING, EvaluationState.SCORING})
+"""States of evaluations that are not over."""

@@ -1,0 +1,277 @@
+"""What goes into and comes out of the repositories of evaluations and schedules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+from marey.db.ids import new_id
+from marey.evaluations.states import EvaluationState
+from marey.jobs.leases import AssetDigest
+from marey.jobs.states import ItemState, JobState
+from marey.jobs.types import Problem
+
+REPORT_FORMATS = ("html", "json", "md")
+TEST_SPLIT, COMPOSITIONAL = "test", "compositional"
+"""What an evaluator's bundle carries prompts of: clips that no model was trained on, and clips whose pairs of act and
+style none was."""
+BUNDLE_SOURCES = (TEST_SPLIT, COMPOSITIONAL, f"{TEST_SPLIT}+{COMPOSITIONAL}")
+"""Sources of prompts that are not their owner's: one of the splits, or both, in this order."""
+MAX_MISSING = 0.01
+"""Share of motions that may be missing from a report: with more, its numbers are those of another set."""
+
+Summary = Mapping[str, float | None]
+"""What was measured, by name; None = it could not be."""
+
+
+@dataclass(frozen=True)
+class EvaluationRequest:
+    """What is measured, and how.
+
+    Args:
+        bundle: the generator: an exact bundle; in a schedule whatever was given, as `hgm3-starter` or `hgm3`.
+        evaluator: the evaluator's bundle, likewise; None = the one that is here.
+        model: the model of the generator; None while its bundle was not looked up.
+        source: where the prompts are from: one of `BUNDLE_SOURCES`, or the name that their owner gave them.
+        settings: of sampling, the same for all motions.
+        repeats: motions of each prompt.
+        seed: of the first motion; motion k, in input order and repeats within prompt, uses seed + k.
+        baseline: an evaluation to compare with, whatever came after it.
+    """
+
+    bundle: str
+    evaluator: str | None = None
+    model: str | None = None
+    source: str = TEST_SPLIT
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
+    repeats: int = 1
+    seed: int = 0
+    baseline: UUID | None = None
+
+    @property
+    def splits(self) -> tuple[str, ...]:
+        """The splits of the evaluator's bundle that the prompts are captions of; none = they are somebody's own."""
+        return tuple(self.source.split("+")) if self.source in BUNDLE_SOURCES else ()
+
+    def as_json(self) -> dict[str, Any]:
+        """As it stands in its row."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {
+            **values,
+            "settings": dict(self.settings),
+            "baseline": None if self.baseline is None else str(self.baseline),
+        }
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> EvaluationRequest:
+        """From what `as_json` gave."""
+        values = dict(row)
+        values["baseline"] = None if row["baseline"] is None else UUID(row["baseline"])
+        return cls(**values)
+
+
+@dataclass(frozen=True)
+class NewEvaluation:
+    """An evaluation to plan.
+
+    Args:
+        prompts: digest of stored prompts (`store_prompts`); None = those of the evaluator's bundle, not looked up yet.
+        due: the time of its schedule that it stands for.
+        reason: why it is there.
+        idempotency_key: makes a request once, however often it is sent.
+        body_sha256: digest of the request; goes with `idempotency_key`.
+        id: what it is going to be called.
+    """
+
+    tenant: str
+    request: EvaluationRequest
+    prompts: str | None = None
+    name: str | None = None
+    comment: str | None = None
+    schedule: UUID | None = None
+    due: datetime | None = None
+    reason: str = "asked for"
+    idempotency_key: str | None = None
+    body_sha256: str | None = None
+    id: UUID = field(default_factory=new_id)
+
+
+@dataclass(frozen=True)
+class EvaluationJob:
+    """A job of an evaluation, as far as it got."""
+
+    id: UUID
+    state: JobState
+    total: int
+    succeeded: int
+    ended: int
+    """Items that succeeded, failed, died or were cancelled."""
+    started: datetime | None
+    finished: datetime | None
+
+
+@dataclass(frozen=True)
+class ReportFile:
+    """One format of a report."""
+
+    format: str
+    sha256: str
+    size: int
+    media_type: str
+
+
+@dataclass(frozen=True)
+class EvaluationEvent:
+    """A change of state, and why."""
+
+    state: EvaluationState
+    reason: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class EvaluationRow:
+    """An evaluation."""
+
+    id: UUID
+    tenant: str
+    schedule: UUID | None
+    due: datetime | None
+    name: str | None
+    comment: str | None
+    request: EvaluationRequest
+    prompts: str | None
+    """Digest of its prompts."""
+    prompt_count: int | None
+    state: EvaluationState
+    reason: str
+    generation: EvaluationJob | None
+    scoring: EvaluationJob | None
+    summary: Summary | None
+    regressed: bool | None
+    reports: tuple[ReportFile, ...]
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+
+    @property
+    def label(self) -> str:
+        """Its name, or the end of its id: for people."""
+        return self.name or str(self.id)[-8:]
+
+
+# --- scoring ---
+
+
+@dataclass(frozen=True)
+class MadeItem:
+    """What became of one item of an evaluation's generation."""
+
+    index: int
+    variant: int
+    prompt: str
+    expected: str | None
+    seconds: float | None
+    seed: int
+    state: ItemState
+    problem: Problem | None
+    frames: int | None
+    fps: float | None
+    elapsed: float | None
+    """Seconds of work on it."""
+    licence: str | None
+    """Terms of the weights that made it."""
+    npz: AssetDigest | None
+    """Its motion; None where there is none."""
+
+
+@dataclass(frozen=True)
+class EarlierRun:
+    """An evaluation that is done, of the same prompts, by the same evaluator."""
+
+    id: UUID
+    name: str | None
+    request: EvaluationRequest
+    summary: Summary
+    finished: datetime
+    report: AssetDigest | None
+    """Its report as JSON."""
+
+
+@dataclass(frozen=True)
+class ScoreRows:
+    """All that is known of an evaluation that is to be scored."""
+
+    evaluation: EvaluationRow
+    items: tuple[MadeItem, ...]
+    """In input order, variants within prompt."""
+    history: tuple[EarlierRun, ...]
+    """The last of the same model, the oldest first."""
+    baseline: EarlierRun | None
+
+
+@dataclass(frozen=True)
+class NewScore:
+    """The result of a score item; its files lie in the asset store and were announced by `begin_assets`."""
+
+    item: UUID
+    files: Mapping[str, AssetDigest]
+    """Reports by format."""
+    summary: Summary
+    regressed: bool | None
+    reason: str
+
+
+# --- schedules ---
+
+
+@dataclass(frozen=True)
+class NewSchedule:
+    """A schedule to make; `cron` has five fields, in the time of `time_zone`."""
+
+    tenant: str
+    cron: str
+    time_zone: str
+    request: EvaluationRequest
+    prompts: str | None = None
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class ScheduleRow:
+    """A schedule."""
+
+    id: UUID
+    tenant: str
+    name: str | None
+    cron: str
+    time_zone: str
+    request: EvaluationRequest
+    prompts: str | None
+    prompt_count: int | None
+    paused: bool
+    next: datetime | None
+    """When it is due; None while it is paused."""
+    last: UUID | None
+    """Its newest evaluation."""
+    last_state: EvaluationState | None
+    last_regressed: bool | None
+    created: datetime
+
+
+@dataclass(frozen=True)
+class ScheduleChange:
+    """What is to be changed of a schedule; None = nothing.
+
+    Args:
+        request: with the digest of its prompts, None for those of the evaluator's bundle.
+    """
+
+    name: str | None = None
+    cron: str | None = None
+    time_zone: str | None = None
+    paused: bool | None = None
+    request: tuple[EvaluationRequest, str | None] | None = None

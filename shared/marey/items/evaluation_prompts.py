@@ -1,0 +1,95 @@
+"""The prompts of an evaluation: what a line of a file or body may hold, and the one check of it.
+
+Standard library only: the small client reads files with it, the API bodies, and both say the same of the same line.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from marey.core.characters import WHITESPACE, check_text
+from marey.core.errors import InvalidInput, TooLarge
+from marey.items.expected import read_expected
+from marey.items.item import CHECKS, Problem, checked, read_fields
+
+COLUMNS = ("prompt", "seconds", "expected")
+PromptCheck = Callable[[Mapping[str, Any], int | None], Iterable[Problem]]
+MIN_PROMPTS = 2
+"""What is measured over a set (how real it looks, how varied, which prompt fits which motion) has no value for one."""
+MAX_PROMPTS = 10_000
+
+
+@dataclass(frozen=True)
+class EvaluationPrompt:
+    """One prompt; `expected` is a text that `marey.items.expected` reads, None = nothing is checked."""
+
+    prompt: str
+    seconds: float | None = None
+    expected: str | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """As a line of a body: only what was given."""
+        return {name: value for name in COLUMNS if (value := getattr(self, name)) is not None}
+
+
+def read_prompts(
+    raws: Iterable[tuple[int | None, object]], *, where: str | None = None, check: PromptCheck | None = None
+) -> tuple[EvaluationPrompt, ...]:
+    """All prompts, or one error with all problems.
+
+    Args:
+        check: gives what else is wrong with the fields of a prompt that can be used.
+
+    Raises:
+        InvalidItems: at least one is wrong.
+        InvalidInput: fewer than `MIN_PROMPTS`.
+        TooLarge: more than `MAX_PROMPTS`.
+    """
+
+    def read(raw: object, line: int | None) -> tuple[EvaluationPrompt | None, list[Problem]]:
+        values, problems = read_fields(raw, _CHECKS, line)
+        if check is not None:
+            problems += check(values, line)
+        return (None, problems) if problems else (EvaluationPrompt(**values), [])
+
+    prompts = tuple(checked(_counted(raws, where), read, where=where))
+    if len(prompts) < MIN_PROMPTS:
+        raise InvalidInput(
+            "there is a single prompt in it, and nothing can be measured over one",
+            where=where,
+            hint=f"Give at least {MIN_PROMPTS}; a few hundred give numbers that mean something.",
+        )
+    return prompts
+
+
+def prompts_of(rows: Iterable[Mapping[str, Any]]) -> tuple[EvaluationPrompt, ...]:
+    """Prompts from what `as_json` gave."""
+    return tuple(EvaluationPrompt(**row) for row in rows)
+
+
+def prompts_sha256(prompts: Sequence[EvaluationPrompt]) -> str:
+    """One digest for prompts, lengths, expectations and their order: equal ones may be compared."""
+    rows = json.dumps([prompt.as_json() for prompt in prompts], ensure_ascii=False, sort_keys=True)
+    return hashlib.sha256(rows.encode()).hexdigest()
+
+
+def _counted(raws: Iterable[tuple[int | None, object]], where: str | None) -> Iterator[tuple[int | None, object]]:
+    """What is far too long is not looked at to its end."""
+    for number, row in enumerate(raws):
+        if number == MAX_PROMPTS:
+            raise TooLarge(f"more than {MAX_PROMPTS:,} prompts, the limit of an evaluation", where=where)
+        yield row
+
+
+def _expected(value: object) -> str:
+    if not isinstance(value, str):
+        raise InvalidInput('is not a text: write "walk then wave left"')
+    read_expected(check_text(value, allowed=WHITESPACE))
+    return " ".join(value.lower().split())
+
+
+_CHECKS = {"prompt": CHECKS["prompt"], "seconds": CHECKS["seconds"], "expected": _expected}

@@ -1,0 +1,81 @@
+"""What a motion is expected to show, as a person writes it: `walk`, `wave left`, `walk straight then bow`.
+
+Acts stand in the order in which they must come, joined by `then`. Standard library only: the small client reads files
+of prompts with it, and so does the API. What it means for a motion is for whoever judges one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from marey.core.errors import InvalidInput
+
+TURN = "turn"
+TRAVELS = ("walk", "run", "walk_back")
+"""Acts that may be asked to go `straight`."""
+SIDED: dict[str, tuple[str, ...]] = {
+    TURN: ("left", "right"),
+    "wave": ("left", "right", "both"),
+    "raise": ("left", "right", "both"),
+}
+"""Acts that may name a side: the way a turn goes, the hand that waves or is raised."""
+ACTS = (*TRAVELS, *SIDED, "bow", "kick", "punch", "slash", "dance")
+STRAIGHT = "straight"
+JOIN = "then"
+MAX_ACTS = 4
+
+
+@dataclass(frozen=True)
+class ExpectedAct:
+    """One act. `side` is empty where none is named."""
+
+    act: str
+    side: str = ""
+    straight: bool = False
+
+
+def read_expected(text: str) -> tuple[ExpectedAct, ...]:
+    """The acts of a text such as `walk straight then wave left`.
+
+    Raises:
+        InvalidInput: an unknown act, a word that does not belong to its act, or too many acts.
+    """
+    parts: list[list[str]] = [[]]
+    for word in text.lower().split():
+        if word == JOIN:
+            parts.append([])
+        else:
+            parts[-1].append(word)
+    if len(parts) > MAX_ACTS:
+        raise InvalidInput(f"{len(parts)} acts are over the limit of {MAX_ACTS}")
+    return tuple(_act(words) for words in parts)
+
+
+def format_expected(acts: tuple[ExpectedAct, ...]) -> str:
+    """The text that `read_expected` reads as these acts."""
+    words = [" ".join(filter(None, (a.act, a.side, STRAIGHT if a.straight else ""))) for a in acts]
+    return f" {JOIN} ".join(words)
+
+
+def _act(words: list[str]) -> ExpectedAct:
+    if not words:
+        raise InvalidInput(f'an act is missing: write "walk", or "walk {JOIN} wave left"')
+    name, *rest = words
+    if name not in ACTS:
+        raise InvalidInput(f"{name[:40]!r} is not an act; known are {', '.join(ACTS)}")
+    side, straight = "", False
+    for word in rest:
+        if word == STRAIGHT and name in TRAVELS and not straight:
+            straight = True
+        elif word in SIDED.get(name, ()) and not side:
+            side = word
+        else:
+            raise InvalidInput(f"{word[:40]!r} does not belong to {name!r}; {_allowed(name)}")
+    if name == TURN and not side:
+        raise InvalidInput(f'a turn needs its side: "{TURN} left" or "{TURN} right"')
+    return ExpectedAct(name, side, straight)
+
+
+def _allowed(name: str) -> str:
+    words = SIDED.get(name) or ((STRAIGHT,) if name in TRAVELS else ())
+    return f"it may have {' or '.join(words)}" if words else f'acts are joined by "{JOIN}"'

@@ -1,0 +1,410 @@
+"""What one line of input asks for, and the one check of it.
+
+The command line (files, `generate`) and the API (JSON and NDJSON bodies) read items through here, so that a problem
+has the same words everywhere. Standard library only: the small client imports it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar, cast
+
+from marey.core.characters import check_text, is_printable
+from marey.core.errors import InvalidInput, TooLarge
+from marey.items.prompts import check_prompt
+
+T = TypeVar("T")
+
+MAX_ITEMS = 100_000
+"""Items (prompts times variants) of one job."""
+MAX_BODY_BYTES = 64 * 2**20
+MAX_PROBLEMS = 1000
+"""More than these are counted, not listed."""
+MAX_UNKNOWN = 100
+"""Unknown fields of one item that are told one by one."""
+MAX_SEED = 2**31 - 1
+MAX_VARIANTS = 100
+MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
+"""What any model here may do; a bundle's own range, which is narrower, is checked where the bundle is known."""
+MAX_TAGS, MAX_TAG_LENGTH = 20, 64
+
+COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
+FIELDS = (*COLUMNS, "settings")
+OUTPUT_FPS = "fps"
+"""The one setting of an item that is not the network's: the frame rate of its files."""
+SETTINGS = {
+    "steps": (1, 100),
+    "guidance": (0.0, 100.0),
+    "temperature": (0.0, 100.0),
+    "top_k": (0.001, 1.0),
+    "upper_guidance": (0.0, 100.0),
+    "upper_temperature": (0.0, 100.0),
+    "upper_top_k": (0.001, 1.0),
+    "residual_guidance": (0.0, 100.0),
+    "residual_temperature": (0.0, 100.0),
+    "residual_top_k": (0.001, 1.0),
+    OUTPUT_FPS: (1.0, 240.0),
+}
+"""Settings of sampling, each with its range; which of them a model has, its bundle says. One with whole bounds is
+whole."""
+
+MAX_NAME = 100
+NAME = re.compile(rf"[^\W_][^/\\]{{0,{MAX_NAME - 1}}}")
+"""A name begins with a letter or digit of any script and holds no separators; characters that do not show are refused
+besides. The client derives the file name from it (`marey.cli.names`)."""
+RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
+"""Names that Windows keeps for devices."""
+MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One prompt with what goes with it; None = the server or the model decides."""
+
+    prompt: str
+    name: str | None = None
+    seconds: float | None = None
+    seed: int | None = None
+    """Seed of variant 0; variant k uses seed + k."""
+    variants: int = 1
+    model: str | None = None
+    """A model (`hgm3`), a bundle (`hgm3-starter`) or an exact bundle (`hgm3-starter@0123456789ab`)."""
+    tags: tuple[str, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def as_json(self) -> dict[str, Any]:
+        """The item as a line of a request body: only what was given."""
+        fields = {name: getattr(self, name) for name in FIELDS}
+        fields["tags"] = list(self.tags)
+        return {name: value for name, value in fields.items() if value not in (None, [], {})}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with the input. `line` counts from 1; None = not about a line."""
+
+    line: int | None
+    field: str | None
+    message: str
+
+    def __str__(self) -> str:
+        place = ": ".join(str(p) for p in (f"line {self.line}" if self.line else None, self.field) if p is not None)
+        return f"{place}: {self.message}" if place else self.message
+
+
+class InvalidItems(InvalidInput):
+    """Some lines of the input cannot be used; none was."""
+
+    problem_type = "invalid-items"
+
+    def __init__(
+        self,
+        problems: Iterable[Problem],
+        *,
+        where: str | None = None,
+        total: int | None = None,
+        hint: str = "Correct them and try again.",
+    ) -> None:
+        found = list(problems)
+        self.total = len(found) if total is None else total
+        self.problems = tuple(found[:MAX_PROBLEMS])
+        count = "1 problem" if self.total == 1 else f"{self.total} problems"
+        super().__init__(f"{count} in the input; none of it is used", where=where, hint=hint)
+
+    def __str__(self) -> str:
+        lines = [f"  {problem}" for problem in self.problems]
+        if self.total > len(lines):
+            lines.append(f"  … and {self.total - len(lines)} more")
+        head = f"{self.where}: {self.message}" if self.where else self.message
+        return "\n".join([head, *lines, f"  {self.hint}"])
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """A line that could not even be parsed, or a part of it; `read_item` refuses it with this message."""
+
+    message: str
+    field: str | None = None
+
+
+def read_json(line: str | bytes) -> object:
+    """The JSON value of one line, or `Unreadable`."""
+    try:
+        return json.loads(line)
+    except RecursionError:
+        return Unreadable("is nested too deeply")
+    except ValueError as error:
+        return Unreadable(f"is not JSON: {error}")
+
+
+def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[Problem]]:
+    """The item in `raw`, a JSON object, or all that is wrong with it.
+
+    Args:
+        raw: what a JSON line or an element of `items` holds, or `Unreadable`.
+        line: where it stood, for the problems.
+    """
+    values, problems = read_values(raw, line)
+    return (None, problems) if problems else (Item(**values), [])
+
+
+def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], list[Problem]]:
+    """The fields of an item that can be used, and all that is wrong with it; see `read_item`."""
+    values, problems = read_fields(raw, CHECKS, line)
+    seed, variants = values.get("seed"), values.get("variants", 1)
+    if seed is not None and seed + variants - 1 > MAX_SEED:
+        problems.append(Problem(line, "seed", f"plus {variants - 1} for the last variant is over {MAX_SEED}"))
+    return values, problems
+
+
+def names_model(values: Mapping[str, Any], problems: Iterable[Problem]) -> bool:
+    """Return True if it is known which model an item is for, so that its other fields can be held against the ranges
+    of the model, whatever else is wrong with it."""
+    return bool(values) and all(problem.field != "model" for problem in problems)
+
+
+def read_fields(
+    raw: object, checks: Mapping[str, Callable[[object], object]], line: int | None = None
+) -> tuple[dict[str, Any], list[Problem]]:
+    """The checked values of a JSON object that has a prompt, and all that is wrong with it.
+
+    Args:
+        raw: see `read_item`.
+        checks: of the known fields; each gives the value, or raises `InvalidInput`.
+        line: where it stood, for the problems.
+    """
+    if isinstance(raw, Unreadable):
+        return {}, [Problem(line, raw.field, raw.message)]
+    if not isinstance(raw, Mapping):
+        return {}, [Problem(line, None, 'is not an object: write {"prompt": "…"}')]
+    given = cast("Mapping[object, object]", raw)
+    unknown = [name for name in given if name not in checks]
+    known = ", ".join(checks)
+    problems = [
+        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {known}")
+        for name in unknown[:MAX_UNKNOWN]
+    ]
+    if len(unknown) > MAX_UNKNOWN:
+        problems.append(Problem(line, None, f"has {len(unknown)} fields that are not known; known are {known}"))
+    values: dict[str, Any] = {}
+    for name, check in checks.items():
+        if given.get(name) is None:
+            continue
+        try:
+            values[name] = check(given[name])
+        except InvalidInput as error:
+            problems.append(Problem(line, name, f"{error.message}. {error.hint}" if error.hint else error.message))
+    if given.get("prompt") is None:
+        problems.append(Problem(line, "prompt", "is missing: say what the person does"))
+    return values, problems
+
+
+def read_items(
+    raws: Iterable[tuple[int | None, object]],
+    *,
+    where: str | None = None,
+    check: Callable[[Mapping[str, Any], int | None], Iterable[Problem]] | None = None,
+) -> Iterator[Item]:
+    """Items as they are read, as `checked` gives them.
+
+    Args:
+        check: gives what else is wrong with the usable fields of an item; called where `names_model`.
+
+    Raises:
+        InvalidItems: at least one is wrong.
+        InvalidInput: there are none.
+        TooLarge: more than `MAX_ITEMS` with their variants.
+    """
+    count = 0
+
+    def read(raw: object, line: int | None) -> tuple[Item | None, list[Problem]]:
+        nonlocal count
+        values, problems = read_values(raw, line)
+        if check is not None and names_model(values, problems):
+            problems += check(values, line)
+        item = None if problems else Item(**values)
+        count += 1 if item is None else item.variants
+        check_count(count, line, where)
+        return item, problems
+
+    return checked(raws, read, where=where)
+
+
+def check_count(count: int, line: int | None, where: str | None) -> None:
+    """Check that a job may have so many motions; what is far too long is not read to its end.
+
+    Raises:
+        TooLarge: it may not.
+    """
+    if count > MAX_ITEMS:
+        raise TooLarge(
+            f"is over the limit of {MAX_ITEMS:,} motions (prompts times variants) a job",
+            where=where if line is None else ", ".join(filter(None, (where, f"line {line}"))),
+            hint="Submit them as several jobs.",
+        )
+
+
+def checked(
+    raws: Iterable[tuple[int | None, object]],
+    read: Callable[[object, int | None], tuple[T | None, list[Problem]]],
+    *,
+    where: str | None = None,
+) -> Iterator[T]:
+    """What `read` makes of each, one after another; after the last, one error with all problems. What came before
+    counts only if none follows.
+
+    Raises:
+        InvalidItems: at least one is wrong.
+        InvalidInput: there are none.
+    """
+    problems: list[Problem] = []
+    good = total = 0
+    for line, raw in raws:
+        value, found = read(raw, line)
+        total += len(found)
+        problems.extend(found[: MAX_PROBLEMS - len(problems)])
+        if value is not None and not problems:
+            good += 1
+            yield value
+    if problems:
+        raise InvalidItems(problems, where=where, total=total)
+    if not good:
+        raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
+
+
+def _name(value: object) -> str:
+    text = check_text(_text(value))
+    if not text.isascii():
+        text = re.sub(r"[^\S ]", " ", unicodedata.normalize("NFC", text))
+    text = text.strip()
+    if len(text) > MAX_NAME:
+        raise InvalidInput(f"has {len(text)} characters; file names take up to {MAX_NAME} of it")
+    if RESERVED.fullmatch(text):
+        raise InvalidInput(f"{text!r} cannot be a file name: Windows keeps it for a device")
+    if not NAME.fullmatch(text) or text.endswith(".") or ".." in text or not is_printable(text):
+        raise InvalidInput(
+            f"{text[:60]!r} cannot be a file name: begin with a letter or digit, use no / \\ .. and no dot at the end"
+        )
+    return text
+
+
+def _seconds(value: object) -> float:
+    number = _number(value)
+    if not MIN_SECONDS <= number <= MAX_SECONDS:
+        raise InvalidInput(f"{number:g} is outside {MIN_SECONDS:g} to {MAX_SECONDS:g} seconds")
+    return number
+
+
+def outside_range(seconds: float, low: float, high: float, bundle: str) -> str:
+    """The message about a length that a bundle cannot make."""
+    return f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {bundle}"
+
+
+def _seed(value: object) -> int:
+    return _whole(value, 0, MAX_SEED)
+
+
+def _variants(value: object) -> int:
+    return _whole(value, 1, MAX_VARIANTS)
+
+
+def _model(value: object) -> str:
+    text = _text(value)
+    if not MODEL.fullmatch(text):
+        raise InvalidInput(f"{text[:60]!r} is not the name of a model or bundle: `marey models list` shows them")
+    return text
+
+
+def _tags(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise InvalidInput('is not a list of words: write ["walk", "take 2"]')
+    given = cast("Sequence[object]", value)
+    if len(given) > MAX_TAGS:
+        raise InvalidInput(f"{len(given)} tags are over the limit of {MAX_TAGS}")
+    return tuple(_tag(tag) for tag in given)
+
+
+def _tag(value: object) -> str:
+    tag = _text(value)
+    if not tag.isprintable():
+        check_text(tag, subject=f"{tag[:80]!r} is not a tag: it")
+    if not tag.strip() or len(tag) > MAX_TAG_LENGTH or not is_printable(tag):
+        raise InvalidInput(f"{tag[:80]!r} is not a tag: 1 to {MAX_TAG_LENGTH} printable characters")
+    return tag
+
+
+def _settings(value: object) -> dict[str, float]:
+    if not isinstance(value, Mapping):
+        raise InvalidInput('is not an object: write {"guidance": 4.5}')
+    checked: dict[str, float] = {}
+    for name, given in cast("Mapping[object, object]", value).items():
+        if not isinstance(name, str) or name not in SETTINGS:
+            raise InvalidInput(f"{str(name)[:60]!r} is not a setting; known are {', '.join(SETTINGS)}")
+        low, high = SETTINGS[name]
+        try:
+            checked[name] = _whole(given, low, int(high)) if isinstance(low, int) else _number(given)
+        except InvalidInput as error:
+            raise InvalidInput(f"{name}: {error.message}") from error
+        if not low <= checked[name] <= high:
+            raise InvalidInput(f"{name}: {checked[name]:g} is outside {low:g} to {high:g}")
+    return checked
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise InvalidInput(f"is {_kind(value)}, not a text")
+    return value
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidInput(f"is {_kind(value)}, not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InvalidInput("is not a finite number")
+    return number
+
+
+def _whole(value: object, low: int, high: int) -> int:
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InvalidInput(f"is {_kind(value)}, not a whole number")
+    if not low <= value <= high:
+        raise InvalidInput(f"{value if abs(value) < 10**20 else 'it'} is outside {low} to {high}")
+    return value
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, str):
+        return repr(value[:40])
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, list):
+        return "a list"
+    return "an object" if isinstance(value, dict) else ascii(value)[:40]
+
+
+def _prompt(value: object) -> str:
+    return check_prompt(_text(value))
+
+
+CHECKS: dict[str, Callable[[object], object]] = {
+    "prompt": _prompt,
+    "name": _name,
+    "seconds": _seconds,
+    "seed": _seed,
+    "variants": _variants,
+    "model": _model,
+    "tags": _tags,
+    "settings": _settings,
+}
+"""How the value of each field is checked."""

@@ -1,0 +1,76 @@
+"""Reading motions with their files."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from marey.core.errors import NotFound
+from marey.db.sql import among
+from marey.jobs import tables
+from marey.jobs.files import files_of
+from marey.jobs.states import Review
+from marey.jobs.types import MotionFile, MotionRow
+
+
+def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
+    """One motion.
+
+    Raises:
+        NotFound: the tenant has no such motion.
+    """
+    return motions_of(conn, tenant, [motion])[0]
+
+
+def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> list[MotionRow]:
+    """These motions, in the order given, each once.
+
+    Raises:
+        NotFound: the tenant lacks one of them.
+    """
+    asked = list(dict.fromkeys(motions))
+    table = tables.motion.c
+    rows = {row.id: row for row in read_motions(conn, (table.tenant_id == tenant) & among(table.id, asked))}
+    missing = [motion for motion in asked if motion not in rows]
+    if missing:
+        more = f" (and {len(missing) - 1} more of those given)" if len(missing) > 1 else ""
+        raise NotFound(
+            f"there is no such motion{more}", where=f"motion {missing[0]}", hint="`marey motions list` shows yours."
+        )
+    return [rows[motion] for motion in asked]
+
+
+def read_motions(
+    conn: sa.Connection,
+    wanted: sa.ColumnElement[bool],
+) -> list[MotionRow]:
+    """Motions with their files, in no order: two queries, however many."""
+    motion, item = tables.motion.c, tables.item.c
+    later = tables.item.alias("later")
+    query = (
+        sa.select(
+            *(motion.id, motion.tenant_id.label("tenant"), motion.job_id.label("job"), motion.item_id.label("item")),
+            *(item.name, item.prompt, item.model, item.bundle, motion.licence, item.seed, item.variant),
+            *(motion.frames, motion.fps, motion.elapsed, motion.metadata.label("metadata")),
+            motion.created_at.label("created"),
+            *(item.index, item.tags, item.replaces, later.c.id.label("replaced_by")),
+            *(motion.review, motion.reviewed_at.label("reviewed"), motion.reviewed_by, motion.review_comment),
+        )
+        .join(tables.item, item.id == motion.item_id)
+        .outerjoin(later, later.c.replaces == motion.id)
+        .where(wanted)
+    )
+    rows = conn.execute(query).mappings().all()
+    file = tables.motion_file.c
+    files = files_of(conn, file.motion_id, [row["id"] for row in rows], MotionFile, ~file.erasing)
+    return [_motion(row, files[row["id"]]) for row in rows]
+
+
+def _motion(row: sa.RowMapping, files: Sequence[MotionFile]) -> MotionRow:
+    values: dict[str, Any] = dict(row)
+    review = row["review"]
+    values.update(tags=tuple(row["tags"]), review=None if review is None else Review(review))
+    return MotionRow(**values, files=tuple(files))

@@ -1,0 +1,25 @@
+"""Events of jobs for webhooks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from marey.jobs.states import ENDED, JobState
+from marey.webhooks.outbox import tell
+from marey.webhooks.types import EventKind
+
+
+def tell_of_job(
+    conn: sa.Connection, tenant: str, job: UUID, before: JobState, after: JobState, counters: Mapping[str, int]
+) -> None:
+    """Tell of a job that ended or was paused; of no other change."""
+    if after is before:
+        return
+    data = {"job": job, "state": after, "counters": dict(counters)}
+    if after in ENDED:
+        tell(conn, tenant, EventKind.JOB_ENDED, data)
+    elif after is JobState.PAUSED:
+        tell(conn, tenant, EventKind.JOB_PAUSED, data)

@@ -1,0 +1,107 @@
+"""What a bundle offers: the items that can be made with it, and those items as rows of a job."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import secrets
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
+from marey.bundles.find import log_broken
+from marey.bundles.limits import check_seconds, check_settings, seconds_of, settings_of
+from marey.core.errors import InvalidBundle, MareyError
+from marey.core.settings import Settings
+from marey.items.item import MAX_SEED, Item
+from marey.jobs import NewItem
+from marey.text.keys import as_served, feature_key, resolve
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A bundle that items can be made with."""
+
+    bundle: Bundle
+    text: TextSpec
+    """With every hash filled in."""
+    min_seconds: float
+    max_seconds: float
+
+    def check_seconds(self, seconds: float | None) -> None:
+        """See `check_seconds`."""
+        check_seconds(self.bundle, seconds)
+
+    def check_settings(self, names: Iterable[str]) -> None:
+        """See `check_settings`."""
+        check_settings(self.bundle, names)
+
+
+@dataclass(frozen=True)
+class Offers:
+    """List the bundles that this machine can make motions with."""
+
+    found: tuple[Offer, ...]
+    broken: tuple[BrokenBundle, ...]
+    """Bundles that are here and cannot be used; of any kind, since a broken manifest does not tell its kind."""
+
+
+def offers(config: Settings) -> Offers:
+    """Every generator's bundle of this machine, by folder; a broken one is logged and hides no other."""
+    bundles = scan_bundles(config=config, kind="generator")
+    found: list[Offer] = []
+    broken = list(bundles.broken)
+    for bundle in bundles.found:
+        try:
+            found.append(offer_of(bundle, config))
+        except MareyError as error:
+            broken.append(BrokenBundle.of(bundle.path.name, error))
+            log_broken(broken[-1])
+    return Offers(tuple(found), tuple(broken))
+
+
+def offer_of(bundle: Bundle, config: Settings) -> Offer:
+    """What a generator's bundle allows.
+
+    Raises:
+        InvalidBundle: it is no generator, or its manifest does not say what it makes.
+        NotFound: what reads its prompts is not here.
+    """
+    manifest = bundle.manifest
+    if manifest.kind != "generator" or manifest.text is None or not manifest.fps:
+        raise InvalidBundle(
+            f"{manifest.name!r} is of the kind {manifest.kind}, not a text-to-motion generator", where=str(bundle.path)
+        )
+    low, high = seconds_of(bundle)
+    settings_of(bundle)
+    return Offer(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
+
+
+def new_items(items: Iterable[tuple[Item, Offer]]) -> Iterator[NewItem]:
+    """One row a motion: prompt times variant, with the seed drawn where none was given."""
+    batch_keys: dict[tuple[str, str], str] = {}
+    for index, (item, offer) in enumerate(items):
+        reference = offer.bundle.reference
+        settings = json.dumps(dict(item.settings), sort_keys=True)
+        batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
+        seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+        for variant in range(item.variants):
+            yield NewItem(
+                index=index,
+                prompt=item.prompt,
+                model=offer.bundle.manifest.model,
+                bundle=reference,
+                batch_key=batch_key,
+                text_key=feature_key(item.prompt, offer.text),
+                text_batch_key=_sha256(offer.text.model_dump_json()),
+                seed=seed + variant,
+                variant=variant,
+                name=item.name,
+                seconds=item.seconds,
+                settings=dict(item.settings),
+                tags=item.tags,
+            )
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,242 @@
+"""BVH files: read what anybody wrote, write what everybody reads.
+
+Reading is for files nobody here wrote: six channels a joint, positions that replace the OFFSET or are added to it,
+any rotation order, tabs, CRLF, wrong frame counts, a T-pose before the first frame. What is odd but harmless is told in
+`BvhClip.notes`; what is broken raises InvalidFile with its line number.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from marey.core.errors import InvalidFile, NotFound, TooLarge
+from marey.motion.io.bvh_header import LARGEST, Header, Joint
+from marey.motion.io.bvh_write import format_bvh, write_bvh
+from marey.motion.kinematics import forward_kinematics
+from marey.motion.rotations import AXES, Array, angle_between, from_euler, multiply, rotate, unroll
+from marey.motion.skeleton import Skeleton, mirror_by_name
+from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+
+__all__ = ["MAX_BYTES", "MAX_FRAMES", "BvhClip", "format_bvh", "parse_bvh", "read_bvh", "write_bvh"]
+
+MAX_BYTES = 512 * 2**20  # the longest capture takes we know are under 100 MB
+MAX_FRAMES = 1_000_000  # over two hours at 120 fps
+
+
+@dataclass(frozen=True, eq=False)
+class BvhClip:
+    """What a BVH file holds, in metres, Y up.
+
+    Attributes:
+        skeleton: its own tree; offsets are the file's (or the constant positions that replace them), root offset zero.
+        rotations: (T, J, 4) float64 local quaternions.
+        root: (T, 3) float64 position of joint 0.
+        positions: (T, J, 3) local translations in place of the offsets, when a joint under the root moves; else None.
+        fps: frames a second; a rounded frame time is taken back to the rate it was rounded from.
+        ends: (J, 3) offset of the End Site, NaN where there is none.
+        rest: the first frame's joints (J, 3), if it was a rest pose and has been left out.
+        notes: what was odd about the file.
+    """
+
+    skeleton: Skeleton
+    rotations: Array = field(repr=False)
+    root: Array = field(repr=False)
+    positions: Array | None = field(repr=False)
+    fps: float
+    ends: Array = field(repr=False)
+    rest: Array | None = field(default=None, repr=False)
+    notes: tuple[str, ...] = ()
+
+    def joints(self) -> Array:
+        """(T, J, 3) joint positions in the world, metres."""
+        return forward_kinematics(self.skeleton, self.rotations, self.root, positions=self.positions)
+
+
+def read_bvh(
+    path: Path | str,
+    *,
+    unit: Unit = "cm",
+    up: Up = "y",
+    rest_frame: Literal["auto", "keep", "drop"] = "auto",
+    translation: Literal["auto", "replace", "add"] = "auto",
+) -> BvhClip:
+    """Read a BVH file.
+
+    Args:
+        path: the file.
+        unit: what its lengths are in.
+        up: which axis of the file points up.
+        rest_frame: leave the first frame out when it is a rest pose (`auto`: when it stands apart from the rest).
+        translation: whether position channels replace the OFFSET (Blender) or are added to it (three.js, iClone);
+            `auto` finds out.
+
+    Raises:
+        NotFound: no such file.
+        InvalidFile: broken, with the line number.
+        TooLarge: over the limits above.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise TooLarge(f"{size / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB", where=str(path))
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise NotFound("no such file", where=str(path)) from None
+    except OSError as error:
+        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
+    return parse_bvh(data, str(path), unit=unit, up=up, rest_frame=rest_frame, translation=translation)
+
+
+def parse_bvh(
+    data: bytes,
+    where: str = "bvh",
+    *,
+    unit: Unit = "cm",
+    up: Up = "y",
+    rest_frame: Literal["auto", "keep", "drop"] = "auto",
+    translation: Literal["auto", "replace", "add"] = "auto",
+) -> BvhClip:
+    """Read the bytes of a BVH file; see `read_bvh`. `where` names it in errors."""
+    header = Header(data, where)
+    notes = header.notes
+    values = _numbers(data, header, where)
+    joints, scale = header.joints, METRES[unit]
+    frames = len(values)
+    if header.frames != frames:
+        notes.append(f"line {header.frames_line}: the header says {header.frames} frames, the file holds {frames}")
+    rotations = np.empty((frames, len(joints), 4))
+    by_order: dict[str, list[int]] = {}
+    for j, joint in enumerate(joints):
+        by_order.setdefault("".join(a for kind, a in joint.channels if kind == "r"), []).append(j)
+    for order, members in by_order.items():
+        columns = [[joints[j].first + c for c, (k, _) in enumerate(joints[j].channels) if k == "r"] for j in members]
+        rotations[:, members] = from_euler(values[:, np.array(columns, np.intp).reshape(len(members), -1)], order)
+    names = _unique([j.name for j in joints], notes)
+    offsets, channels, given = _translations(joints, values)
+    tree = Skeleton("bvh", names, tuple(j.parent for j in joints), offsets.astype(np.float32), mirror_by_name(names))
+    add = _are_added(tree, rotations, channels, given, up) if translation == "auto" else translation == "add"
+    if add:
+        notes.append("positions are added to the OFFSETs")
+    moving = np.where(given, channels + offsets * add, offsets) * scale
+    offsets, root = offsets * scale, moving[:, 0]
+    ends = np.array([j.end or (np.nan,) * 3 for j in joints]) * scale
+    if up == "z":
+        offsets, moving, root, ends = (rotate(Z_TO_Y, a) for a in (offsets, moving, root, ends))
+        rotations = multiply(multiply(Z_TO_Y, rotations), Z_TO_Y * [1, -1, -1, -1])
+    still = np.ptp(moving[:, 1:], axis=0).max(initial=0.0) < 1e-4  # metres: what rounding in a file can do
+    offsets = np.concatenate([np.zeros((1, 3)), moving[:, 1:].mean(axis=0) if still else offsets[1:]])
+    skeleton = tree.with_offsets(offsets)
+    clip = BvhClip(skeleton, unroll(rotations), root, None if still else moving, header.fps, ends, None, tuple(notes))
+    drop = rest_frame == "drop" or (rest_frame == "auto" and first_frame_stands_apart(clip))
+    return _without_first(clip) if drop and frames > 1 else clip
+
+
+def first_frame_stands_apart(clip: BvhClip) -> bool:
+    """Whether the first frame is a rest pose and no part of the motion: the joints turn far more from it to the second
+    frame than they ever do within the motion."""
+    if len(clip.rotations) < 4:
+        return False
+    steps = angle_between(clip.rotations[:-1], clip.rotations[1:]).mean(axis=1)
+    return bool(steps[0] > 0.1 and steps[0] > 3 * steps[1:].max())
+
+
+def _without_first(clip: BvhClip) -> BvhClip:
+    positions = None if clip.positions is None else clip.positions[1:]
+    return BvhClip(
+        clip.skeleton, clip.rotations[1:], clip.root[1:], positions, clip.fps, clip.ends, clip.joints()[0], clip.notes
+    )
+
+
+def _translations(joints: list[Joint], values: Array) -> tuple[Array, Array, Array]:
+    """Offsets (J, 3), the position channels (T, J, 3) and which there are (J, 3), in the file's unit."""
+    offsets = np.array([j.offset for j in joints], np.float64)
+    channels = np.zeros((len(values), *offsets.shape))
+    given = np.zeros(offsets.shape, bool)
+    for j, joint in enumerate(joints):
+        for column, (kind, axis) in enumerate(joint.channels, start=joint.first):
+            if kind == "p":
+                channels[:, j, AXES.index(axis)] = values[:, column]
+                given[j, AXES.index(axis)] = True
+    return offsets, channels, given
+
+
+def _are_added(tree: Skeleton, rotations: Array, channels: Array, given: Array, up: Up) -> bool:
+    """Whether position channels are added to the OFFSETs (three.js, iClone) or replace them (Blender, Bandai-Namco).
+
+    Joints below the root decide it: where channels replace, they hold the offset. In a file with channels on the root
+    alone, it is the reading whose lowest point is nearer to the floor.
+    """
+    offsets = tree.offsets.astype(np.float64)
+    lengths = np.linalg.norm(offsets, axis=-1)
+    tell = given.all(axis=-1) & (lengths > 0)
+    if tell[1:].any():
+        moved = np.linalg.norm(np.median(channels, axis=0) - offsets, axis=-1)
+        return float(np.median((moved / np.maximum(lengths, 1e-12))[1:][tell[1:]])) > 0.5
+    axis = 1 if up == "y" else 2
+    if not given[0, axis] or offsets[0, axis] == 0:
+        return False
+    some = slice(None, None, max(1, len(rotations) // 64))
+    lowest = float(forward_kinematics(tree, rotations[some], channels[some, 0])[..., axis].min())
+    return abs(lowest + float(offsets[0, axis])) < abs(lowest)
+
+
+def _unique(names: list[str], notes: list[str]) -> tuple[str, ...]:
+    seen: dict[str, int] = {}
+    unique: list[str] = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        if seen[name] > 1:
+            notes.append(f"there are several joints {name}")
+        unique.append(name if seen[name] == 1 else f"{name}.{seen[name]}")
+    return tuple(unique)
+
+
+def _numbers(data: bytes, header: Header, where: str) -> Array:
+    """The motion (T, C). Fast where all is well; only a broken file is read again line by line, to say where."""
+    with warnings.catch_warnings():
+        # Up to numpy 2.2 text that is no number is a DeprecationWarning and an early end, later a ValueError.
+        warnings.simplefilter("error", DeprecationWarning)
+        try:
+            values = np.fromstring(data[header.motion_at :], np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            values = None
+    width = header.channels
+    if not width:
+        raise header.fail("no joint has channels: there is no motion")
+    if values is None or values.size % width or not (np.abs(values) <= LARGEST).all():
+        raise _first_fault(data, header, where)
+    if values.size // width > MAX_FRAMES:
+        raise TooLarge(f"{values.size // width} frames, over the limit of {MAX_FRAMES}", where=where)
+    if not values.size:
+        raise header.fail("holds no frames")
+    return values.reshape(-1, width)
+
+
+def _first_fault(data: bytes, header: Header, where: str) -> InvalidFile:
+    """The error for the first line of numbers that is not what the header promised."""
+    lines = data[header.motion_at :].decode("latin-1").splitlines()
+    for number, text in enumerate(lines, start=header.motion_line):
+        words = text.split()
+        for word in words:
+            try:
+                good = abs(float(word)) <= LARGEST
+            except ValueError:
+                good = False
+            if not good:
+                return InvalidFile(
+                    f"`{word[:40]}` is no number, or not finite, or far too large", where=f"{where}, line {number}"
+                )
+        if words and len(words) != header.channels:
+            last = not any(later.strip() for later in lines[number - header.motion_line + 1 :])
+            return InvalidFile(
+                f"{len(words)} numbers, where the channels need {header.channels}",
+                where=f"{where}, line {number}",
+                hint="The file ends in the middle of a frame: it is cut off." if last else None,
+            )
+    return InvalidFile("the numbers do not fill whole frames", where=where)

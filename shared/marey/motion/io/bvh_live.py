@@ -1,0 +1,217 @@
+"""A BVH file that grows while its motion is made, and is whole at every moment, also when the program is killed.
+
+- It comes into being with its first frame, by a rename: BVH has no way to say "no frames".
+- A row is written before it is counted, so `Frames:` never promises rows that are not there. Between the two steps
+  there are more rows than it says: three.js stops at the count, Blender and `bvh.py` read all rows. The count has a
+  fixed width, blanks after it, and is written in place.
+- No row is ever there in part: Blender and `bvh.py` would refuse the file. A write whose process is killed ends where a
+  page of memory ends and nowhere else, so a row that would lie across such a border begins behind it, after blanks.
+  (True of rows of up to a page, about a hundred joints. A power failure is another matter: only `close` waits for the
+  disk.)
+
+The numbers are those of `bvh_write.py`, which writes whole clips.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import tempfile
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from marey.core.errors import Conflict, InvalidInput, TooLarge
+from marey.motion.files import write_atomically
+from marey.motion.io.bvh import MAX_FRAMES
+from marey.motion.io.bvh_write import Layout
+from marey.motion.rotations import Array, continuous_euler, slerp
+from marey.motion.skeleton import Skeleton
+
+PAGE = 4096  # bytes; some systems have larger ones, whose borders are borders of these
+COUNT_WIDTH = len(str(MAX_FRAMES))
+
+
+class LiveBVH:
+    """A BVH file to add frames to: centimetres, Y up, one row a frame. Not for several threads.
+
+    Args:
+        path: the file; nothing is there before the first frame.
+        skeleton: its offsets become the OFFSETs.
+        fps: frames a second.
+
+    Attributes:
+        frames: rows in the file.
+        filled: how many of them were made up for frames that were missing.
+    """
+
+    def __init__(self, path: Path, skeleton: Skeleton, fps: float) -> None:
+        if not (math.isfinite(fps) and fps > 0):
+            raise InvalidInput(f"{fps:g} frames a second cannot be", where=str(path))
+        self.path = path
+        self.skeleton = skeleton
+        self.fps = fps
+        self.frames = 0
+        self.filled = 0
+        self._layout = Layout(skeleton)
+        self._file: FileIO | None = None
+        self._closed = False
+        self._end = 0  # of the last row, in bytes
+        self._count_at = 0
+        self._last: tuple[Array, Array, Array] | None = None  # rotations (J, 4), root (3,), angles (J, 3)
+
+    @classmethod
+    def open(cls, path: Path | str, skeleton: Skeleton, fps: float, *, overwrite: bool = False) -> LiveBVH:
+        """A file to begin; what can be wrong with its place is found out now.
+
+        Args:
+            overwrite: replace a file that is there; it stays until the first frame.
+
+        Raises:
+            Conflict: a file is there.
+            InvalidInput: the folder is not there or cannot be written to.
+        """
+        check_place(path, overwrite=overwrite)
+        return cls(Path(path), skeleton, fps)
+
+    def __enter__(self) -> LiveBVH:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def add(self, rotations: ArrayLike, root: ArrayLike, *, missing: int = 0) -> None:
+        """Add a frame, and before it those that are missing, so that the time line holds.
+
+        A missing frame is the pose between its neighbours: rotations by slerp, the root by lerp. Missing frames before
+        the first one show the first one.
+
+        Args:
+            rotations: (J, 4) local unit quaternions `w x y z`.
+            root: (3,) metres, Y up.
+            missing: how many frames are missing before it.
+
+        Raises:
+            InvalidInput: wrong shapes, numbers that are not finite, a file that cannot be written or is closed.
+            TooLarge: more frames than a BVH file may have here.
+        """
+        turns, place = self._checked(rotations, root)
+        if missing < 0:
+            raise InvalidInput(f"{missing} missing frames cannot be", where=str(self.path))
+        if self.frames + missing + 1 > MAX_FRAMES:
+            raise TooLarge(f"more than {MAX_FRAMES:,} frames", where=str(self.path))
+        before = (turns, place) if self._last is None else self._last[:2]
+        steps = np.arange(1, missing + 2) / (missing + 1)  # (missing + 1,), the last is the frame itself
+        between = slerp(before[0], turns, steps[:-1, None])
+        angles = self._layout.angles(np.concatenate([between, turns[None]]))
+        if self._last is None:
+            angles = continuous_euler(angles)
+        else:
+            angles = continuous_euler(np.concatenate([self._last[2][None], angles]))[1:]
+        places = before[1] + steps[:, None] * (place - before[1])
+        self._write(self._layout.rows(places, angles))
+        self._last = turns, place, angles[-1]
+        self.frames += missing + 1
+        self.filled += missing
+
+    def close(self) -> None:
+        """Wait until the disk has it. Without a frame there is no file.
+
+        Raises:
+            InvalidInput: the disk says that it has it not.
+        """
+        self._closed = True
+        file, self._file = self._file, None
+        if file is None:
+            return
+        try:
+            with file:
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise InvalidInput(f"cannot be written: {error.strerror}", where=str(self.path)) from None
+
+    def _checked(self, rotations: ArrayLike, root: ArrayLike) -> tuple[Array, Array]:
+        where = f"{self.path}, frame {self.frames}"
+        if self._closed:
+            raise InvalidInput("the file is closed", where=where)
+        turns, place = np.asarray(rotations, np.float64), np.asarray(root, np.float64)
+        if turns.shape != (len(self.skeleton), 4) or place.shape != (3,):
+            message = f"rotations {turns.shape} and root {place.shape}, not ({len(self.skeleton)}, 4) and (3,)"
+            raise InvalidInput(message, where=where)
+        if not (_finite(turns) and _finite(place)):
+            raise InvalidInput("the frame holds NaN or infinite numbers", where=where)
+        return turns, place
+
+    def _write(self, rows: list[str]) -> None:
+        """Rows, then the count; all, or none. The first row comes with the file."""
+        kept, count = self._end, self.frames + len(rows)
+        try:
+            if self._file is None:
+                self._file = self._begin(rows.pop(0))
+            kept = self._end
+            for row in rows:
+                self._append(row.encode() + b"\n")
+            if rows:
+                self._put(self._count_at, f"{count:<{COUNT_WIDTH}}".encode())
+        except OSError as error:
+            if self._file is not None:
+                self._file.truncate(kept)
+            self._closed = True
+            raise InvalidInput(f"cannot be written: {error.strerror}", where=str(self.path)) from None
+
+    def _begin(self, row: str) -> FileIO:
+        blanks = ""
+        while True:
+            header = self._layout.header(f"{blanks}{1:<{COUNT_WIDTH}}", self.fps).encode() + b"\n"
+            self._count_at = header.rindex(b"\nFrames: ") + len("\nFrames: ") + len(blanks)
+            over = PAGE - self._count_at % PAGE
+            if over >= COUNT_WIDTH:
+                break
+            blanks = " " * over  # the count must not lie across a border either
+        data = header + row.encode() + b"\n"
+        write_atomically(self.path, data)
+        self._end = len(data)
+        return FileIO(self.path, "r+")
+
+    def _append(self, row: bytes) -> None:
+        room = PAGE - self._end % PAGE
+        if room < len(row) <= PAGE:
+            row = b" " * room + row
+        self._put(self._end, row)
+        self._end += len(row)
+
+    def _put(self, at: int, data: bytes) -> None:
+        assert self._file is not None
+        self._file.seek(at)
+        if self._file.write(data) != len(data):  # the first part found room
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def check_place(path: Path | str, *, overwrite: bool = False) -> None:
+    """Find out whether a file can come into being here.
+
+    Raises:
+        Conflict: a file is there.
+        InvalidInput: the folder is not there or cannot be written to.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InvalidInput("is a folder", where=str(path), hint="Name a file.")
+    if path.exists() and not overwrite:
+        raise Conflict("is there already", where=str(path), hint="Choose another name, or --overwrite.")
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise InvalidInput(f"cannot be written: {error.strerror}", where=str(path)) from None
+
+
+def _finite(values: NDArray[np.floating[Any]]) -> bool:
+    return bool(np.isfinite(values).all())

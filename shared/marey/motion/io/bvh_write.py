@@ -1,0 +1,143 @@
+"""Writing BVH files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.core.errors import InvalidInput
+from marey.motion.files import write_atomically
+from marey.motion.rotations import Array, conjugate, continuous_euler, multiply, normalize, rotate, to_euler
+from marey.motion.skeleton import Skeleton
+from marey.motion.units import METRES, Z_TO_Y, Unit, Up
+
+
+class Posed(Protocol):
+    """What can be written: a BvhClip or a MotionClip."""
+
+    @property
+    def skeleton(self) -> Skeleton: ...
+    @property
+    def rotations(self) -> NDArray[np.floating[Any]]: ...
+    @property
+    def root(self) -> NDArray[np.floating[Any]]: ...
+    @property
+    def fps(self) -> float: ...
+
+
+def write_bvh(path: Path | str, clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> None:
+    """Write a clip: OFFSETs are the T-pose, joint names the skeleton's, no comments; whole or not at all.
+
+    The root's OFFSET is zero, because programs differ in whether position channels replace it or are added to it; for
+    the same reason only the root has position channels, and bones that change length are refused.
+
+    Raises:
+        InvalidInput: joints of the clip change their distance, or it holds numbers that are not finite.
+    """
+    write_atomically(Path(path), format_bvh(clip, unit=unit, up=up).encode())
+
+
+def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
+    """The text of the BVH file; see `write_bvh`."""
+    if getattr(clip, "positions", None) is not None:
+        raise InvalidInput("bones of this clip change their length, which one set of OFFSETs cannot say")
+    layout = Layout(clip.skeleton, ends=getattr(clip, "ends", None), unit=unit, up=up)
+    rows = layout.rows(clip.root, continuous_euler(layout.angles(clip.rotations)))
+    return "\n".join([layout.header(str(len(rows)), clip.fps), *rows]) + "\n"
+
+
+class Layout:
+    """One skeleton as BVH: the only place that knows how a header and a row of numbers look.
+
+    Joints stand depth first in the file, whatever their order in the arrays.
+
+    Args:
+        skeleton: its offsets become the OFFSETs.
+        ends: (J, 3) End Site offsets in metres, NaN or None where a short bone on from the last one will do.
+        unit: what the lengths of the file are in.
+        up: which axis of the file points up.
+    """
+
+    def __init__(self, skeleton: Skeleton, *, ends: Array | None = None, unit: Unit = "cm", up: Up = "y") -> None:
+        self.skeleton = skeleton
+        self.up = up
+        self._scale = 1 / METRES[unit]
+        self._offsets = self._turned(skeleton.offsets * self._scale)
+        self._tips = self._turned(_tips(skeleton, ends) * self._scale)
+        self._order: list[int] = []
+        self._hierarchy = ["HIERARCHY"]
+        self._joint(0, 0)
+
+    def header(self, frames: str, fps: float) -> str:
+        """Everything before the numbers, without the end of its last line; `frames` is the count as it is to stand."""
+        return "\n".join([*self._hierarchy, "MOTION", f"Frames: {frames}", f"Frame Time: {1 / fps:.8f}"])
+
+    def angles(self, rotations: NDArray[np.floating[Any]]) -> Array:
+        """Local quaternions (T, J, 4) as Euler angles (T, J, 3) in degrees, each frame by itself: `continuous_euler`
+        makes channels without jumps of them."""
+        turns = np.asarray(rotations, np.float64)
+        if self.up == "z":
+            turns = multiply(multiply(conjugate(Z_TO_Y), turns), Z_TO_Y)
+        return to_euler(turns, "ZYX")
+
+    def rows(self, root: NDArray[np.floating[Any]], angles: Array) -> list[str]:
+        """The lines of numbers, without their ends.
+
+        Args:
+            root: (T, 3) metres, Y up.
+            angles: (T, J, 3) degrees, in the skeleton's order.
+
+        Raises:
+            InvalidInput: numbers that are not finite.
+        """
+        place = self._turned(np.asarray(root, np.float64) * self._scale)
+        values = np.concatenate([place, angles[:, self._order].reshape(len(place), -1)], axis=1)
+        if not np.isfinite(values).all():
+            raise InvalidInput("the clip holds NaN or infinite numbers", where=self.skeleton.name)
+        values = np.round(values, 6) + 0.0  # no -0
+        row = " ".join(["%.6f"] * values.shape[1])
+        return [row % tuple(numbers) for numbers in values.tolist()]
+
+    def _turned(self, vectors: Array) -> Array:
+        return rotate(conjugate(Z_TO_Y), vectors) if self.up == "z" else vectors
+
+    def _joint(self, j: int, depth: int) -> None:
+        self._order.append(j)
+        children, pad = self.skeleton.children[j], "\t" * depth
+        channels = "3 Zrotation Yrotation Xrotation"
+        if not j:
+            channels = "6 Xposition Yposition Zposition Zrotation Yrotation Xrotation"
+        self._hierarchy += [
+            f"{pad}{'JOINT' if j else 'ROOT'} {_word(self.skeleton.joint_names[j])}",
+            f"{pad}{{",
+            f"{pad}\tOFFSET {_vector(self._offsets[j] if j else np.zeros(3))}",
+            f"{pad}\tCHANNELS {channels}",
+        ]
+        for child in children:
+            self._joint(child, depth + 1)
+        if not children:
+            self._hierarchy += [f"{pad}\tEnd Site", f"{pad}\t{{"]
+            self._hierarchy += [f"{pad}\t\tOFFSET {_vector(self._tips[j])}", f"{pad}\t}}"]
+        self._hierarchy.append(f"{pad}}}")
+
+
+def _vector(v: Array) -> str:
+    return " ".join(f"{x + 0.0:.6f}" for x in np.round(v, 6))
+
+
+def _word(name: str) -> str:
+    """A joint name as one word of the file: whitespace and braces would end it."""
+    return re.sub(r"[\s{}]+", "_", name) or "_"
+
+
+def _tips(skeleton: Skeleton, ends: Array | None) -> Array:
+    """(J, 3) End Site offsets in metres: the given ones, else a short bone on from the last one (toes: forward)."""
+    offsets = np.asarray(skeleton.offsets, np.float64)
+    tips = 0.15 * normalize(offsets)
+    for toe in skeleton.feet[1::2]:
+        tips[toe] = [0.0, 0.0, 0.05]
+    return tips if ends is None else np.where(np.isfinite(ends), ends, tips)

@@ -1,0 +1,148 @@
+"""Conversion between BVH and npz, with another rate, unit or axis on the way: what `marey convert` calls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from marey.core.errors import Conflict, InvalidInput
+from marey.motion.clip import MotionClip, load_npz
+from marey.motion.feet import find_contacts
+from marey.motion.io.bvh import BvhClip, read_bvh, write_bvh
+from marey.motion.kinematics import facing, forward_kinematics
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
+from marey.motion.rigs import feet_and_facing
+from marey.motion.rotations import Array, about, multiply, rotate
+from marey.motion.skeleton import known_order, skeleton_of
+from marey.motion.units import Unit, Up
+
+KINDS = (".bvh", ".npz")
+
+
+def convert(
+    source: Path | str,
+    target: Path | str,
+    *,
+    fps: float | None = None,
+    unit: Unit = "cm",
+    up: Up = "y",
+    source_unit: Unit = "cm",
+    source_up: Up = "y",
+    overwrite: bool = False,
+) -> tuple[str, ...]:
+    """Convert a motion file; the endings of the names tell the kinds.
+
+    Args:
+        source, target: `.bvh` or `.npz`.
+        fps: rate of the result; as it is by default.
+        unit, up: of a BVH result; npz is always metres and Y up.
+        source_unit, source_up: of a BVH source.
+        overwrite: replace an existing file.
+
+    Returns:
+        What was odd about a BVH source, for a person.
+
+    Raises:
+        InvalidInput: a kind of file that is not known, or a rate out of bounds.
+        Conflict: the target is there already.
+        NotFound, InvalidFile, TooLarge: from reading.
+    """
+    source, target = Path(source), Path(target)
+    for path in (source, target):
+        if path.suffix.lower() not in KINDS:
+            raise InvalidInput(f"`{path.suffix}` is no kind of motion file", where=str(path), hint="Known: .bvh, .npz.")
+    if target.exists() and not overwrite:
+        raise Conflict("is there already", where=str(target), hint="Choose another name, or allow overwriting.")
+    if source.suffix.lower() == ".bvh":
+        clip = steady(read_bvh(source, unit=source_unit, up=source_up))
+        clip = clip if fps is None else resample_bvh(clip, fps)
+        if target.suffix.lower() == ".npz":
+            clip_from_bvh(clip, source.name).save_npz(target)
+        else:
+            write_bvh(target, clip, unit=unit, up=up)
+        return clip.notes
+    motion = load_npz(source)
+    motion = motion if fps is None else resample(motion, fps)
+    if target.suffix.lower() == ".npz":
+        motion.save_npz(target)
+    else:
+        write_bvh(target, motion, unit=unit, up=up)
+    return ()
+
+
+def resample_bvh(clip: BvhClip, fps: float) -> BvhClip:
+    """See `resample`; for clips as they come from BVH files."""
+    times = frame_times(len(clip.root), clip.fps, fps)
+    return replace(
+        clip,
+        rotations=interpolate_rotations(clip.rotations, times),
+        root=interpolate(clip.root, times),
+        positions=None if clip.positions is None else interpolate(clip.positions, times),
+        fps=fps,
+    )
+
+
+def steady(clip: BvhClip) -> BvhClip:
+    """The same motion with bones of constant length.
+
+    A root that only carries another joint (Bandai-Namco's `joint_Root` over the travelling `Hips`) is merged into it.
+    What moves below gets its mean offset, and a note says by how much the farthest joint is off then.
+    """
+    positions = clip.positions
+    if positions is None:
+        return clip
+    while len(clip.skeleton.children[0]) == 1 and len(clip.skeleton) > 2 and np.ptp(positions[:, 1], axis=0).any():
+        clip, positions = _without_root(clip, positions)
+    skeleton = clip.skeleton.with_offsets(np.concatenate([np.zeros((1, 3)), positions.mean(axis=0)[1:]]))
+    fixed = replace(clip, skeleton=skeleton, positions=None)
+    off = float(np.linalg.norm(fixed.joints() - clip.joints(), axis=-1).max())
+    if off > 1e-3:
+        note = f"bones change their length; with constant ones a joint is {1e3 * off:.0f} mm off at most"
+        fixed = replace(fixed, notes=(*clip.notes, note))
+    return fixed
+
+
+def _without_root(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
+    """Joint 1 as the new root, with the old one's rotation and place taken in."""
+    tree = clip.skeleton
+    root = clip.root + rotate(clip.rotations[:, 0], positions[:, 1])
+    rotations = clip.rotations[:, 1:].copy()
+    rotations[:, 0] = multiply(clip.rotations[:, 0], clip.rotations[:, 1])
+    positions = positions[:, 1:].copy()
+    positions[:, 0] = root
+    skeleton = skeleton_of(tree.joint_names[1:], tuple(p - 1 for p in tree.parents[1:]), tree.offsets[1:])
+    ends = clip.ends[1:]
+    merged = replace(clip, skeleton=skeleton, rotations=rotations, root=root, positions=positions, ends=ends, rest=None)
+    return merged, positions
+
+
+def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
+    """A clip of what a BVH file held: facing +Z in frame 0 and with contacts, where hips, shoulders and feet are known
+    by their names.
+
+    Args:
+        clip: with constant bone lengths (see `steady`).
+        origin: name of the file, for the manifest.
+    """
+    clip = steady(clip)
+    tree, rotations, root = clip.skeleton, clip.rotations, clip.root
+    contacts = np.zeros((len(root), 4), bool)
+    manifest = {"origin": origin, "notes": list(clip.notes)}
+    known = known_order(tree.joint_names, tree.parents)
+    if known is not None:
+        ours, order = known
+        tree, rotations = ours.with_offsets(tree.offsets[list(order)]), rotations[:, list(order)]
+    else:
+        feet, looks = feet_and_facing(tree)
+        tree = replace(tree, name="other", feet=feet, facing=looks)
+    joints = forward_kinematics(tree, rotations, root)
+    if tree.facing:
+        forward = facing(joints[0], tree)
+        turn = about("Y", -np.arctan2(forward[0], forward[2]))
+        rotations = np.concatenate([multiply(turn, rotations[:, :1]), rotations[:, 1:]], axis=1)
+        root = rotate(turn, root)
+    if tree.feet:
+        contacts = find_contacts(joints, tree, clip.fps)
+    return MotionClip.of(tree, rotations, root, contacts, clip.fps, manifest=manifest)

@@ -1,0 +1,27 @@
+"""States of live streams, and the one table of allowed transitions. The database holds it in a trigger, too."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class StreamState(StrEnum):
+    """Where a live stream stands. `ENDED` and `FAILED` are final."""
+
+    WAITING = "waiting"
+    LIVE = "live"
+    PAUSED = "paused"
+    ENDED = "ended"
+    FAILED = "failed"
+
+
+STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
+    StreamState.WAITING: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.LIVE: frozenset({StreamState.PAUSED, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.PAUSED: frozenset({StreamState.LIVE, StreamState.ENDED, StreamState.FAILED}),
+    StreamState.ENDED: frozenset(),
+    StreamState.FAILED: frozenset(),
+}
+"""Allowed transitions of streams; the trigger `stream_transition` is the same table."""
+OPEN_STREAMS = frozenset({StreamState.WAITING, StreamState.LIVE, StreamState.PAUSED})
+"""States of streams that are not over."""

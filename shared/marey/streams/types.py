@@ -1,0 +1,115 @@
+"""What goes into and comes out of the repository of live streams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import NamedTuple
+from uuid import UUID
+
+from marey.jobs.types import Problem
+from marey.streams.acts import Begun
+from marey.streams.reads import ReadAs
+from marey.streams.states import StreamState
+
+
+@dataclass(frozen=True)
+class NewStream:
+    """A live stream to begin.
+
+    Args:
+        key: the caller's API key.
+        prompt: the first.
+        bundle: the exact bundle.
+        seed: 0 … 2³¹ − 1.
+        max_frames: after which it ends by itself.
+    """
+
+    tenant: str
+    key: UUID
+    prompt: str
+    model: str
+    bundle: str
+    seed: int
+    max_frames: int
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class StreamRow:
+    """A live stream."""
+
+    id: UUID
+    tenant: str
+    name: str | None
+    prompt: str
+    model: str
+    bundle: str
+    seed: int
+    max_frames: int
+    state: StreamState
+    position: int | None
+    """How many wait before it; None when it does not wait."""
+    reason: str | None
+    problem: Problem | None
+    fence: int
+    worker: str | None
+    control: str
+    frames: int
+    """How many are on record; a second less than were shown, at most."""
+    job: UUID | None
+    """Makes its clip."""
+    created: datetime
+    started: datetime | None
+    ended: datetime | None
+
+
+class StreamPrompt(NamedTuple):
+    """A prompt of a stream as whoever watches is told of it."""
+
+    frame: int
+    """From which it was in force."""
+    prompt: str
+    read: ReadAs | None = None
+    """None where that is not on record."""
+
+
+@dataclass(frozen=True)
+class StreamPast:
+    """What a worker goes on from.
+
+    Attributes:
+        tokens: int16, little-endian, a column of V levels for each of `row.frames`.
+        prompts: every prompt with the frame from which it was in force; none before the first frame.
+        acts: the acts of all these prompts that began.
+    """
+
+    row: StreamRow
+    tokens: bytes = field(repr=False)
+    prompts: tuple[tuple[int, str], ...]
+    acts: tuple[Begun, ...]
+
+
+@dataclass(frozen=True)
+class StreamChunk:
+    """What was made since the last one.
+
+    Args:
+        first: number of its first frame.
+        frames: how many.
+        tokens: int16, little-endian, a column of V levels a frame.
+        prompts: those that came into force in it; `reads`, of as many, says how each was read.
+        control: id of the last message that was obeyed.
+        state: live or paused; None = as before.
+        acts: those that began in it.
+    """
+
+    first: int
+    frames: int
+    tokens: bytes = field(repr=False)
+    prompts: Sequence[tuple[int, str]]
+    control: str
+    state: StreamState | None = None
+    acts: Sequence[Begun] = ()
+    reads: Sequence[ReadAs] | None = None

@@ -1,0 +1,255 @@
+"""What goes by itself or for good: jobs whose days are over, prompts that are to be forgotten, their files."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+from uuid import UUID
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import insert
+
+from marey.core.errors import Conflict, InvalidFile, NotFound
+from marey.db.database import EVENT_CHANNEL, transaction
+from marey.db.deadlines import BULK, MAINTENANCE
+from marey.db.ids import new_id
+from marey.db.sql import CLOCK, notify
+from marey.evaluations import tables as evaluation_tables
+from marey.evaluations.repository import refuse_needed
+from marey.jobs import tables as job_tables
+from marey.jobs.files import asset_key
+from marey.jobs.journal import LockedJob, NewEvent, lock_job_of, record
+from marey.jobs.states import ENDED
+from marey.jobs.submit import TEXTS_LOCK
+from marey.jobs.types import NO_TEXT
+from marey.takes.gc import ObjectStore, remove_unused_assets
+from marey.takes.types import Erasure
+
+ROUND = 200
+"""Jobs or files of one round."""
+KEPT = (
+    *("model", "bundle", "weights_sha256", "random_weights", "licence", "seed", "settings", "software"),
+    *("feet_cleaned", "stream"),
+)
+"""What a manifest says besides its prompt. All else goes: what is added later is gone until it is named here."""
+
+LATE = sa.text("""
+    SELECT id, tenant_id FROM job
+    WHERE keep_days IS NOT NULL AND finished_at + make_interval(days => keep_days) < clock_timestamp()
+      AND (CAST(:job AS uuid) IS NULL OR id = :job)
+    ORDER BY id LIMIT :limit
+""")
+
+FORGET = (
+    """
+    UPDATE item SET prompt = '', text_key = '', reason = split_part(reason, ':', 1),
+        problem = CASE WHEN problem IS NULL THEN NULL ELSE jsonb_build_object(
+            'type', problem -> 'type', 'message', 'erased with the prompt', 'where', NULL, 'hint', NULL) END
+    WHERE job_id = :job
+    """,
+    """
+    UPDATE motion SET metadata = coalesce(
+        (SELECT jsonb_object_agg(key, value) FROM jsonb_each(metadata) WHERE key = ANY(:kept)), '{}')
+    WHERE job_id = :job
+    """,
+    """
+    UPDATE job_event SET reason = 'erased with the prompt', data = data - 'problem'
+    WHERE job_id = :job AND data ? 'problem'
+    """,
+    "UPDATE motion_file SET erasing = true FROM motion "
+    "WHERE motion.id = motion_file.motion_id AND motion.job_id = :job AND motion_file.format = 'npz'",
+    "UPDATE stream_chunk SET prompts = '[]', reads = NULL FROM stream "
+    "WHERE stream.id = stream_chunk.stream_id AND stream.job_id = :job",
+    "UPDATE stream SET prompt = '' WHERE job_id = :job",
+    "DELETE FROM idempotency WHERE job_id = :job",
+    "UPDATE job SET erased_at = clock_timestamp() WHERE id = :job",
+)
+"""Everything of the database that holds words of a prompt, or a hash by which they could be guessed."""
+
+FORGET_TEXTS = sa.text("""
+    DELETE FROM text_features
+    WHERE key = ANY(:keys) AND NOT EXISTS (SELECT FROM item WHERE item.text_key = text_features.key)
+""")
+
+
+class FileStore(ObjectStore, Protocol):
+    """What rewriting files needs of an asset store (`marey.storage.AssetStore` fits)."""
+
+    def get(self, key: str) -> bytes: ...
+    def put(self, key: str, source: bytes) -> object: ...
+
+
+def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
+    """Remove a job that has ended, with its items, events and motions; their files go at the next garbage collection.
+
+    Raises:
+        NotFound: the tenant has no such job.
+        Conflict: the job has open items, or works for an evaluation that is not over; cancel it first.
+    """
+    refuse_needed(conn, tenant, job)
+    locked = lock_job_of(conn, tenant, job)
+    if locked.state not in ENDED:
+        raise Conflict(
+            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
+        )
+    conn.execute(sa.delete(job_tables.job).where(job_tables.job.c.id == job))
+    notify(conn, EVENT_CHANNEL, [str(job)])
+
+
+def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
+    """Delete jobs whose days are over, with motions and files; how many. One that an evaluation works with waits.
+
+    Raises:
+        Unreachable: the store or the database does not answer.
+    """
+    with transaction(engine, MAINTENANCE) as conn:
+        late = conn.execute(LATE, {"job": None, "limit": ROUND}).all()
+    deleted = 0
+    for job, tenant in late:
+        try:
+            with transaction(engine, BULK) as conn:
+                refuse_needed(conn, tenant, job)
+                lock_job_of(conn, tenant, job)
+                if conn.execute(LATE, {"job": job, "limit": 1}).one_or_none() is not None:  # not gone on meanwhile
+                    delete(conn, tenant, job)
+                    deleted += 1
+        except (Conflict, NotFound):
+            continue
+    if deleted:
+        remove_unused_assets(engine, store)
+    return deleted
+
+
+def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
+    """Forget the prompts of a job that has ended: prompts, their rewritten forms, graphs and features, at once; the npz
+    files, whose manifests hold them, are given to nobody any more and written anew by `rewrite_files`.
+
+    Names, tags, verdicts, motions and every other file stay. Erased already: no change.
+
+    Raises:
+        NotFound: the tenant has no such job.
+        Conflict: it has open items, or an evaluation made it, whose prompts and report stand elsewhere.
+    """
+    _refuse_evaluations(conn, tenant, job)
+    locked = lock_job_of(conn, tenant, job)
+    if locked.state not in ENDED:
+        raise Conflict(
+            f"the job is {locked.state}", where=f"job {job}", hint=f"Cancel it first: `marey jobs cancel {job}`."
+        )
+    if not locked.erased:
+        _forget(conn, locked, by)
+    table = job_tables.job.c
+    erased = conn.execute(sa.select(table.erased_at).where(table.id == job)).scalar_one()
+    return Erasure(job, erased, _files_left(conn, job))
+
+
+def rewrite_files(engine: sa.Engine, store: FileStore, scrub: Callable[[bytes], bytes]) -> int:
+    """Write the files of erased jobs anew, and remove the old ones; how many.
+
+    Args:
+        scrub: a file's bytes without its prompt; a file that it cannot read (`InvalidFile`) is removed.
+
+    Raises:
+        Unreachable: the store or the database does not answer; what was not done is done the next time.
+    """
+    with transaction(engine, MAINTENANCE) as conn:
+        waiting = _waiting(conn)
+    done = sum(_rewrite(engine, store, file, scrub) for file in waiting)
+    if waiting:
+        remove_unused_assets(engine, store)
+    return done
+
+
+@dataclass(frozen=True)
+class _File:
+    motion: UUID
+    format: str
+    asset: UUID
+    tenant: str
+    sha256: str
+    media_type: str
+
+
+def _refuse_evaluations(conn: sa.Connection, tenant: str, job: UUID) -> None:
+    refuse_needed(conn, tenant, job)
+    table = evaluation_tables.evaluation.c
+    ours = (table.tenant_id == tenant) & ((table.generate_job_id == job) | (table.score_job_id == job))
+    evaluation = conn.execute(sa.select(table.id).where(ours).limit(1)).scalar_one_or_none()
+    if evaluation is not None:
+        raise Conflict(
+            f"evaluation {evaluation} made it, and its report holds the prompts too",
+            where=f"job {job}",
+            hint="Prompts of evaluations cannot be erased by job.",
+        )
+
+
+def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
+    item = job_tables.item.c
+    used = sa.select(item.text_key).where(item.job_id == job.id, item.text_key != NO_TEXT).distinct()
+    keys: Sequence[str] = conn.execute(used).scalars().all()
+    for statement in FORGET:
+        values = {"job": job.id} | ({"kept": list(KEPT)} if ":kept" in statement else {})
+        conn.execute(sa.text(statement), values)
+    # Whoever is submitting just now may have seen these features and counts on them: wait for it, and look then.
+    conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
+    conn.execute(FORGET_TEXTS, {"keys": list(keys)})
+    record(conn, job, [NewEvent("erased", f"prompts erased by {by}")])
+
+
+def _files_left(conn: sa.Connection, job: UUID) -> int:
+    file, motion = job_tables.motion_file.c, job_tables.motion.c
+    query = (
+        sa.select(sa.func.count())
+        .select_from(job_tables.motion_file)
+        .join(job_tables.motion, motion.id == file.motion_id)
+    )
+    return conn.execute(query.where(motion.job_id == job, file.erasing)).scalar_one()
+
+
+def _waiting(conn: sa.Connection) -> list[_File]:
+    file, asset = job_tables.motion_file.c, job_tables.asset.c
+    query = (
+        sa.select(file.motion_id, file.format, asset.id, asset.tenant_id, asset.sha256, asset.media_type)
+        .join(job_tables.asset, asset.id == file.asset_id)
+        .where(file.erasing)
+        .order_by(file.motion_id)
+        .limit(ROUND)
+    )
+    return [_File(*row) for row in conn.execute(query)]
+
+
+def _rewrite(engine: sa.Engine, store: FileStore, file: _File, scrub: Callable[[bytes], bytes]) -> bool:
+    """Whether it is done; not, where the collector came between: then the next round does it again."""
+    try:
+        data = scrub(store.get(asset_key(file.tenant, file.sha256)))
+    except (InvalidFile, NotFound):
+        with transaction(engine, MAINTENANCE) as conn:
+            conn.execute(sa.delete(job_tables.motion_file).where(_row_of(file)))
+        return True
+    sha256 = hashlib.sha256(data).hexdigest()
+    values = {"tenant_id": file.tenant, "sha256": sha256, "size": len(data), "media_type": file.media_type}
+    with transaction(engine, MAINTENANCE) as conn:
+        announced = insert(job_tables.asset).values(id=new_id(), state="writing", announced_at=CLOCK, **values)
+        conn.execute(
+            announced.on_conflict_do_update(index_elements=["tenant_id", "sha256"], set_={"announced_at": CLOCK})
+        )
+    store.put(asset_key(file.tenant, sha256), data)
+    table = job_tables.asset.c
+    with transaction(engine, MAINTENANCE) as conn:
+        ours = conn.execute(
+            sa.update(job_tables.asset)
+            .where(table.tenant_id == file.tenant, table.sha256 == sha256)
+            .values(state="stored")
+            .returning(table.id)
+        ).scalar_one_or_none()
+        if ours is None:
+            return False
+        conn.execute(sa.update(job_tables.motion_file).where(_row_of(file)).values(asset_id=ours, erasing=False))
+    return True
+
+
+def _row_of(file: _File) -> sa.ColumnElement[bool]:
+    table = job_tables.motion_file.c
+    return (table.motion_id == file.motion) & (table.format == file.format) & (table.asset_id == file.asset)

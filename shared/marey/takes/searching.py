@@ -1,0 +1,134 @@
+"""Search among a million motions: two ways of finding a page, neither of which the planner may choose for itself.
+
+`motion_search` holds a row of each motion, and its `terms` all that a filter names. A page is looked for
+
+1. newest first, among the `WALKED` motions that come next: a filter that much fits is satisfied at once;
+2. through the index of terms, which intersects all conditions of the filter and answers what fits, however old; those
+   rows alone are sorted. What comes here is either rare, or older than all that was walked.
+
+The cost is bounded by the walk plus the rows that fit, never by the rows that there are. Without statistics (after a
+bulk load), or with those of another day, the planner would walk the primary key or read the whole table instead: so
+each statement runs with settings that leave it one plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import TSQUERY
+
+from marey.db.pages import Order
+from marey.db.sql import check_text
+from marey.jobs import tables
+from marey.takes.types import MotionFilter
+
+WALKED = 20_000
+"""Motions that are looked at in order before the index is asked: some 10 ms."""
+UNREVIEWED = "new"
+VARIANTS = 1000
+"""Motions of one prompt that are looked at, by its index."""
+
+_PLAIN = {"jit": "off", "max_parallel_workers_per_gather": "0", "work_mem": "32MB"}
+_SWITCHES = ("seqscan", "indexscan", "indexonlyscan", "bitmapscan", "sort", "hashjoin", "mergejoin")
+_WALK = ("indexscan",)
+_LOOK_UP = ("bitmapscan", "sort")
+_FETCH = ("indexscan", "indexonlyscan", "bitmapscan", "sort")
+
+
+def find_motions(
+    conn: sa.Connection, tenant: str, found: MotionFilter, *, job: UUID | None, cursor: str | None, limit: int
+) -> list[UUID]:
+    """Ids of the motions that a filter finds: of a job in the order they were made; of the whole tenant newest first.
+
+    Raises:
+        InvalidInput: a filter that holds what no text can, or a cursor of something else.
+    """
+    table = tables.motion_search.c
+    order = Order(table.created_at, table.motion_id, descending=job is None)
+    ours = table.tenant_id == tenant if job is None else table.job_id == job
+    place = None if cursor is None else order.place(cursor, ours)
+    walk = sa.select(table.motion_id, table.terms).where(ours).order_by(*order.by())
+    if place is not None:
+        walk = walk.where(order.beyond(place))
+    if not _conditions(found, table.terms):
+        with _plan(conn, _WALK):
+            return list(conn.execute(walk.with_only_columns(table.motion_id).limit(limit)).scalars())
+    recent = walk.limit(WALKED).subquery("recent")
+    query = sa.select(recent.c.motion_id).where(*_conditions(found, recent.c.terms)).limit(limit)
+    with _plan(conn, _WALK):
+        ids = list(conn.execute(query).scalars())
+    if len(ids) == limit:
+        return ids
+    scope = _lexeme("t", tenant) if job is None else _lexeme("j", str(job))
+    matches = (
+        sa.select(table.motion_id, table.created_at)
+        .where(_has(table.terms, scope), *_conditions(found, table.terms))
+        .offset(0)  # a fence: neither the order nor the page's condition gets into it
+        .subquery("matches")
+    )
+    order = Order(matches.c.created_at, matches.c.motion_id, descending=job is None)
+    query = sa.select(matches.c.motion_id).order_by(*order.by()).limit(limit)
+    if place is not None:
+        query = query.where(order.beyond(place))
+    with _plan(conn, _LOOK_UP):
+        return list(conn.execute(query).scalars())
+
+
+def motions_at(conn: sa.Connection, job: UUID, index: int) -> list[UUID]:
+    """Ids of the motions of one prompt of a job, by the prompt's index; more than one where it has variants."""
+    table = tables.motion_search.c
+    terms = (_lexeme("j", str(job)), _lexeme("x", str(index)))
+    with _plan(conn, _LOOK_UP):
+        query = sa.select(table.motion_id).where(*(_has(table.terms, term) for term in terms))
+        return list(conn.execute(query.limit(VARIANTS)).scalars())
+
+
+@contextmanager
+def fetching_by_id(conn: sa.Connection) -> Generator[None]:
+    """Let statements that name some ids go by index alone, whatever the statistics say."""
+    with _plan(conn, _FETCH):
+        yield
+
+
+@contextmanager
+def _plan(conn: sa.Connection, allowed: Sequence[str]) -> Generator[None]:
+    """Leave the planner these ways alone, until the end of the block."""
+    wanted = {**_PLAIN, **{f"enable_{name}": "on" if name in allowed else "off" for name in _SWITCHES}}
+    conn.exec_driver_sql("; ".join(f"SET LOCAL {name} = '{value}'" for name, value in wanted.items()))
+    yield  # after an error the transaction is over, and with it the settings
+    conn.exec_driver_sql("; ".join(f"SET LOCAL {name} TO DEFAULT" for name in wanted))
+
+
+def _conditions(found: MotionFilter, terms: sa.ColumnElement[Any]) -> list[sa.ColumnElement[bool]]:
+    """The conditions of a filter, each one for itself: the index goes through them hand in hand."""
+    for where, text in (("name", found.name), ("text", found.text), *(("tag", tag) for tag in found.tags)):
+        check_text(text, where)
+    wanted = [_has(terms, _lexeme("g", tag)) for tag in found.tags]
+    if found.name is not None:
+        begins = sa.literal("'\x01n").concat(sa.func.lower(_escaped(found.name))).concat("':*")
+        wanted.append(_has(terms, begins))
+    if found.text is not None:
+        asked = sa.func.websearch_to_tsquery(sa.literal_column("'english'::regconfig"), found.text)
+        wanted.append(terms.bool_op("@@")(asked))
+    said = [*map(str, found.reviews), *([UNREVIEWED] if found.unreviewed else [])]
+    if said:
+        wanted.append(_has(terms, sa.literal(" | ".join(f"'\x01r{_escaped(each)}'" for each in said))))
+    return wanted
+
+
+def _lexeme(kind: str, value: str) -> sa.ColumnElement[str]:
+    """A term of `tables.motion_search` as a query."""
+    return sa.literal(f"'\x01{kind}{_escaped(value)}'")
+
+
+def _escaped(text: str) -> str:
+    """The text as it stands between the quotes of a tsquery."""
+    return text.replace("\\", "\\\\").replace("'", "''")
+
+
+def _has(terms: sa.ColumnElement[Any], query: sa.ColumnElement[str]) -> sa.ColumnElement[bool]:
+    return terms.bool_op("@@")(sa.cast(query, TSQUERY))

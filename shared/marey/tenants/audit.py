@@ -1,0 +1,75 @@
+"""The audit log: who did what from which key, when. Written in the transaction of what it tells; holds no prompts."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+import sqlalchemy as sa
+
+from marey.db.ids import new_id
+from marey.db.pages import Order, Page, cut_page, mark_of, page_limit
+from marey.db.sql import CLOCK
+from marey.tenants import tables
+from marey.tenants.types import Actor, AuditRow
+
+
+def audit(conn: sa.Connection, tenant: str, actor: Actor, verb: str, target: object, **data: object) -> None:
+    """Note that somebody did something.
+
+    Args:
+        verb: noun and verb: "job.cancel".
+        target: identifier of what it was done to.
+        data: what tells it apart (a count, a priority); never a prompt, never a secret.
+    """
+    conn.execute(
+        sa.insert(tables.audit_event).values(
+            id=new_id(),
+            at=CLOCK,
+            tenant_id=tenant,
+            key_id=actor.key,
+            actor=actor.name,
+            verb=verb,
+            target=str(target),
+            data={name: value for name, value in data.items() if value is not None},
+        )
+    )
+
+
+def list_audit(
+    conn: sa.Connection,
+    *,
+    tenant: str | None = None,
+    key: UUID | None = None,
+    verb: str | None = None,
+    since: datetime | None = None,
+    cursor: str | None = None,
+    limit: int = 50,
+) -> Page[AuditRow]:
+    """What was done, newest first; by one key, of one kind, in one tenant, if they are given.
+
+    Args:
+        verb: "job.cancel", or a noun: "job".
+    """
+    table = tables.audit_event.c
+    ours = sa.true() if tenant is None else table.tenant_id == tenant
+    query, order = _rows().where(ours), Order(table.at, table.id)
+    if key is not None:
+        query = query.where(table.key_id == key)
+    if verb is not None:
+        query = query.where((table.verb == verb) | table.verb.startswith(f"{verb}.", autoescape=True))
+    if since is not None:
+        query = query.where(table.at >= since)
+    if cursor is not None:
+        query = query.where(order.after(cursor, ours))
+    rows = conn.execute(query.order_by(*order.by()).limit(page_limit(limit) + 1)).mappings().all()
+    return cut_page([AuditRow(**row) for row in rows], limit, lambda row: mark_of(row.at, row.id))
+
+
+def _rows() -> sa.Select[*tuple[Any, ...]]:
+    table = tables.audit_event.c
+    return sa.select(
+        *(table.id, table.at, table.tenant_id.label("tenant"), table.key_id.label("key")),
+        *(table.actor, table.verb, table.target, table.data),
+    )

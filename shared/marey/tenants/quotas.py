@@ -1,0 +1,172 @@
+"""What a tenant uses of its quotas, and whether there is room for more.
+
+No counter is kept for this, so none can drift: queued and running items are those of the counters on the tenant's open
+jobs, which change in the transactions of the items themselves; bytes are summed over the rows of the files. Who needs
+room takes the lock of the tenant's row, counts, and commits what it takes: two at once count one after the other.
+Tenants without quotas pay nothing of that.
+"""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+
+from marey.core.errors import QuotaUsedUp
+from marey.tenants import tables
+from marey.tenants.repository import get_tenant
+from marey.tenants.types import Room, Usage
+
+EXPECTED_BYTES = 512 * 2**10
+"""Of a motion's files where the tenant has none yet: five seconds as npz and BVH."""
+MEASURED = 200  # newest motions that say what the next will take
+QUEUE_SECONDS, BYTES_SECONDS = 30, 3600
+"""When to ask again: the queue moves by itself, files go when somebody deletes them."""
+
+OPEN_ITEMS = sa.text("""
+    SELECT coalesce(sum(ready + leased), 0)::bigint AS queued, coalesce(sum(leased), 0)::bigint AS running
+    FROM job WHERE tenant_id = :tenant AND finished_at IS NULL
+""")
+
+OPEN_STREAMS = sa.text("SELECT count(*) FROM stream WHERE tenant_id = :tenant AND ended_at IS NULL")
+
+STORED = sa.text("SELECT coalesce(sum(size), 0)::bigint FROM asset WHERE tenant_id = :tenant AND state = 'stored'")
+
+OF_A_MOTION = sa.text("""
+    SELECT avg(bytes) FROM (
+        SELECT sum(asset.size) AS bytes
+        FROM (SELECT id FROM motion WHERE tenant_id = :tenant ORDER BY id DESC LIMIT :measured) AS newest
+             JOIN motion_file ON motion_file.motion_id = newest.id JOIN asset ON asset.id = motion_file.asset_id
+        GROUP BY newest.id
+    ) AS motions
+""")
+
+
+def usage(conn: sa.Connection, tenant: str) -> Usage:
+    """What a tenant has now."""
+    queued, running = _open_items(conn, tenant)
+    return Usage(
+        queued=queued,
+        running=running,
+        bytes=_stored(conn, tenant),
+        expected=queued * bytes_of_a_motion(conn, tenant),
+        streams=conn.execute(OPEN_STREAMS, {"tenant": tenant}).scalar_one(),
+    )
+
+
+def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
+    """Nothing, if a tenant's queue has room for so many more items now. Bytes, which cost a sum over the files, are not
+    looked at, and others may take of the same room.
+
+    Raises:
+        QuotaUsedUp: it has not.
+        NotFound: there is no such tenant.
+    """
+    quotas = get_tenant(conn, tenant).quotas
+    if quotas.queued is not None:
+        _refuse_beyond(tenant, _in_queue(quotas.queued, _open_items(conn, tenant)[0], items))
+
+
+def check_room(conn: sa.Connection, tenant: str, items: int) -> tuple[Room, ...]:
+    """What so many more items would take of each quota that a tenant has; others may take of the same room.
+
+    Raises:
+        QuotaUsedUp: one has no room for them.
+        NotFound: there is no such tenant.
+    """
+    quotas = get_tenant(conn, tenant).quotas
+    if quotas.queued is None and quotas.bytes is None:
+        return ()
+    queued, _ = _open_items(conn, tenant)
+    rooms: list[Room] = []
+    if quotas.queued is not None:
+        rooms.append(_in_queue(quotas.queued, queued, items))
+        _refuse_beyond(tenant, rooms[-1])
+    if quotas.bytes is not None:
+        each = bytes_of_a_motion(conn, tenant)
+        rooms.append(Room("bytes", quotas.bytes, _stored(conn, tenant), queued * each, items * each))
+        _refuse_beyond(tenant, rooms[-1])
+    return tuple(rooms)
+
+
+def take_room(conn: sa.Connection, tenant: str, items: int) -> None:
+    """`check_room`, and nobody else takes of the same room until the transaction ends.
+
+    Raises:
+        QuotaUsedUp, NotFound: as it.
+    """
+    quotas = get_tenant(conn, tenant).quotas
+    if quotas.queued is None and quotas.bytes is None:
+        return
+    _lock(conn, tenant)
+    check_room(conn, tenant, items)
+
+
+def room_to_run(conn: sa.Connection, tenant: str, wanted: int) -> int:
+    """How many of `wanted` items a tenant may run beside those it runs; its row stays locked."""
+    _lock(conn, tenant)
+    limit = get_tenant(conn, tenant).quotas.running
+    if limit is None:
+        return wanted
+    _, running = _open_items(conn, tenant)
+    return min(wanted, max(limit - running, 0))
+
+
+def bytes_of_a_motion(conn: sa.Connection, tenant: str) -> int:
+    """What the files of its next motion will likely take: the mean of the newest."""
+    mean = conn.execute(OF_A_MOTION, {"tenant": tenant, "measured": MEASURED}).scalar_one()
+    return EXPECTED_BYTES if mean is None else round(mean)
+
+
+def _lock(conn: sa.Connection, tenant: str) -> None:
+    """NO KEY: rows that refer to the tenant may be inserted by others meanwhile."""
+    conn.execute(sa.select(tables.tenant.c.id).where(tables.tenant.c.id == tenant).with_for_update(key_share=True))
+
+
+def _open_items(conn: sa.Connection, tenant: str) -> tuple[int, int]:
+    """Queued, and of these running."""
+    row = conn.execute(OPEN_ITEMS, {"tenant": tenant}).one()
+    return row.queued, row.running
+
+
+def _stored(conn: sa.Connection, tenant: str) -> int:
+    return conn.execute(STORED, {"tenant": tenant}).scalar_one()
+
+
+def _in_queue(limit: int, queued: int, asked: int) -> Room:
+    return Room("queued", limit, queued, 0, asked)
+
+
+def _refuse_beyond(tenant: str, room: Room) -> None:
+    if room.asked <= room.limit - room.used:
+        return
+    message, hint, seconds = (_queue_full if room.quota == "queued" else _store_full)(room)
+    raise QuotaUsedUp(
+        message,
+        where=f"tenant {tenant}",
+        hint=hint,
+        seconds=seconds,
+        quota=room.quota,
+        limit=room.limit,
+        used=room.used,
+        asked=room.asked,
+    )
+
+
+def _queue_full(room: Room) -> tuple[str, str, int]:
+    """What is said, what to do, and when to ask again."""
+    return (
+        f"{room.asked} items are more than the quota of queued items has room for: "
+        f"{room.used} of {room.limit} are queued, {room.left} are left",
+        "Ask again when some are done."
+        if room.asked <= room.limit
+        else "Submit it as several jobs, one after the other.",
+        QUEUE_SECONDS,
+    )
+
+
+def _store_full(room: Room) -> tuple[str, str, int]:
+    return (
+        f"some {room.asked} bytes are more than the quota of stored bytes has room for: {room.stands} of {room.limit} "
+        f"are stored, {room.expected} expected of what is queued, {room.left} are left",
+        "Delete jobs whose motions are fetched; the operator's next `marey admin gc` frees their bytes.",
+        BYTES_SECONDS,
+    )

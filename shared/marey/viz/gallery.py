@@ -1,0 +1,101 @@
+"""The gallery: one HTML file with many motions as small 3D players, to say of each whether to keep it.
+
+As in the player everything is inside, every text is escaped, and the page may fetch nothing. It changes nothing by
+itself: it shows the commands that do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from marey.core.errors import InvalidInput
+from marey.motion.clip import MotionClip
+from marey.motion.files import write_atomically
+from marey.viz.pages import asset, fill, script_json, whole_page
+from marey.viz.paper import one_line
+from marey.viz.player import motion_document
+
+MOST_CARDS = 400
+"""Motions of a page: a clip of 10 s takes 50 kB."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A motion with what is told of it.
+
+    Args:
+        id: what the commands name it by.
+        facts: one line: number, name, seed, length.
+        said: what was thought of it before; empty = nothing.
+    """
+
+    id: str
+    clip: MotionClip
+    prompt: str
+    facts: str
+    tags: Sequence[str] = ()
+    said: str = ""
+
+
+def html_gallery(
+    cards: Sequence[Card],
+    path: str | Path,
+    *,
+    title: str,
+    count: str = "",
+    earlier: str | None = None,
+    later: str | None = None,
+) -> Path:
+    """Write a page of motions.
+
+    Args:
+        path: the `.html` to write.
+        count: which of how many these are.
+        earlier, later: names of the pages beside it.
+
+    Returns:
+        The path written.
+
+    Raises:
+        InvalidInput: no motion, more than `MOST_CARDS`, or a path that is not a writable HTML file.
+    """
+    path = Path(path)
+    if not 1 <= len(cards) <= MOST_CARDS:
+        raise InvalidInput(f"{len(cards)} motions; a page takes 1 to {MOST_CARDS}")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InvalidInput(f"a gallery is an .html, not {path.suffix or 'a name without ending'}", where=str(path))
+    document = {
+        "title": one_line(title),
+        "count": count,
+        "earlier": None if earlier is None else f"./{quote(earlier)}",
+        "later": None if later is None else f"./{quote(later)}",
+        "cards": [
+            {
+                "id": card.id,
+                "prompt": one_line(card.prompt),
+                "facts": one_line(card.facts),
+                "tags": [one_line(tag) for tag in card.tags],
+                "said": one_line(card.said),
+            }
+            for card in cards
+        ],
+    }
+    body = fill(
+        asset("gallery.html"),
+        {
+            "%CARDS%": script_json(document),
+            "%MOTION%": script_json(motion_document([card.clip for card in cards], [""] * len(cards))),
+            "%LICENCE%": asset("three.LICENSE.txt"),
+            "%THREE%": asset("three.min.js"),
+            "%SCENE%": asset("scene.js"),
+            "%CLIP%": asset("clip.js"),
+            "%GALLERY%": asset("gallery.js"),
+            "%PLAYERS%": asset("small_players.js"),
+        },
+    )
+    styles = (asset("small_players.css"), asset("gallery.css"))
+    write_atomically(path, whole_page(body, title=f"{one_line(title)} · Marey", styles=styles).encode())
+    return path

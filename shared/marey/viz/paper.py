@@ -1,0 +1,128 @@
+"""Paper and ink of the drawings: colours, type, wrapped lines."""
+
+from __future__ import annotations
+
+import bisect
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Literal
+
+from PIL import Image, ImageDraw, ImageFont
+
+from marey.core.errors import InvalidInput
+from marey.viz.body import Part
+
+Colour = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours of a sheet, sRGB. Blue and orange stay apart for the colour-blind."""
+
+    paper: Colour
+    ink: Colour
+    muted: Colour
+    line: Colour
+    floor: Colour
+    shadow: Colour
+    parts: Mapping[Part, Colour] = field(
+        default_factory=lambda: {
+            "left": (56, 134, 214),
+            "right": (236, 122, 48),
+            "middle": (206, 200, 190),
+            "face": (150, 143, 133),
+        }
+    )
+
+
+THEMES = {
+    "light": Theme(
+        paper=(250, 249, 246),
+        ink=(27, 30, 35),
+        muted=(118, 122, 129),
+        line=(214, 210, 201),
+        floor=(239, 236, 230),
+        shadow=(92, 84, 74),
+    ),
+    "dark": Theme(
+        paper=(20, 22, 26),
+        ink=(238, 236, 231),
+        muted=(146, 150, 158),
+        line=(58, 62, 70),
+        floor=(31, 34, 40),
+        shadow=(4, 5, 7),
+    ),
+}
+
+
+def theme_named(name: str) -> Theme:
+    """A theme by name.
+
+    Raises:
+        InvalidInput: there is none of that name.
+    """
+    if name not in THEMES:
+        raise InvalidInput(f"there is no theme {name!r}", hint=f"One of: {', '.join(THEMES)}.")
+    return THEMES[name]
+
+
+def blend(under: Colour, over: Colour, share: float) -> Colour:
+    """`share` of one colour over another."""
+    r, g, b = (round(u + (o - u) * share) for u, o in zip(under, over, strict=True))
+    return r, g, b
+
+
+def one_line(text: str) -> str:
+    """Any text as one printable line: line breaks and control characters become spaces."""
+    return " ".join("".join(" " if unicodedata.category(c).startswith(("C", "Z")) else c for c in text).split())
+
+
+@lru_cache(maxsize=32)
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)  # Aileron, part of Pillow: the same sheet on every machine
+
+
+@dataclass(frozen=True)
+class Paper:
+    """An image one writes on."""
+
+    image: Image.Image
+    theme: Theme
+
+    def text(
+        self,
+        at: tuple[float, float],
+        text: str,
+        size: int,
+        colour: Colour,
+        align: Literal["left", "centre", "right"] = "left",
+    ) -> None:
+        """One line; `at` is the left end, centre or right end of its top."""
+        anchor = {"left": "la", "centre": "ma", "right": "ra"}[align]
+        ImageDraw.Draw(self.image).text(at, text, fill=colour, font=_font(size), anchor=anchor)
+
+    def length(self, text: str, size: int) -> float:
+        """Width of a line, pixels."""
+        return ImageDraw.Draw(self.image).textlength(text, font=_font(size))
+
+    def wrap(self, text: str, size: int, width: float, *, lines: int) -> list[str]:
+        """Break at words into at most `lines` lines; what does not fit ends in an ellipsis."""
+        words, broken = one_line(text).split(), list[str]()
+        while words and len(broken) < lines:
+            line = words.pop(0)
+            while words and self.length(f"{line} {words[0]}", size) <= width:
+                line += " " + words.pop(0)
+            broken.append(line)
+        if words and broken:
+            broken[-1] += "…"
+        return [self._shorten(line, size, width) for line in broken] or [""]
+
+    def _shorten(self, line: str, size: int, width: float) -> str:
+        if self.length(line, size) <= width:
+            return line
+        line = line.rstrip("…")
+        # The longest beginning that fits, by halving: a prompt may be one word of thousands of letters.
+        fits = bisect.bisect_right(range(len(line)), width, key=lambda n: self.length(line[:n] + "…", size)) - 1
+        return line[: max(fits, 0)].rstrip() + "…"

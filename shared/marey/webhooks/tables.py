@@ -1,0 +1,85 @@
+"""Tables of webhooks: who wants to be told, what there is to tell (the outbox), and how telling went.
+
+Who writes an event holds the lock of the row that it is about, and takes webhook rows (KEY SHARE) after it; nobody
+goes from a webhook to such a row.
+"""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from sqlalchemy.dialects.postgresql import ARRAY, BYTEA, JSONB
+
+from marey.db.tables import NOW, Id, Time, metadata, short_id
+
+webhook = sa.Table(
+    "webhook",
+    metadata,
+    sa.Column("id", Id, primary_key=True),
+    sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
+    sa.Column("name", sa.Text),
+    sa.Column("url", sa.Text, nullable=False),
+    sa.Column("events", ARRAY(sa.Text), nullable=False),
+    sa.Column("secret", BYTEA, nullable=False),  # encrypted: `marey.webhooks.vault`
+    sa.Column("previous_secret", BYTEA),  # signs beside it until then
+    sa.Column("previous_until", Time),
+    sa.Column("paused", sa.Boolean, nullable=False, server_default=sa.false()),
+    sa.Column("created_at", Time, nullable=False, server_default=NOW),
+    sa.CheckConstraint("cardinality(events) > 0", name="events"),
+    sa.CheckConstraint("(previous_secret IS NULL) = (previous_until IS NULL)", name="previous"),
+    sa.Index("ix_webhook_tenant_id_id", "tenant_id", "id"),
+    sa.Index("ix_webhook_created", "tenant_id", "created_at", "id"),
+    sa.Index("ix_webhook_short_id", "tenant_id", short_id()),
+)
+
+# One row an event, however many webhooks want it; none where nobody does.
+webhook_event = sa.Table(
+    "webhook_event",
+    metadata,
+    sa.Column("id", Id, primary_key=True),  # what receivers know the message by, in every try
+    sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
+    sa.Column("kind", sa.Text, nullable=False),
+    sa.Column("data", JSONB, nullable=False),
+    sa.Column("at", Time, nullable=False),
+    sa.Index("ix_webhook_event_at", "at"),
+)
+
+webhook_delivery = sa.Table(
+    "webhook_delivery",
+    metadata,
+    sa.Column("webhook_id", Id, sa.ForeignKey("webhook.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("event_id", Id, sa.ForeignKey("webhook_event.id", ondelete="CASCADE"), primary_key=True),
+    sa.Column("state", sa.Text, nullable=False, server_default="pending"),
+    sa.Column("tries", sa.Integer, nullable=False, server_default="0"),  # since it was written, or replayed
+    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  # in all
+    sa.Column("next_at", Time),  # when it is tried; while it is claimed, when it counts as abandoned
+    sa.Column("claim", Id),  # fences the record of a try
+    sa.Column("ended_at", Time),
+    sa.Column("created_at", Time, nullable=False, server_default=NOW),
+    sa.CheckConstraint("state IN ('pending', 'delivered', 'failed')", name="state"),
+    sa.CheckConstraint("(state = 'pending') = (next_at IS NOT NULL)", name="next"),
+    sa.CheckConstraint("(state = 'pending') = (ended_at IS NULL)", name="ended"),
+    sa.CheckConstraint("claim IS NULL OR state = 'pending'", name="claim"),
+    sa.CheckConstraint("0 <= tries AND tries <= attempts", name="tries"),
+    sa.Index("ix_webhook_delivery_due", "webhook_id", "next_at", postgresql_where=sa.text("state = 'pending'")),
+    sa.Index("ix_webhook_delivery_event_id", "event_id"),
+    sa.Index("ix_webhook_delivery_created", "webhook_id", "created_at", "event_id"),
+    sa.Index("ix_webhook_delivery_short_id", "webhook_id", short_id("event_id")),
+)
+
+webhook_attempt = sa.Table(
+    "webhook_attempt",
+    metadata,
+    sa.Column("webhook_id", Id, primary_key=True),
+    sa.Column("event_id", Id, primary_key=True),
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("at", Time, nullable=False),  # its end
+    sa.Column("status", sa.Integer),  # of the answer; null = there was none
+    sa.Column("seconds", sa.Double, nullable=False),
+    sa.Column("error", sa.Text),  # null = delivered
+    sa.ForeignKeyConstraint(
+        ["webhook_id", "event_id"],
+        ["webhook_delivery.webhook_id", "webhook_delivery.event_id"],
+        name="fk_webhook_attempt_delivery",
+        ondelete="CASCADE",
+    ),
+)

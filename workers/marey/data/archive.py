@@ -1,0 +1,77 @@
+"""Read BVH files out of a `.tar.xz` archive or a folder. Nothing is ever extracted to a path the archive names."""
+
+from __future__ import annotations
+
+import lzma
+import tarfile
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from marey.core.errors import InvalidFile, NotFound, TooLarge
+
+MAX_FILE_BYTES = 64 * 2**20  # the longest take of the two archives has 11 MB
+MAX_TOTAL_BYTES = 4 * 2**30  # the larger archive unpacks to 548 MB: a bomb stops here
+MAX_FILES = 100_000
+
+
+def bvh_files(path: Path) -> Iterator[tuple[str, bytes]]:
+    """The BVH files of an archive or a folder: stem of the name, and content.
+
+    Links, devices and other file types are passed over; only the last part of a name is used.
+
+    Raises:
+        NotFound: no such path.
+        InvalidFile: not an archive, truncated, or two members with one name.
+        TooLarge: more bytes or files than any known archive has.
+    """
+    if path.is_dir():
+        members = _folder(path)
+    elif path.is_file():
+        members = _archive(path)
+    else:
+        raise NotFound("no such archive or folder", where=str(path))
+    seen: set[str] = set()
+    total = 0
+    for name, data in members:
+        total += len(data)
+        if total > MAX_TOTAL_BYTES or len(seen) >= MAX_FILES:
+            raise TooLarge(
+                f"more than {MAX_TOTAL_BYTES >> 30} GiB or {MAX_FILES:,} files",
+                where=str(path),
+                hint="This is not one of the archives that can be prepared.",
+            )
+        if name in seen:
+            raise InvalidFile(f"two files are called {name}.bvh", where=str(path))
+        seen.add(name)
+        yield name, data
+    if not seen:
+        raise InvalidFile("holds no BVH file", where=str(path))
+
+
+def _folder(path: Path) -> Iterator[tuple[str, bytes]]:
+    for file in sorted(path.rglob("*")):
+        if file.suffix.lower() == ".bvh" and file.is_file() and not file.is_symlink():
+            _check_size(file.stat().st_size, str(file))
+            yield file.stem, file.read_bytes()
+
+
+def _archive(path: Path) -> Iterator[tuple[str, bytes]]:
+    try:
+        with tarfile.open(path, "r|*") as tar:
+            for member in tar:
+                name = PurePosixPath(member.name)
+                if not member.isreg() or name.suffix.lower() != ".bvh":
+                    continue
+                _check_size(member.size, f"{path}: {member.name}")
+                file = tar.extractfile(member)
+                data = file.read(member.size + 1) if file else b""
+                if len(data) != member.size:
+                    raise InvalidFile("is truncated", where=f"{path}: {member.name}")
+                yield name.stem, data
+    except (tarfile.TarError, lzma.LZMAError, EOFError, OSError) as error:
+        raise InvalidFile(f"not a readable archive: {error}", where=str(path)) from error
+
+
+def _check_size(size: int, where: str) -> None:
+    if size > MAX_FILE_BYTES:
+        raise TooLarge(f"{size:,} bytes are more than {MAX_FILE_BYTES:,} for one BVH file", where=where)

@@ -1,0 +1,287 @@
+"""Stage 2 of preparing data: joints packs to a prepared folder. The same packs give the same bytes on every machine."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.core.errors import Conflict, InvalidInput
+from marey.core.hashing import sha256_of
+from marey.data import manifest as names
+from marey.data.captions import captions, phrasings
+from marey.data.compose import COUNTS, compose
+from marey.data.describe import Facts, describe, describe_cmu
+from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
+from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
+from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
+from marey.data.soundness import is_broken
+from marey.data.sources import SOURCES
+from marey.motion.features import HUMANML3D_263
+
+Array = NDArray[np.floating]
+# Heading: smoothed over half a second, which keeps the sway of a gait (1 Hz) out of it and follows a turn; hips and
+# shoulders count alike; frame 0 has no jump. Decoding is that of HumanML3D.
+LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed")
+COMPOSITIONAL_SPLIT = "compositional"
+
+Progress = Callable[[int, int], None]
+
+
+def swap_sides(label: str) -> str:
+    """`walk-turn-left` to `walk-turn-right`, and back."""
+    return label.replace("left", "\0").replace("right", "left").replace("\0", "right")
+
+
+def windows(frames: int) -> list[slice]:
+    """Pieces of at most MAX_FRAMES + 1 poses of a clip; a clip a little too long is cut at both ends."""
+    limit = MAX_FRAMES + 1
+    if frames <= limit:
+        return [slice(0, frames)]
+    if frames < 1.3 * limit:
+        first = (frames - limit) // 2
+        return [slice(first, first + limit)]
+    count = -(-frames // limit)
+    edges = np.linspace(0, frames, count + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def held_out_pairs(packs: Sequence[JointsPack]) -> frozenset[tuple[str, str]]:
+    """(content, style) pairs of the compositional split: nothing else may show them, mirrored clips included."""
+    return frozenset((c.content, c.style) for pack in packs for c in pack.clips if c.split == COMPOSITIONAL_SPLIT)
+
+
+def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[Part]:
+    """Each captured clip and its mirror image, in windows, described; what is not used goes to `left_out`."""
+    held_out = held_out_pairs(packs)
+    for pack in packs:
+        for clip in pack.clips:
+            whole = pack.joints(clip)
+            pieces = windows(len(whole))
+            for mirrored in (False, True):
+                content = swap_sides(clip.content) if mirrored and clip.dataset == "bandai-namco" else clip.content
+                if mirrored and (content, clip.style) in held_out and clip.split != COMPOSITIONAL_SPLIT:
+                    left_out[f"M{clip.id}"] = "its mirror image shows a held-out pair"
+                    continue
+                for k, piece in enumerate(pieces):
+                    joints = LAYOUT.mirror_joints(whole[piece]) if mirrored else whole[piece]
+                    name = ("M" if mirrored else "") + clip.id + (f"@{k}" if len(pieces) > 1 else "")
+                    facts = _facts(clip, content, joints)
+                    if len(joints) <= MIN_FRAMES:
+                        left_out[name] = "shorter than a second"
+                    elif is_broken(joints, FPS):
+                        left_out[name] = "broken capture: joints bend or jump as no body does"
+                    elif _jumps(joints):
+                        left_out[name] = "the body has no clear heading"
+                    elif facts is None:
+                        left_out[name] = "label and motion contradict each other"
+                    else:
+                        yield Part(name, clip, content, mirrored, joints, facts)
+
+
+def _facts(clip: PackClip, content: str, joints: NDArray[np.float32]) -> Facts | None:
+    if clip.dataset == "cmu":
+        return describe_cmu(content, joints, FPS)
+    return describe(content, clip.style, joints, FPS)
+
+
+_LEAST_STD = 1e-4  # a group that never changes must not become infinite
+_LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a second
+
+
+def _jumps(joints: NDArray[np.float32]) -> bool:
+    """Whether the heading jumps: a body bent over backwards has hips and shoulders square to each other."""
+    return bool(np.abs(LAYOUT.encode(joints)[:, 0]).max() > _LARGEST_YAW_STEP)
+
+
+class FolderWriter:
+    """Writes a prepared folder beside its final place, and moves it there when it is complete."""
+
+    def __init__(self, out: Path) -> None:
+        if out.exists() and any(out.iterdir()):
+            raise Conflict("the folder is not empty", where=str(out), hint="Name another one, or remove it first.")
+        self.out = out
+        self.work = out.with_name(out.name + ".part")
+        shutil.rmtree(self.work, ignore_errors=True)
+        self.work.mkdir(parents=True)
+        self.clips: list[Clip] = []
+        self.frames = 0
+        self._features = (self.work / "features.raw").open("wb")
+        self._local = (self.work / "joints.raw").open("wb")
+        self._roots = (self.work / "roots.raw").open("wb")
+
+    def __enter__(self) -> FolderWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """What is not finished is removed."""
+        for file in (self._features, self._local, self._roots):
+            file.close()
+        shutil.rmtree(self.work, ignore_errors=True)
+
+    def add(
+        self,
+        part: Part,
+        joints: NDArray[np.floating],
+        acts: Sequence[Facts],
+        *,
+        name: str,
+        spliced: tuple[str, ...],
+        seams: tuple[int, ...] = (),
+    ) -> None:
+        """Encode and append one clip; joints (T, 22, 3)."""
+        placed = LAYOUT.canonicalize(joints)
+        features = LAYOUT.encode(placed)
+        local, root = split_root(placed)
+        self._features.write(np.ascontiguousarray(features, "<f4").tobytes())
+        self._local.write(np.ascontiguousarray(local, "<f2").tobytes())
+        self._roots.write(np.ascontiguousarray(root, "<f4").tobytes())
+        walked = acts[0].gait
+        self.clips.append(
+            Clip(
+                id=name,
+                start=self.frames,
+                length=len(features),
+                joints_start=self.frames + len(self.clips),
+                split=part.source.split,
+                dataset=part.source.dataset,
+                content=part.content,
+                style=part.source.style,
+                mirrored=part.mirrored,
+                spliced=spliced,
+                acts=tuple(facts.act for facts in acts),
+                sides=tuple(facts.side for facts in acts),
+                measured=Measured(
+                    seconds=round(len(features) / FPS, 2),
+                    path=round(walked.path, 2),
+                    turn=round(walked.turn, 1),
+                    speed=round(walked.speed, 2),
+                    steps=walked.steps,
+                    side=acts[0].side,
+                ),
+                captions=captions(acts, name, phrasings(acts, spliced=bool(spliced))),
+                seams=seams,
+                act_captions=tuple(
+                    captions([facts], f"{name}/{k}", 1)[0] for k, facts in enumerate(acts) if len(acts) > 1
+                ),
+            )
+        )
+        self.frames += len(features)
+
+    def finish(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
+        """Statistics, manifest, hashes; then the folder appears under its name, complete."""
+        if not any(clip.split == "train" for clip in self.clips):
+            raise InvalidInput("no training clip is left", where=str(self.out))
+        rows = self.frames + len(self.clips)
+        for file, name, shape, dtype in (
+            (self._features, names.FEATURES, (self.frames, LAYOUT.dim), "<f4"),
+            (self._local, names.JOINTS, (rows, 21, 3), "<f2"),
+            (self._roots, names.ROOTS, (rows, 3), "<f4"),
+        ):
+            file.close()
+            _raw_to_npy(Path(file.name), self.work / name, shape, dtype)
+        with (self.work / names.CLIPS).open("w", encoding="utf-8") as lines:
+            lines.writelines(clip.model_dump_json() + "\n" for clip in self.clips)
+        mean, std = self._statistics()
+        np.savez(self.work / names.STATISTICS, mean=mean, std=std)
+        manifest = self._manifest(packs, left_out)
+        (self.work / names.MANIFEST).write_text(manifest.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        if self.out.exists():
+            self.out.rmdir()
+        self.work.rename(self.out)
+        return manifest
+
+    def _statistics(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Mean and group-averaged deviation of the captured and mirrored training clips."""
+        features = np.load(self.work / names.FEATURES, mmap_mode="r")
+        total, squares, count = np.zeros(LAYOUT.dim), np.zeros(LAYOUT.dim), 0
+        for clip in self.clips:
+            if clip.split == "train" and not clip.spliced:
+                block = features[clip.start : clip.start + clip.length].astype(np.float64)
+                total += block.sum(axis=0)
+                squares += (block**2).sum(axis=0)
+                count += len(block)
+        mean = total / count
+        deviation = np.sqrt(np.maximum(squares / count - mean**2, 0.0))
+        std = np.empty_like(deviation)
+        for group in LAYOUT.slices.values():
+            std[group] = max(float(deviation[group].mean()), _LEAST_STD)
+        return mean.astype(np.float32), std.astype(np.float32)
+
+    def _manifest(self, packs: Sequence[JointsPack], left_out: dict[str, str]) -> Manifest:
+        kinds = Counter(_kind(clip) for clip in self.clips)
+        lengths = {split: Counter() for split in SPLITS}
+        for clip in self.clips:
+            whole = int(clip.measured.seconds)
+            lengths[clip.split][f"{whole}-{whole + 1}"] += 1
+        used = sorted({clip.dataset for clip in self.clips})
+        return Manifest(
+            format=names.FORMAT,
+            sources=tuple(SourceEntry(**vars(SOURCES[name])) for name in used),
+            layout=LAYOUT.name,
+            facing_sigma=LAYOUT.facing_sigma,
+            fps=FPS,
+            skeleton=LAYOUT.skeleton.name,
+            dim=LAYOUT.dim,
+            frames=self.frames,
+            clips=len(self.clips),
+            splits={split: sum(clip.split == split for clip in self.clips) for split in SPLITS},
+            lengths={split: dict(sorted(counts.items())) for split, counts in lengths.items()},
+            kinds=dict(sorted(kinds.items())),
+            captions=len({text for clip in self.clips for text in clip.captions}),
+            left_out=dict(sorted(left_out.items())),
+            compositional_pairs=tuple(sorted(held_out_pairs(packs))),
+            files={
+                name: FileEntry(sha256=sha256_of(self.work / name), bytes=(self.work / name).stat().st_size)
+                for name in names.FILES
+            },
+        )
+
+
+def _kind(clip: Clip) -> str:
+    if clip.spliced:
+        return "spliced" if len(clip.acts) > 1 else "looped"
+    return "mirrored" if clip.mirrored else "captured"
+
+
+def _raw_to_npy(raw: Path, path: Path, shape: tuple[int, ...], dtype: str) -> None:
+    header = {"descr": dtype, "fortran_order": False, "shape": shape}
+    with path.open("wb") as out, raw.open("rb") as data:
+        np.lib.format.write_array_header_1_0(out, header)
+        shutil.copyfileobj(data, out)
+    raw.unlink()
+
+
+def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None = None) -> Manifest:
+    """Write a prepared folder.
+
+    Args:
+        packs: one a source.
+        out: a folder that is empty or not there; it appears only when it is complete.
+        progress: called with clips done and clips in all.
+
+    Raises:
+        Conflict: the folder is not empty.
+        InvalidInput: no training clip is left.
+    """
+    left_out: dict[str, str] = {}
+    by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
+    total = 2 * sum(len(pack.clips) for pack in packs) + sum(sum(vars(counts).values()) for counts in COUNTS.values())
+    with FolderWriter(out) as writer:
+        for part in parts_of(packs, left_out):
+            by_split[part.source.split].append(part)
+            writer.add(part, part.joints, (part.facts,), name=part.id, spliced=())
+            if progress:
+                progress(len(writer.clips), total)
+        for split, parts in by_split.items():
+            for made in compose(parts, split):
+                ids = tuple(part.id for part in made.parts)
+                writer.add(made.parts[0], made.joints, made.facts, name=made.name, spliced=ids, seams=made.seams)
+                if progress:
+                    progress(len(writer.clips), total)
+        return writer.finish(packs, left_out)

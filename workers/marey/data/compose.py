@@ -1,0 +1,330 @@
+"""Which clips are joined: sequences of two and three acts, longer and shorter versions of single ones.
+
+Captured takes are 1 to 6 s of one act. Here walks go on, waves last longer or shorter, bows come twice, and acts follow
+each other, so that every act is seen at many lengths up to 9.8 s and graphs with two and three verbs occur in training.
+Everything is drawn by seeds from clips of one split; facts are measured again on what came out.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.judge import Act, Expectation, Side, judge
+from marey.data.captions import seeded
+from marey.data.cuts import WORST_SEAM, best_cut, core
+from marey.data.describe import CYCLIC, Facts, describe
+from marey.data.part import FPS, MIN_FRAMES, Part
+from marey.data.retime import LIMIT, Made, crop, loop, on_a_way, stretch
+from marey.data.splice import join_clips
+
+Array = NDArray[np.floating]
+
+# How often an act is drawn for a sequence. Travel and greetings are what prompts ask for; the acts of one or two clips
+# stay rare, or the model would learn those clips by heart.
+SEQUENCE_WEIGHTS: dict[str, float] = {
+    "walk": 3.0,
+    "run": 2.0,
+    "walk_back": 1.6,
+    "turn": 2.6,
+    "dash": 0.5,
+    "walk_diagonal": 0.5,
+    "wave": 4.0,
+    "raise": 3.0,
+    "bow": 2.2,
+    "guide": 0.4,
+    "kick": 0.3,
+    "punch": 0.4,
+    "slash": 0.3,
+    "call": 0.2,
+    "dance": 0.2,
+}
+SIDED = ("wave", "raise", "turn")
+OTHER_SIDE_SHARE = 0.15  # how often one of these is followed by itself with another side
+# Ways that prompts ask for more often than drawing by weight gives them.
+REVERSALS = {"walk": "walk_back", "walk_back": "walk", "run": "walk"}
+REVERSAL_SHARE = 0.2
+# Gestures at lengths at which they were not captured (raises take 1 to 5 s, waves 5 to 8): without them a
+# model takes the length for the act, and a raise of 6 s becomes a wave. Frames.
+SLOW_RAISES = range(100, LIMIT + 1)
+QUICK_WAVES = range(36, 91)
+LONG_TURNS = range(140, LIMIT + 1)
+"""Captured turns take 3 to 7 s. Of a model that saw few others a walk of 8 s never turned, or twice."""
+_STRAIGHT = ("walk", "run", "walk_back")
+TRIES = 8  # for each clip that is wanted
+_CANDIDATES = 8  # clips among which the best seam is taken
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many clips are made for one split."""
+
+    pairs: int
+    triples: int
+    retimed: int
+    slow_raises: int = 0
+    quick_waves: int = 0
+    long_turns: int = 0
+    brief_waves: int = 0
+
+
+COUNTS: dict[str, Counts] = {
+    "train": Counts(
+        pairs=3400, triples=500, retimed=2200, slow_raises=700, quick_waves=350, long_turns=350, brief_waves=700
+    ),
+    "val": Counts(pairs=60, triples=10, retimed=0),
+    "test": Counts(pairs=200, triples=40, retimed=0),
+}
+
+
+@dataclass(frozen=True)
+class Composed:
+    """A clip that was put together.
+
+    Attributes:
+        parts: the clips it was made of, in order.
+        joints: (T, 22, 3).
+        facts: one an act.
+        seams: first frame of each act but the first.
+    """
+
+    name: str
+    parts: tuple[Part, ...]
+    joints: Array
+    facts: tuple[Facts, ...]
+    seams: tuple[int, ...] = ()
+
+
+class Composer:
+    """Draws clips of one split and puts them together."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self.by_act: dict[str, list[Part]] = defaultdict(list)
+        self.by_style: dict[tuple[str, str], list[Part]] = defaultdict(list)
+        for part in parts:
+            if part.source.dataset == "bandai-namco" and part.facts.act in SEQUENCE_WEIGHTS:
+                self.by_act[part.facts.act].append(part)
+                self.by_style[part.facts.act, part.facts.style].append(part)
+        self.acts = sorted(self.by_act)
+
+    def sequence(self, name: str, count: int) -> Composed | None:
+        """Two or three different acts, or None when what was drawn does not fit."""
+        rng = seeded("sequence", name)
+        acts = self._draw_acts(rng, count)
+        same_style = rng.random() < 0.75
+        part = self._draw_first(rng, acts[0])
+        budget = LIMIT - sum(30 if act in CYCLIC else 45 for act in acts[1:])
+        start, stop = _cut_first(part, rng, budget, len(acts))
+        if stop.stop <= stop.start:
+            return None
+        chosen, joints, seams = [part], np.empty((0, 22, 3)), [0]
+        current, first = part, start
+        for act in acts[1:]:
+            found = self._best_next(rng, current, stop, act, part.facts.style if same_style else None)
+            if found is None:
+                return None
+            following, leave, enter = found
+            piece = current.joints[first : leave + 1].astype(np.float64)
+            joints = piece if not len(joints) else join_clips(joints, piece, FPS)
+            seams.append(len(joints))
+            chosen.append(following)
+            current, first = following, enter
+            stop = _leave_range(following, enter, rng, LIMIT - len(joints) - 30 * (count - len(chosen)))
+            if stop.stop <= stop.start:
+                return None
+        last = int(rng.choice(stop)) if current.facts.act in CYCLIC else stop.stop - 1
+        joints = join_clips(joints, current.joints[first : last + 1].astype(np.float64), FPS)
+        seams.append(len(joints))
+        return _checked(name, chosen, joints, seams)
+
+    def _draw_acts(self, rng: random.Random, count: int) -> list[str]:
+        acts: list[str] = []
+        while len(acts) < count:
+            if acts and acts[-1] in SIDED and rng.random() < OTHER_SIDE_SHARE:
+                acts.append(acts[-1])
+                continue
+            if acts and acts[-1] in REVERSALS and rng.random() < REVERSAL_SHARE:
+                acts.append(REVERSALS[acts[-1]])
+                continue
+            act = rng.choices(self.acts, [SEQUENCE_WEIGHTS[a] for a in self.acts])[0]
+            if not acts or act != acts[-1] or act in SIDED:
+                acts.append(act)
+        return acts
+
+    def _draw_first(self, rng: random.Random, act: str) -> Part:
+        style = rng.choice(sorted({part.facts.style for part in self.by_act[act]}))
+        return rng.choice(self.by_style[act, style])
+
+    def _best_next(
+        self, rng: random.Random, current: Part, leave: range, act: str, style: str | None
+    ) -> tuple[Part, int, int] | None:
+        pool = self.by_style.get((act, style or ""), []) or self.by_act[act]
+        best, least = None, WORST_SEAM
+        for part in rng.sample(pool, min(_CANDIDATES, len(pool))):
+            if (part.facts.act, part.facts.side) == (current.facts.act, current.facts.side):
+                continue
+            i, j, cost = best_cut(current, leave, part, _enter_range(part))
+            if cost < least:
+                best, least = (part, i, j), cost
+        return best
+
+    # -- one act, another length ------------------------------------------------------------------------------------
+
+    def gesture(self, name: str, act: str, lengths: range) -> Composed | None:
+        """A gesture of one of these lengths, done once."""
+        if act not in self.by_act:
+            return None
+        rng = seeded("retimed", name)
+        part = self._draw_first(rng, act)
+        return self._measured_again(name, part, stretch(part, rng.choice(lengths), rng, repeat_share=0))
+
+    def retimed(self, name: str) -> Composed | None:
+        """One act, longer or shorter than it was captured."""
+        rng = seeded("retimed", name)
+        weights = [len(self.by_act[a]) ** 0.25 * (0.4 if a in ("dash", "walk_diagonal") else 1.0) for a in self.acts]
+        act = rng.choices(self.acts, weights)[0]
+        part = self._draw_first(rng, act)
+        target = rng.randint(32, LIMIT)
+        if act in CYCLIC:
+            made = crop(part, target, rng) if target < 0.8 * len(part.joints) else loop(part, target)
+        elif act == "turn":
+            made = self._on_a_way(rng, part, target, before=1.0)
+        elif act in ("wave", "raise", "guide", "bow", "call"):
+            made = stretch(part, target, rng)
+        else:
+            made = crop(part, max(target, 70), rng)
+        return self._measured_again(name, part, made)
+
+    def long_turn(self, name: str) -> Composed | None:
+        """A turn somewhere in a walk of 7 to 9.8 s."""
+        if not self.by_act["turn"]:
+            return None
+        rng = seeded("retimed", name)
+        part = self._draw_first(rng, "turn")
+        made = self._on_a_way(rng, part, rng.choice(LONG_TURNS), before=rng.uniform(0.1, 1.0))
+        return self._measured_again(name, part, made)
+
+    def _on_a_way(self, rng: random.Random, part: Part, target: int, before: float) -> Made | None:
+        pool = self.by_style.get(("walk", part.facts.style), [])
+        if not pool:
+            return None
+        walk = max(rng.sample(pool, min(4, len(pool))), key=lambda p: len(p.joints))
+        return on_a_way(part, walk, target, before)
+
+    @staticmethod
+    def _measured_again(name: str, part: Part, made: Made | None) -> Composed | None:
+        if made is None or len(made[0]) <= MIN_FRAMES:
+            return None
+        joints, used, repeats = made
+        facts = _measured(part, joints)
+        if facts is None or not _still_does(facts, joints, repeats):
+            return None
+        return Composed(name, used, joints, (replace(facts, repeats=repeats),))
+
+
+def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
+    """Whether the act can still be told from others: a hand held by loops must not seem to wave, a loop not bend the
+    way."""
+    act = "run" if facts.act == "dash" else facts.act
+    if repeats > 1 or act not in get_args(Act):
+        return True
+    side = facts.side if act in ("turn", "wave", "raise") else ""
+    expected = Expectation(cast("Act", act), cast("Side", side), straight=act in _STRAIGHT)
+    return judge(joints, FPS, [expected]).passed
+
+
+def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple[int, range]:
+    """Where the first clip begins, and the frames after which it may be left."""
+    if part.facts.act in CYCLIC:
+        room = len(part.joints) - 1
+        start = rng.randint(0, max(room - 60, 0))
+        longest = min(room, start + min(budget, 110 if count == 2 else 65))
+        return start, range(min(start + 28, longest), longest + 1)
+    return 0, _leave_range(part, 0, rng, budget)
+
+
+def _enter_range(part: Part) -> range:
+    if part.facts.act in CYCLIC:
+        return range(max(len(part.joints) - 40, 1))
+    return range(core(part)[0] + 1)
+
+
+def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> range:
+    """Frames after which the clip may be left when it was entered at `start` and `budget` frames are free."""
+    end = min(len(part.joints), start + budget)
+    if part.facts.act in CYCLIC:
+        return range(min(start + 28, end), end)
+    first = core(part)[1]
+    return range(max(first, start + 1), end)
+
+
+def with_brief_waves(parts: Sequence[Part]) -> list[Part]:
+    """The same clips with waves cut short: two acts fit into 9.8 s where a captured wave takes 5 to 8 of them."""
+    out: list[Part] = []
+    for part in parts:
+        if part.facts.act != "wave":
+            out.append(part)
+            continue
+        rng = seeded("brief", part.id)
+        made = stretch(part, rng.choice(QUICK_WAVES), rng, repeat_share=0)
+        facts = None if made is None else _measured(part, made[0])
+        if made is not None and facts is not None and _still_does(facts, made[0], 1):
+            out.append(replace(part, joints=made[0].astype(np.float32), facts=facts))
+    return out
+
+
+def _with_wave(composed: Composed | None) -> Composed | None:
+    return composed if composed is not None and any(f.act == "wave" for f in composed.facts) else None
+
+
+def _measured(part: Part, joints: Array) -> Facts | None:
+    facts = describe(part.content, part.source.style, joints, FPS)
+    return facts if facts is not None and facts.side == part.facts.side else None
+
+
+def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> Composed | None:
+    """Measure each act again in its stretch of the result."""
+    if len(joints) > LIMIT:
+        return None
+    facts = []
+    for part, a, b in zip(parts, seams, seams[1:], strict=False):
+        measured = _measured(part, joints[a:b]) if b - a >= 16 else None
+        if measured is None:
+            return None
+        facts.append(measured)
+    return Composed(name, tuple(parts), joints, tuple(facts), tuple(seams[1:-1]))
+
+
+def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
+    """All clips that are put together for a split, from parts of that split alone."""
+    counts = COUNTS.get(split)
+    if counts is None or not parts:
+        return
+    composer = Composer(parts)
+    brief = Composer(with_brief_waves(parts)) if counts.brief_waves else composer
+    makers = (
+        ("S2", 2, counts.pairs, lambda name: composer.sequence(name, 2)),
+        ("S3", 3, counts.triples, lambda name: composer.sequence(name, 3)),
+        ("R", 1, counts.retimed, composer.retimed),
+        ("RR", 1, counts.slow_raises, lambda name: composer.gesture(name, "raise", SLOW_RAISES)),
+        ("RT", 1, counts.long_turns, composer.long_turn),
+        ("SW", 2, counts.brief_waves, lambda name: _with_wave(brief.sequence(name, 2))),
+        ("RW", 1, counts.quick_waves, lambda name: composer.gesture(name, "wave", QUICK_WAVES)),
+    )
+    for letter, acts, wanted, make in makers:
+        if len(composer.acts) < acts:
+            continue
+        made = 0
+        for attempt in range(TRIES * wanted):
+            if made >= wanted:
+                break
+            composed = make(f"{letter}-{split}-{attempt:05}")
+            if composed is not None:
+                made += 1
+                yield composed

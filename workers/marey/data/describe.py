@@ -1,0 +1,158 @@
+"""What a clip shows, as facts: labels, and what is measured on its joints. Captions are made of these alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import Gait, Hand, gait, hand, lean
+from marey.checks.strikes import is_lively, kicks, punches, slashes
+
+LEFT, RIGHT = 0, 1
+SIDES = ("left", "right")
+
+# content label -> act; the side is always measured
+ACTS: dict[str, str] = {
+    "1/walk": "walk",
+    "2/walk": "walk",
+    "1/run": "run",
+    "2/run": "run",
+    "1/dash": "dash",
+    "1/walk-back": "walk_back",
+    "1/walk-left": "walk_diagonal",
+    "1/walk-right": "walk_diagonal",
+    "2/walk-turn-left": "turn",
+    "2/walk-turn-right": "turn",
+    "1/bow": "bow",
+    "1/bye": "wave",
+    "1/byebye": "wave",
+    "2/wave-left-hand": "wave",
+    "2/wave-right-hand": "wave",
+    "2/wave-both-hands": "wave",
+    "2/raise-up-left-hand": "raise",
+    "2/raise-up-right-hand": "raise",
+    "2/raise-up-both-hands": "raise",
+    "1/respond": "raise",
+    "1/guide": "guide",
+    "1/call": "call",
+    "1/kick": "kick",
+    "1/punch": "punch",
+    "1/slash": "slash",
+    "1/dance-short": "dance",
+}
+STRIKES = {"kick": kicks, "punch": punches, "slash": slashes, "dance": is_lively}
+LOCOMOTION = ("walk", "run", "dash", "walk_back", "walk_diagonal", "turn")
+CYCLIC = ("walk", "run", "dash", "walk_back", "walk_diagonal")
+# one style, two names in the two data sets
+STYLE_NAMES = {"masculinity": "masculine", "tired": "exhausted", "old": "elderly"}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A clip in words and numbers.
+
+    Attributes:
+        act: key of the caption grammar.
+        style: key of the caption grammar; `normal` where there is none.
+        side: left, right, both, or empty.
+        gait, hands, lean: what was measured; lean is the deepest forward lean over the standing one, degrees.
+        repeats: how often the act is done (a spliced loop of raises, for instance).
+        text: a caption of the source's own, where it has one.
+    """
+
+    act: str
+    style: str
+    side: str
+    gait: Gait
+    hands: tuple[Hand, Hand]
+    lean: float
+    repeats: int = 1
+    text: tuple[str, ...] = ()
+
+
+def measure(joints: NDArray[np.floating], fps: float) -> tuple[Gait, tuple[Hand, Hand], float]:
+    """Gait, both hands and the deepest lean of a motion (T, 22, 3)."""
+    bend = lean(np.asarray(joints, np.float64), fps)
+    return gait(joints, fps), (hand(joints, fps, LEFT), hand(joints, fps, RIGHT)), float(bend.max() - np.median(bend))
+
+
+def describe(content: str, style: str, joints: NDArray[np.floating], fps: float) -> Facts | None:
+    """Facts of a captured clip of the Bandai-Namco sets.
+
+    Args:
+        content: label of the original, such as `2/wave-left-hand`; which side it names is not believed.
+        style: label of the archive.
+        joints: (T, 22, 3), mirrored or not.
+
+    Returns:
+        None when label and motion contradict each other, so that no true caption can be made: a turn of the wrong size,
+        a wave without a hand that moves.
+    """
+    act = ACTS[content]
+    walked, hands, bend = measure(joints, fps)
+    facts = Facts(act, STYLE_NAMES.get(style, style), "", walked, hands, bend)
+    if act == "turn":
+        single = 55 <= abs(walked.turn) <= 130 and walked.swing < abs(walked.turn) + 30
+        return replace(facts, side=_signed(walked.turn)) if single else None
+    if act == "walk_diagonal":
+        return replace(facts, side=_signed(walked.sideways)) if abs(walked.sideways) > 0.6 else None
+    if act in ("wave", "raise", "guide"):
+        side = active_hands(hands, walked.duration)
+        return replace(facts, side=side) if side else None
+    if act == "walk_back":
+        return facts if walked.along < -0.5 else None
+    if act in STRIKES:
+        return facts if STRIKES[act](np.asarray(joints, np.float64), fps) else None
+    if act in ("walk", "run", "dash"):
+        return facts if walked.along > 0.5 and abs(walked.turn) < 40 else None
+    return facts
+
+
+def _signed(value: float) -> str:
+    return "left" if value > 0 else "right"
+
+
+def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
+    """Which hand is up: left, right, both, or empty.
+
+    A hand counts when it gets near the shoulder line, and either rises there by 15 cm and 0.45 of the other hand's
+    rise, or is up for most of the clip (takes that begin with the hands up).
+    """
+    rise = [h.rise for h in hands]
+    up = [
+        h.peak > -0.25 and ((h.rise > 0.15 and h.rise > 0.45 * max(rise)) or h.lifted > 0.6 * duration) for h in hands
+    ]
+    return "both" if all(up) else "left" if up[LEFT] else "right" if up[RIGHT] else ""
+
+
+_CMU_TEXT: dict[str, tuple[str, ...]] = {
+    "walk": ("a person walks", "A person walks forward.", "someone is walking"),
+    "slow walk": ("a person walks slowly", "A person walks forward slowly.", "someone is walking at a slow pace"),
+    "brisk walk": ("a person walks briskly", "A person walks forward fast.", "someone is walking at a brisk pace"),
+    "swordplay": ("a person fights with a sword", "someone practices swordplay", "A person swings a sword around."),
+    "punch/strike": ("a person punches", "Someone throws punches and strikes.", "a person is punching and striking"),
+    "wash self": ("a person washes himself", "Someone is taking a hand shower.", "a person is washing the body"),
+}
+
+
+def describe_cmu(content: str, joints: NDArray[np.floating], fps: float) -> Facts | None:
+    """Facts of a CMU trial: its captions follow CMU's own description, in a few plain sentences."""
+    walked, hands, bend = measure(joints, fps)
+    kind, _, rest = content.partition(" - ")
+    if content in _CMU_TEXT:
+        text = _CMU_TEXT[content]
+    elif kind == "dance":
+        text = ("a person dances", f"A person dances ballet, with {rest}.", "someone is dancing gracefully")
+    elif kind == "basketball":
+        text = ("a person plays basketball", f"A person plays basketball: {rest}.", "someone is dribbling a basketball")
+    elif kind == "walk on uneven terrain":
+        text = (
+            "a person walks on uneven ground",
+            "Someone walks over rough terrain.",
+            "a person is walking over obstacles",
+        )
+    else:
+        text = (f"a person does this: {content}.",)
+    return Facts("cmu", "normal", "", walked, hands, bend, text=text)

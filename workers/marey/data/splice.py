@@ -1,0 +1,191 @@
+"""Joining real clips with inertialized transitions (Bollo 2018, "Inertialization", GDC: the difference of pose and
+velocity at the seam is added to the second clip and decays by a quintic).
+
+The second clip is turned to the heading of the first and put so that a standing foot stays where it stands. Root, toes,
+foot directions and bone directions are inertialized apart; bones keep their length, and knees are solved between hip
+and ankle, so that a standing foot does not slide under a body that slows down or sets off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from marey.checks.kinematics import heading
+from marey.data.retarget import two_bones
+from marey.motion.rotations import between, cross, from_rotvec, normalize, rotate, to_rotvec
+from marey.motion.skeleton import HUMANML3D
+
+Array = NDArray[np.floating]
+
+BLEND_SECONDS = 0.5
+_PARENTS = np.array([max(p, 0) for p in HUMANML3D.parents])
+_LENGTH: Array = np.linalg.norm(HUMANML3D.offsets.astype(np.float64), axis=1)
+_LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
+_LEG_JOINTS = {4, 5, 7, 8, 10, 11}
+_DIRECTED = tuple(j for j in range(1, 22) if j not in _LEG_JOINTS)  # in order: parents come first
+_STAND_SPEED = 0.35  # metres a second under which a low toe stands
+_STAND_HEIGHT = 0.05
+_STEP_FROM = 0.015  # metres by which a standing foot may be displaced without lifting it
+
+
+def quintic(offset: Array, velocity: Array, frames: int) -> Array:
+    """Decay of an offset (...,) with initial velocity a frame to nothing: (frames, ...) at 1, 2, …, `frames`.
+
+    x(0) and x'(0) are given, x''(0) = 0, and x, x', x'' vanish at the end.
+    """
+    s = np.arange(1, frames + 1).reshape(-1, *[1] * offset.ndim) / frames
+    position = 1 - 10 * s**3 + 15 * s**4 - 6 * s**5
+    speed = s - 6 * s**3 + 8 * s**4 - 3 * s**5
+    return position * offset + speed * velocity * frames
+
+
+def place_after(first: Array, second: Array, fps: float) -> Array:
+    """The second clip (T, 22, 3), turned and moved over the floor to go on where the first one ends."""
+    turn = np.radians(heading(first[-8:], fps)[-1] - heading(second[:8], fps)[0])
+    c, s = np.cos(turn), np.sin(turn)
+    turned = second @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
+    foot = _shared_foot(first, turned, fps)
+    anchor = 0 if foot is None else foot
+    shift = first[-1, anchor] - turned[0, anchor]
+    return turned + shift * np.array([1.0, 0.0, 1.0])
+
+
+def _stands(points: Array, fps: float) -> bool:
+    """Whether a toe (n >= 2, 3) stands at the seam."""
+    speed = np.linalg.norm(points[1] - points[0]) * fps
+    return bool(speed < _STAND_SPEED and points[:, 1].min() < _STAND_HEIGHT)
+
+
+def _shared_foot(first: Array, second: Array, fps: float) -> int | None:
+    """Toe joint that stands on both sides of the seam; the slower one of two, None when there is none."""
+    best, least = None, np.inf
+    for _, _, _, toe in _LEGS:
+        if _stands(first[-2:, toe], fps) and _stands(second[:2, toe], fps):
+            speed = np.linalg.norm(first[-1, toe] - first[-2, toe]) + np.linalg.norm(second[1, toe] - second[0, toe])
+            if speed < least:
+                best, least = toe, speed
+    return best
+
+
+def join_clips(first: Array, second: Array, fps: float) -> Array:
+    """One motion of two: all of the first (T1, 22, 3), then the second but its first frame, (T1 + T2 - 1, 22, 3).
+
+    Both need two frames at least; the second is placed by `place_after`.
+    """
+    first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    second = place_after(first, second, fps)
+    frames = min(round(BLEND_SECONDS * fps), len(second) - 1)
+    tail = second[1:].copy()
+    tail[:frames] = _rebuild(*_blend(first, second, frames, fps))
+    return np.concatenate([first, tail])
+
+
+def _blend(first: Array, second: Array, frames: int, fps: float) -> tuple[Array, Array, Array, Array]:
+    """Root (n, 3), directions (n, 22, 3), toes (n, 2, 3) and knee poles (n, 2, 3) of the blended frames."""
+    target = second[1 : frames + 1]
+
+    def decayed(a: Array, b: Array, seam: Array) -> Array:
+        """`a`: the last two frames of the first clip, `b`: the first two of the second, `seam`: what is added to."""
+        return seam + quintic(a[1] - b[0], (a[1] - a[0]) - (b[1] - b[0]), frames)
+
+    ends = (first[-2:], second[:2])
+    root = decayed(ends[0][:, 0], ends[1][:, 0], target[:, 0])
+    toes = decayed(ends[0][:, [10, 11]], ends[1][:, [10, 11]], target[:, [10, 11]])
+    toes[..., 1] = np.maximum(
+        toes[..., 1] + _lift(ends[0], ends[1], frames, fps), np.minimum(target[:, [10, 11], 1], 0)
+    )
+    directions = turned(_directions(ends[0]), _directions(ends[1]), _directions(target))
+    return root, directions, toes, turned(_poles(ends[0]), _poles(ends[1]), _poles(target))
+
+
+def turned(first: Array, second: Array, target: Array) -> Array:
+    """Unit vectors (n, K, 3), inertialized as rotations: what turns those of the second clip into those of the first
+    at the seam, and how fast that changes, decays.
+
+    As vectors they could not be: where an arm swings by more than a right angle within the blend, its direction and the
+    decaying difference all but cancel, and the arm jumps (1 in 20 joins had more jerk than any capture).
+
+    Args:
+        first: (2, K, 3) the last two frames of the first clip.
+        second: (2, K, 3) the first two of the second.
+        target: (n, K, 3) the second clip's from its second frame on.
+    """
+    now = to_rotvec(between(second[0], first[1])).astype(np.float64)
+    before = to_rotvec(between(normalize(2 * second[0] - second[1]), first[0]))
+    decayed = from_rotvec(quintic(now, now - before, len(target)))
+    return normalize(rotate(decayed, target)).astype(np.float64)
+
+
+def _lift(before: Array, after: Array, frames: int, fps: float) -> Array:
+    """(n, 2) extra height of a foot that stands on both sides of the seam, but elsewhere: it makes a small step."""
+    out = np.zeros((frames, 2))
+    bump = np.sin(np.pi * np.arange(1, frames + 1) / (frames + 1)) ** 2
+    for side, toe in enumerate((10, 11)):
+        offset = float(np.linalg.norm((before[1, toe] - after[0, toe])[[0, 2]]))
+        if offset > _STEP_FROM and (_stands(before[:, toe], fps) or _stands(after[:, toe], fps)):
+            out[:, side] = min(0.12, 0.04 + 0.3 * offset) * bump
+    return out
+
+
+def _directions(joints: Array) -> Array:
+    """(n, 22, 3) unit vectors from each joint's parent."""
+    return normalize(joints - joints[:, _PARENTS]).astype(np.float64)
+
+
+def _poles(joints: Array) -> Array:
+    """(n, 2, 3) where the knees point: off the line from hip to ankle, a little of the body's forward added; unit."""
+    left = joints[:, 1] - joints[:, 2]
+    forward = normalize(cross(left, np.broadcast_to([0.0, 1.0, 0.0], left.shape)))
+    out = []
+    for hip, knee, ankle, _ in _LEGS:
+        axis = normalize(joints[:, ankle] - joints[:, hip])
+        bend = joints[:, knee] - joints[:, hip]
+        bend = bend - axis * np.einsum("ti,ti->t", bend, axis)[:, None]
+        out.append(bend + 0.03 * forward)
+    return normalize(np.stack(out, axis=1)).astype(np.float64)
+
+
+def _rebuild(root: Array, directions: Array, toes: Array, poles: Array) -> Array:
+    """Joints (n, 22, 3) with bones of the skeleton's lengths."""
+    joints = np.empty((len(root), 22, 3))
+    joints[:, 0] = root
+    for j in _DIRECTED:
+        joints[:, j] = joints[:, _PARENTS[j]] + _LENGTH[j] * directions[:, j]
+    for side, (hip, knee, ankle, toe) in enumerate(_LEGS):
+        foot = _LENGTH[toe] * directions[:, toe]
+        wanted = toes[:, side] - foot
+        joints[:, knee], joints[:, ankle] = two_bones(
+            joints[:, hip], wanted, poles[:, side], (_LENGTH[knee], _LENGTH[ankle])
+        )
+        joints[:, toe] = joints[:, ankle] + foot
+    return joints
+
+
+# -- where to cut --------------------------------------------------------------------------------------------------
+
+
+def seam_features(joints: Array, fps: float) -> Array:
+    """(T, K) description of each frame for finding seams: pose and velocities in the body's frame, in metres.
+
+    Feet weigh double, since a foot that is elsewhere must step; velocities count as what they cover in 0.15 s.
+    """
+    angle = np.radians(heading(joints, fps))
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+
+    def local(v: Array) -> Array:
+        return np.stack([v[..., 0] * c - v[..., 2] * s, v[..., 1], v[..., 0] * s + v[..., 2] * c], axis=-1)
+
+    pose = local(joints - joints[:, :1] * np.array([1.0, 0.0, 1.0]))
+    speed = local(np.gradient(joints, axis=0) * fps)
+    weights = np.ones(22)
+    weights[[7, 8, 10, 11]] = 2.0
+    weights[[3, 6, 9, 12, 13, 14]] = 0.5
+    parts = [pose * weights[:, None], 0.15 * speed * weights[:, None]]
+    return np.concatenate([part.reshape(len(joints), -1) for part in parts], axis=1)
+
+
+def seam_costs(first: Array, second: Array) -> Array:
+    """(T1, T2) mean squared difference of seam features: how badly frame i of one goes over to frame j of the other."""
+    squares = (first**2).sum(1)[:, None] + (second**2).sum(1)[None] - 2 * first @ second.T
+    return np.maximum(squares, 0.0) / 22

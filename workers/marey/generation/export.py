@@ -1,0 +1,86 @@
+"""From generated features to files: the last step of an item, the same in a worker and in `marey generate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import torch
+
+from marey.generation.port import Generated, Generator, Request, S
+from marey.items.item import OUTPUT_FPS
+from marey.motion.clip import MotionClip
+from marey.motion.finish import finish_motion
+from marey.motion.io.bvh_write import format_bvh
+from marey.runtime.handler import Export, ExportedFile
+
+MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
+
+
+def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
+    """An item's settings as the network's own and the output's frame rate (None = the model's)."""
+    return {k: v for k, v in values.items() if k != OUTPUT_FPS}, values.get(OUTPUT_FPS)
+
+
+def manifest_of(generator: Generator[S], request: Request, settings: S) -> dict[str, Any]:
+    """Where a motion comes from: everything that decides it, nothing that differs between two equal runs."""
+    bundle, text, recording = generator.bundle, request.text, request.recording
+    streamed = {} if recording is None else {"stream": recording.stream, "prompts": list(recording.prompts)}
+    return {
+        "prompt": text.prompt,
+        "rewritten": text.rewritten,
+        **({} if text.not_rewritten is None else {"not_rewritten": text.not_rewritten}),
+        "graph": text.graph.to_json(),
+        "model": bundle.manifest.model,
+        "bundle": bundle.reference,
+        "weights_sha256": bundle.weights_sha256,
+        "random_weights": bundle.manifest.random,
+        "licence": bundle.manifest.licence,
+        "seed": request.seed,
+        "settings": generator.described(settings),
+        "software": software_of(generator),
+        **streamed,
+    }
+
+
+def software_of(generator: Generator[Any]) -> dict[str, Any]:
+    """What equal tokens depend on besides the inputs: device kind, number type, threads, versions."""
+    return {
+        "marey": version("marey"),
+        "torch": torch.__version__,
+        "device": generator.device.type,
+        "dtype": str(generator.dtype).removeprefix("torch."),
+        "threads": torch.get_num_threads(),
+    }
+
+
+def finish(
+    generator: Generator[S],
+    request: Request,
+    generated: Generated,
+    settings: S,
+    *,
+    fps: float | None = None,
+    clean: bool = True,
+) -> MotionClip:
+    """The finished clip: decoded, feet cleaned, rotations solved, resampled.
+
+    Args:
+        fps: output rate; None = the model's.
+        clean: lock feet where they stand.
+    """
+    manifest = {**manifest_of(generator, request, settings), "feet_cleaned": clean}
+    return finish_motion(generated.features, generator.layout, fps=fps, clean=clean, manifest=manifest)
+
+
+def export_clip(clip: MotionClip, licence: str) -> Export:
+    """The npz and the BVH of a clip, in memory."""
+    contents: Mapping[str, bytes] = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
+    return Export(
+        files=tuple(ExportedFile(name, content, MEDIA_TYPES[name]) for name, content in contents.items()),
+        frames=clip.frames,
+        fps=clip.fps,
+        licence=licence,
+        manifest=clip.manifest,
+    )

@@ -1,0 +1,64 @@
+"""The bundle of the role labeller: weights, data credits, licence, scores."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from marey.bundles import Bundle, BundleWriter, DataSource
+from marey.labeller.card import card
+from marey.labeller.fit import PROPBANK_FIT
+from marey.text.encoders import weights_sha256
+from marey.text.light import UPDATES
+
+if TYPE_CHECKING:
+    from marey.labeller.recipe import Recipe, Validation
+    from marey.labeller.weights import Weights
+
+CAPTIONS = DataSource(
+    name="AllenNLP SRL-BERT labels of KIT-ML captions",
+    licence="Apache-2.0 (labels, jpthu17/GraphMotion); captions: KIT Motion-Language data set",
+    credit="Jin et al. 2023 (GraphMotion); Shi & Lin 2019 (the parser); Plappert et al. 2016 (KIT-ML)",
+)
+PROPBANK = DataSource(
+    name="PropBank of the English Web Treebank (github.com/propbank/propbank-release)",
+    licence="CC-BY-SA-4.0",
+    credit="The PropBank project: Palmer et al. 2005, Pradhan et al. 2022",
+)
+TREEBANK = DataSource(
+    name="Universal Dependencies English Web Treebank (github.com/UniversalDependencies/UD_English-EWT)",
+    licence="CC-BY-SA-4.0",
+    credit="Silveira et al. 2014; Bies et al. 2012",
+)
+
+
+def pack(output: Path, weights: Weights, gold: Sequence[Path], recipe: Recipe, result: Validation | None) -> Bundle:
+    """Write the bundle; weights that PropBank went into are under its terms."""
+    sources = [CAPTIONS.model_copy(update={"sha256": hashlib.sha256(file.read_bytes()).hexdigest()}) for file in gold]
+    if recipe.first:
+        sources += [PROPBANK, TREEBANK]
+    with BundleWriter(output, overwrite=True) as writer:
+        writer.add_part("labeller", {name: value.numpy() for name, value in weights.head.items()})
+        writer.add_part(UPDATES, {name: value.numpy() for name, value in weights.updates.items()})
+        writer.add_card(card(result))
+        return writer.finish(
+            name=output.name,
+            version="1",
+            kind="labeller",
+            model="light",
+            config="light",
+            parameters={**asdict(weights.network), "minilm_sha256": weights_sha256(recipe.minilm)},
+            data=tuple(sources),
+            licence="CC-BY-SA-4.0" if recipe.first else "Apache-2.0",
+            metrics=result.metrics() if result else {},
+            training={
+                "command": "python -m marey.labeller.train",
+                "seed": recipe.seed,
+                **asdict(recipe.config),
+                **asdict(recipe.pool),
+                **({"first": asdict(PROPBANK_FIT)} if recipe.first else {}),
+            },
+        )

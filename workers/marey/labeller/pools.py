@@ -1,0 +1,98 @@
+"""What the role labeller is trained on, batch by batch: first PropBank, then captions."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from marey.labeller.data import Augmenter
+from marey.labeller.fit import Encoded, encode
+from marey.labeller.grammar import Example, sentence
+from marey.text.light import WordStates
+from marey.text.roles import Frame
+
+CHUNKS = 16  # batches that are drawn together, so that sentences of like length share one: little padding
+
+
+@dataclass(frozen=True)
+class CaptionPool:
+    """Sentences of the second training, and their weights; a variant's is 1."""
+
+    variants: int = 6  # augmented copies of each gold sentence
+    grammar: int = 700  # silver sentences
+    propbank: int = 1000  # sentences of the first training, so that it is not forgotten
+    gold_weight: float = 2.0
+    grammar_weight: float = 0.7
+    propbank_weight: float = 0.4
+
+
+def frequent_roles(examples: Sequence[Example], least: int = 100) -> set[str]:
+    """Roles that occur often enough to be learned."""
+    counts = Counter(a.role for example in examples for frame in example.frames for a in frame.arguments)
+    return {role for role, count in counts.items() if count >= least}
+
+
+def with_roles(examples: Sequence[Example], roles: set[str]) -> list[Example]:
+    """The examples without arguments of any other role."""
+    return [
+        Example(
+            example.words,
+            tuple(Frame(f.predicate, tuple(a for a in f.arguments if a.role in roles)) for f in example.frames),
+        )
+        for example in examples
+    ]
+
+
+def split(examples: Sequence[Example]) -> tuple[list[Example], list[Example]]:
+    """Sentences to train on, and 300 to score; names and greetings of three words at most are left out."""
+    kept = [example for example in examples if example.frames or len(example.words) > 3]
+    random.Random(5).shuffle(kept)  # noqa: S311
+    return kept[300:], kept[:300]
+
+
+def propbank_batches(
+    examples: Sequence[Example], words: WordStates, tags: Sequence[str], size: int, seed: int, grammar: int = 1500
+) -> Iterator[list[Encoded]]:
+    """PropBank and the grammar again and again, `size` sentences at a time, without end."""
+    rng = random.Random(seed)  # noqa: S311
+    silver = [sentence(rng) for _ in range(grammar)]
+    noise = Augmenter(silver, rng).noise
+    pool = [encode(example, words, tags) for example in [*examples, *map(noise, silver)]]
+    while True:
+        rng.shuffle(pool)
+        for start in range(0, len(pool), CHUNKS * size):
+            drawn = sorted(pool[start : start + CHUNKS * size], key=lambda item: len(item.tokens[0]))
+            yield from _chunks(drawn, size, rng)
+
+
+def caption_batches(
+    gold: Sequence[Example],
+    propbank: Sequence[Example],
+    words: WordStates,
+    tags: Sequence[str],
+    config: CaptionPool,
+    size: int,
+    seed: int,
+) -> Iterator[list[Encoded]]:
+    """Captions, their variants, the grammar and some of PropBank, drawn by weight, `size` at a time, without end."""
+    rng = random.Random(seed)  # noqa: S311
+    augmenter = Augmenter(gold, rng)
+    pool = [(example, config.gold_weight) for example in gold]
+    pool += [(augmenter.variant(example), 1.0) for _ in range(config.variants) for example in gold]
+    pool += [(augmenter.noise(sentence(rng)), config.grammar_weight) for _ in range(config.grammar)]
+    some = rng.sample(propbank, min(config.propbank, len(propbank)))
+    pool += [(example, config.propbank_weight) for example in some]
+    encoded = [encode(example, words, tags) for example, _ in pool]
+    weights = [weight for _, weight in pool]
+    while True:
+        drawn = rng.choices(encoded, weights, k=CHUNKS * size)
+        drawn.sort(key=lambda item: len(item.tokens[0]) + rng.uniform(-1.5, 1.5))
+        yield from _chunks(drawn, size, rng)
+
+
+def _chunks(drawn: Sequence[Encoded], size: int, rng: random.Random) -> Iterator[list[Encoded]]:
+    chunks = [list(drawn[i : i + size]) for i in range(0, len(drawn), size)]
+    rng.shuffle(chunks)
+    yield from chunks

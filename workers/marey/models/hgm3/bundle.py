@@ -1,0 +1,84 @@
+"""HGM³'s networks as one bundle: assembling, loading, and a random one for the machinery's tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from marey.bundles import Bundle, TextSpec
+from marey.core.errors import InvalidBundle
+from marey.models.hgm3.config import HGM3Config, named_config
+from marey.models.hgm3.model import LengthEstimator, LossPredictor, MaskedTransformer, ResidualTransformer
+from marey.models.hgm3.tokenizer import Tokenizer
+from marey.nn.bundling import fill, random_parts, standing, write_generator
+from marey.nn.motion_tokenizer import biased_std
+
+MODEL = "hgm3"
+
+
+@dataclass(frozen=True)
+class Networks:
+    """All parts of a bundle."""
+
+    tokenizer: Tokenizer
+    masked: MaskedTransformer
+    predictor: LossPredictor  # the teacher, for the heat map
+    residual: ResidualTransformer
+    length: LengthEstimator
+
+    @classmethod
+    def build(cls, config: HGM3Config) -> Networks:
+        """Freshly initialised networks."""
+        return cls(
+            Tokenizer(config),
+            MaskedTransformer(config),
+            LossPredictor(config),
+            ResidualTransformer(config),
+            LengthEstimator(config),
+        )
+
+    def parts(self) -> dict[str, nn.Module]:
+        """Part name to network."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def load_networks(bundle: Bundle) -> tuple[HGM3Config, Networks]:
+    """Build and fill the networks of a bundle, float32, in evaluation mode.
+
+    Raises:
+        InvalidBundle: of another model, or its tensors do not fit its configuration.
+    """
+    if bundle.manifest.model != MODEL:
+        raise InvalidBundle(f"is a bundle of {bundle.manifest.model}, not of {MODEL}", where=str(bundle.path))
+    config = HGM3Config.from_dict(bundle.manifest.parameters)
+    networks = Networks.build(config)
+    for name, network in networks.parts().items():
+        fill(network, bundle, name)
+    mean, std = (torch.from_numpy(v) for v in bundle.statistics())
+    networks.tokenizer.set_statistics(mean, std)
+    networks.residual.set_codebooks(networks.tokenizer.quantizer.codebooks)
+    return config, networks
+
+
+def random_bundle(path: Path | str, config: str | HGM3Config = "tiny", seed: int = 0) -> Bundle:
+    """A real bundle with random weights: it exercises everything and generates nonsense (manifest `random` = true).
+
+    Statistics are those of a person standing still, so that joints stay in sight.
+    """
+    path = Path(path)
+    config = named_config(config) if isinstance(config, str) else config
+    parts = random_parts(lambda: Networks.build(config).parts(), ("masked", "predictor", "residual"), seed)
+    mean, std = standing(config.layout)
+    text = TextSpec(
+        encoder="minilm" if config.condition.text_width == 384 else "clip-vit-b32",
+        width=config.condition.text_width,
+        max_actions=config.condition.max_actions,
+        max_specifics=config.condition.max_specifics,
+    )
+    biased = biased_std(torch.from_numpy(std), config.tokenizer.feature_bias).numpy()
+    return write_generator(
+        path, MODEL, config, parts, (mean, biased), text=text, random=True, licence="MIT", overwrite=True
+    )

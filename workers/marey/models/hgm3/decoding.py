@@ -1,0 +1,178 @@
+"""The decoding loops of HGM³ (Sec. 3.4): base tokens by confidence under three conditions, then residual levels.
+
+An item's tokens depend on its own seed, text and length alone. A forward holds items of one bucket (a multiple of 8
+tokens) and both branches of guidance; each sequence has its readable rows first, so padding changes no bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from marey.models.hgm3.conditions import ACTION, MOTION, SPECIFIC
+from marey.models.hgm3.config import InferenceConfig
+from marey.models.hgm3.model import MaskedTransformer, ResidualTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.masking import remaining_masks
+from marey.nn.sampling import sample_top_k, uniform
+
+BASE_STREAM, RESIDUAL_STREAM, LENGTH_STREAM = 1, 2, 3
+"""What random numbers are drawn for; see `marey.nn.sampling.uniform`."""
+
+KeepRows = Callable[[], Tensor | None]
+"""Called after each pass: bool (B,) rows to go on with, or None for all."""
+
+
+@dataclass(frozen=True)
+class DecodeOptions:
+    """Savings and variants; the first two change no token."""
+
+    skip_idle: bool = True  # leave out passes that keep nothing
+    trim_slots: bool = True  # leave out slots that nobody reads
+    min_progress: bool = False  # keep at least one token a pass (ours): other tokens
+
+
+@dataclass(frozen=True)
+class Items:
+    """The items of one bucket."""
+
+    lengths: Tensor  # (B,) own tokens n
+    seeds: Tensor  # (B,) int64
+    condition: Tensor  # (B, S, w) condition tokens of the masked transformer
+    present: Tensor  # (B, S) bool
+    sentence: Tensor  # (B, w') text token of the residual transformer
+    tokens: Tensor  # (B, n_bucket, V) int64, -1 where not decoded
+    decided: Tensor  # (B, 3) int64: base tokens that each level of condition decided
+
+    def select(self, rows: Tensor) -> Items:
+        """The items at `rows`."""
+        fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
+        return Items(**fields)
+
+
+def condition_level(step: int, config: InferenceConfig) -> int:
+    """C(l) of eq. 14 for pass l = 1 … L."""
+    if step > config.action_steps:
+        return SPECIFIC
+    return MOTION if step <= config.motion_steps else ACTION
+
+
+def decode_base(
+    model: MaskedTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
+) -> Items:
+    """Fill `tokens[..., 0]`: L passes, each keeping the most confident tokens and never masking them again."""
+    base = torch.full_like(items.tokens[..., 0], model.mask_token)  # (B, n)
+    schedule = _schedules(items.lengths, config.steps, options)  # (L + 1, B): masked before each pass, at last 0
+    for step in range(1, config.steps + 1):
+        before, after = schedule[step - 1], schedule[step]
+        active = (after < before).nonzero().squeeze(1)
+        rows = active if options.skip_idle and len(active) < len(base) else None
+        if rows is None or len(rows):
+            level = condition_level(step, config)
+            some = items if rows is None else items.select(rows)
+            masked_left = after if rows is None else after[rows]
+            part = base if rows is None else base[rows]
+            filled = _base_pass(model, some, part, masked_left, step, level, config, options)
+            items.decided[:, level] += before - after
+            if rows is None:
+                base = filled
+            else:
+                base[rows] = filled
+        stay = keep()
+        if stay is not None:
+            items, base, schedule = items.select(stay), base[stay], schedule[:, stay]
+    valid = frame_mask(items.lengths, base.shape[1])
+    tokens = items.tokens.clone()
+    tokens[..., 0] = base.masked_fill(~valid, -1)
+    return replace(items, tokens=tokens)
+
+
+def _base_pass(
+    model: MaskedTransformer,
+    items: Items,
+    base: Tensor,
+    masked_left: Tensor,
+    step: int,
+    level: int,
+    config: InferenceConfig,
+    options: DecodeOptions,
+) -> Tensor:
+    """One pass: predict at the masked tokens, keep all but the `masked_left` (B,) least confident. (B, n) -> (B, n)."""
+    size = base.shape[1]
+    valid = frame_mask(items.lengths, size)  # (B, n)
+    guided = _base_logits(model, items, base, valid, level, config.guidance, options)  # (B, n, K)
+    noise = uniform(items.seeds, BASE_STREAM, step, torch.arange(size, device=base.device))
+    drawn = sample_top_k(guided, noise, temperature=config.temperature, share=config.top_k)  # (B, n)
+    # Confidence = the guided softmax itself, before temperature and top-k.
+    confidence = (guided.gather(-1, drawn[..., None]).squeeze(-1) - guided.logsumexp(-1)).masked_fill(
+        (base != model.mask_token) | ~valid, torch.inf
+    )
+    order = confidence.argsort(dim=1, stable=True)  # least confident first; ties go to the earlier token
+    rank = torch.empty_like(order).scatter_(1, order, torch.arange(size, device=base.device).expand_as(order))
+    filled = torch.where(base == model.mask_token, drawn, base)
+    return filled.masked_fill(rank < masked_left[:, None], model.mask_token)
+
+
+def _base_logits(
+    model: MaskedTransformer,
+    items: Items,
+    base: Tensor,
+    valid: Tensor,
+    level: int,
+    guidance: float,
+    options: DecodeOptions,
+) -> Tensor:
+    """Guided logits (B, n, K), from one forward of 2 B sequences."""
+    null = torch.cat([model.condition.null.expand_as(items.condition[:, :1]), items.condition[:, 1:]], 1)
+    visible = model.condition.visible(items.present, level)
+    first = torch.zeros_like(visible)
+    first[:, 0] = True
+    return model(
+        base.repeat(2, 1),
+        valid.repeat(2, 1),
+        torch.cat([items.condition, null]),
+        torch.cat([visible, first]),
+        (valid & (base == model.mask_token)).repeat(2, 1),
+        trim=options.trim_slots,
+        guidance=guidance,
+    )
+
+
+def decode_residual(
+    model: ResidualTransformer, items: Items, config: InferenceConfig, options: DecodeOptions, keep: KeepRows
+) -> Items:
+    """Fill `tokens[..., 1:]` level by level, both branches of guidance in one forward."""
+    size = items.tokens.shape[1]
+    for level in range(1, model.levels):
+        valid = frame_mask(items.lengths, size)
+        below = [model.embed(items.tokens[..., v], v) for v in range(level)]
+        total = torch.stack(below).sum(0)  # (B, n, d)
+        levels = torch.full_like(items.lengths, level).repeat(2)
+        both = torch.cat([items.sentence, model.null.expand_as(items.sentence)])  # (2 B, w')
+        guided = model(
+            total.repeat(2, 1, 1),
+            valid.repeat(2, 1),
+            levels,
+            both,
+            trim=options.trim_slots,
+            guidance=config.residual_guidance,
+        )
+        noise = uniform(items.seeds, RESIDUAL_STREAM, level, torch.arange(size, device=valid.device))
+        drawn = sample_top_k(
+            guided, noise, temperature=config.residual_temperature, share=config.residual_top_k
+        ).masked_fill(~valid, -1)
+        tokens = items.tokens.clone()
+        tokens[..., level] = drawn
+        items = replace(items, tokens=tokens)
+        stay = keep()
+        items = items if stay is None else items.select(stay)
+    return items
+
+
+def _schedules(lengths: Tensor, steps: int, options: DecodeOptions) -> Tensor:
+    """Masked tokens before pass 1 and after each pass: (L + 1, B)."""
+    columns = [[n, *remaining_masks(n, steps, min_progress=options.min_progress)] for n in lengths.tolist()]
+    return torch.tensor(columns, device=lengths.device).T.contiguous()

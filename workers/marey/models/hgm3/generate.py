@@ -1,0 +1,296 @@
+"""Prompts' features in, motion features out: the whole of HGM³'s inference behind one class."""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from marey.bundles import Bundle
+from marey.core.errors import InvalidInput
+from marey.generation.port import Control, Limits, NoControl, Request, open_bundle, read_settings
+from marey.models.hgm3.bundle import Networks, load_networks
+from marey.models.hgm3.conditions import graph_batch
+from marey.models.hgm3.config import HGM3Config, InferenceConfig
+from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
+from marey.motion.features import FeatureLayout, layout
+from marey.nn.lanes import Lanes
+from marey.nn.sampling import uniform
+
+BUCKET = 8
+"""Tokens; an item is padded to a multiple of this, never to its batch's longest."""
+MAX_ROWS = 32
+"""Items a forward; beyond it a larger batch gains nothing on a CPU and costs memory."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Uniform over a batch; None = what the bundle says."""
+
+    steps: int | None = None
+    motion_steps: int | None = None
+    action_steps: int | None = None
+    guidance: float | None = None
+    temperature: float | None = None
+    top_k: float | None = None
+    residual_guidance: float | None = None
+    residual_temperature: float | None = None
+    residual_top_k: float | None = None
+    min_progress: bool = False
+    skip_idle: bool = True
+    trim_slots: bool = True
+
+    def inference(self, default: InferenceConfig) -> InferenceConfig:
+        """The bundle's decoding with this batch's changes; stage boundaries scale with the steps.
+
+        Raises:
+            InvalidInput: a value out of range.
+        """
+        names = [n for n in InferenceConfig.__dataclass_fields__ if getattr(self, n, None) is not None]
+        config = replace(default, **{n: getattr(self, n) for n in names})
+        if config.steps != default.steps:
+            share = config.steps / default.steps
+            config = replace(
+                config,
+                motion_steps=round(config.motion_steps * share) if self.motion_steps is None else config.motion_steps,
+                action_steps=round(config.action_steps * share) if self.action_steps is None else config.action_steps,
+            )
+        if not 1 <= config.steps <= 100:
+            raise InvalidInput("must lie between 1 and 100", where="steps")
+        for name in ("top_k", "residual_top_k"):
+            if not 0 < getattr(config, name) <= 1:
+                raise InvalidInput("must lie in (0, 1]: the share of codes that may be drawn", where=name)
+        for name in ("temperature", "residual_temperature", "guidance", "residual_guidance"):
+            if not 0 <= getattr(config, name) <= 100:
+                raise InvalidInput("must lie between 0 and 100", where=name)
+        return config
+
+
+@dataclass(frozen=True)
+class Generated:
+    """One motion as the network made it: before decoding to joints and clean-up."""
+
+    tokens: NDArray[np.int16]  # (V, n)
+    features: NDArray[np.float32]  # (Tf, D), in the layout's own units
+    decided: tuple[int, int, int]  # base tokens decided under C^m, [C^m; C^a], [C^m; C^a; C^s]
+
+
+class Generator:
+    """A loaded bundle. Not thread-safe; one a process."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        config: HGM3Config,
+        networks: Networks,
+        device: torch.device,
+        dtype: torch.dtype,
+        lanes: Lanes,
+    ) -> None:
+        self.bundle = bundle
+        self.lanes = lanes
+        self.config = config
+        self.networks = networks
+        self.device = device
+        self.dtype = dtype
+        self.layout: FeatureLayout = layout(config.layout)
+        self.limits = Limits(config.min_frames, config.max_frames, config.fps, config.condition.text_width)
+        self.batch = MAX_ROWS
+
+    @classmethod
+    def load(
+        cls, bundle: Bundle | str, *, device: str = "auto", threads: int = 0, dtype: torch.dtype | None = None
+    ) -> Generator:
+        """Load a bundle.
+
+        Args:
+            bundle: a verified bundle, or its name or path.
+            device: `auto`, `cpu`, `cuda`, `cuda:N`.
+            threads: of torch; 0 leaves torch's own choice.
+            dtype: of the transformers' matrices; None = bfloat16 where the device multiplies it fast, else float32.
+
+        Raises:
+            InvalidBundle: not HGM³, or damaged.
+            InvalidInput: no such device.
+        """
+        verified, chosen, dtype = open_bundle(bundle, device, threads, dtype)
+        config, networks = load_networks(verified)
+        for part in networks.parts().values():
+            part.to(chosen)
+        # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.
+        lanes = Lanes(torch.get_num_threads() if chosen.type == "cpu" else 1)
+        networks.masked.lower(dtype, lanes)
+        networks.residual.lower(dtype, lanes)
+        if dtype != torch.float32:
+            networks.tokenizer.decoder.lower(dtype)
+        return cls(verified, config, networks, chosen, dtype, lanes)
+
+    @property
+    def frames_per_token(self) -> int:
+        """N/n."""
+        return self.config.tokenizer.frames_per_token
+
+    @torch.inference_mode()
+    def generate(
+        self, requests: Sequence[Request], settings: Settings | None = None, *, control: Control | None = None
+    ) -> list[Generated | None]:
+        """Make one motion a request; None where `control` dropped it.
+
+        The tokens of an item do not depend on the others, on their number or order.
+
+        Raises:
+            InvalidInput: a length or seed out of range, or features of another encoder.
+        """
+        settings = settings or Settings()
+        inference = settings.inference(self.config.inference)
+        options = DecodeOptions(settings.skip_idle, settings.trim_slots, settings.min_progress)
+        frames = [self.frames(request) for request in requests]
+        results: list[Generated | None] = [None] * len(requests)
+        groups = self._groups(frames)
+        steps = _Steps(control or NoControl(), len(groups) * (inference.steps + self.config.tokenizer.levels))
+
+        def make(rows: list[int]) -> None:
+            self._group(_Watcher(steps, rows), requests, frames, inference, options, results)
+
+        with self.lanes.open():
+            self.lanes.map(make, groups)
+        return results
+
+    def settings(self, values: Mapping[str, Any]) -> Settings:
+        """An item's settings, checked. Raises InvalidInput."""
+        settings = read_settings(Settings, values, InferenceConfig.__dataclass_fields__)
+        settings.inference(self.config.inference)
+        return settings
+
+    def described(self, settings: Settings) -> dict[str, Any]:
+        """Everything that decides how tokens are drawn."""
+        return asdict(settings.inference(self.config.inference))
+
+    def settled(self, request: Request) -> Request:
+        """The request with the length that the estimator draws with its seed, where none was asked for."""
+        return replace(request, frames=self.frames(request))
+
+    def frames(self, request: Request) -> int:
+        """Feature frames: as asked, or drawn from the length estimator. Raises InvalidInput out of range."""
+        self.limits.check(request)
+        return self._estimate(request) if request.frames is None else request.frames
+
+    def bucket(self, request: Request) -> int:
+        """Tokens, rounded up: those of one forward."""
+        return self._bucket(self.frames(request))
+
+    def _bucket(self, frames: int) -> int:
+        tokens = -(-frames // self.frames_per_token)
+        return -(-tokens // BUCKET) * BUCKET
+
+    def _estimate(self, request: Request) -> int:
+        """Frames from the middle third of the estimated distribution (ours): seeds differ, extremes do not come."""
+        sentence = torch.from_numpy(request.text.nodes[:1].astype(np.float32)).to(self.device)
+        share = torch.softmax(self.networks.length(sentence).float(), -1).cumsum(-1)  # (1, n_max)
+        seeds = torch.tensor([request.seed], device=self.device)
+        draw = uniform(seeds, LENGTH_STREAM, 0, torch.zeros(1, dtype=torch.long, device=self.device))
+        tokens = int((share < (1 + draw) / 3 * share[:, -1:]).sum()) + 1
+        frames = tokens * self.frames_per_token
+        return min(max(frames, self.config.min_frames), self.config.max_frames)
+
+    def _groups(self, frames: Sequence[int]) -> list[list[int]]:
+        """Rows of one bucket each, at most MAX_ROWS and no more than a lane's share; the longest motions first."""
+        buckets: dict[int, list[int]] = defaultdict(list)
+        for row, count in enumerate(frames):
+            buckets[self._bucket(count)].append(row)
+        most = min(MAX_ROWS, -(-len(frames) // self.lanes.count))
+        longest = sorted(buckets.items(), reverse=True)
+        return [rows[i : i + most] for _, rows in longest for i in range(0, len(rows), most)]
+
+    def _group(
+        self,
+        watcher: _Watcher,
+        requests: Sequence[Request],
+        frames: Sequence[int],
+        inference: InferenceConfig,
+        options: DecodeOptions,
+        results: list[Generated | None],
+    ) -> None:
+        rows = watcher.rows
+        if not rows:
+            return
+        items = self._items([requests[r] for r in rows], [frames[r] for r in rows])
+        items = decode_base(self.networks.masked, items, inference, options, watcher.step)
+        items = decode_residual(self.networks.residual, items, inference, options, watcher.step)
+        if not watcher.rows:
+            return
+        for position, row in enumerate(watcher.rows):
+            # one by one, at its own length: a convolution rounds differently in another batch, files would differ
+            tokens = items.tokens[position, : int(items.lengths[position])]  # (n, V)
+            features = self.networks.tokenizer.decode(tokens[None])[0, : frames[row]]
+            results[row] = Generated(
+                tokens.T.cpu().numpy().astype(np.int16),
+                features.cpu().numpy(),
+                tuple(items.decided[position].tolist()),
+            )
+        watcher.step()
+
+    def _items(self, requests: Sequence[Request], frames: Sequence[int]) -> Items:
+        lengths = [-(-f // self.frames_per_token) for f in frames]
+        bucket = -(-max(lengths) // BUCKET) * BUCKET
+        device, levels = self.device, self.config.tokenizer.levels
+        # One by one, once a batch: a float32 product of few rows rounds differently with their number.
+        graphs = [graph_batch([r.text], self.config.condition, device) for r in requests]
+        masked, residual = self.networks.masked, self.networks.residual
+        return Items(
+            lengths=torch.tensor(lengths, device=device),
+            seeds=torch.tensor([r.seed for r in requests], device=device),
+            condition=torch.cat([masked.condition(masked.text(graph)) for graph in graphs]),
+            present=torch.cat([graph.present for graph in graphs]),
+            sentence=torch.cat([residual.sentence(graph.nodes[:, 0]) for graph in graphs]),
+            tokens=torch.full((len(requests), bucket, levels), -1, device=device),
+            decided=torch.zeros(len(requests), 3, dtype=torch.long, device=device),
+        )
+
+
+class _Steps:
+    """Counts the steps of all groups, which lanes make side by side, and reports them."""
+
+    def __init__(self, control: Control, total: int) -> None:
+        self._control = control
+        self._total = total
+        self._done = 0
+        self._lock = threading.Lock()
+
+    def step(self) -> set[int]:
+        """One step done; requests to leave out."""
+        with self._lock:
+            self._done = min(self._done + 1, self._total)
+            self._control.progress(self._done, self._total)
+            return self._control.dropped()
+
+    def dropped(self) -> set[int]:
+        """Requests to leave out."""
+        with self._lock:
+            return self._control.dropped()
+
+
+class _Watcher:
+    """Turns dropped requests into rows of one group to keep."""
+
+    def __init__(self, steps: _Steps, rows: list[int]) -> None:
+        """`rows`: the group's requests."""
+        self._steps = steps
+        dropped = steps.dropped()
+        self.rows = [r for r in rows if r not in dropped]
+
+    def step(self) -> Tensor | None:
+        """One step done; rows to keep, or None for all."""
+        dropped = self._steps.step()
+        if not dropped or not any(r in dropped for r in self.rows):
+            return None
+        keep = [r not in dropped for r in self.rows]
+        self.rows = [r for r in self.rows if r not in dropped]
+        return torch.tensor(keep)

@@ -1,0 +1,135 @@
+"""More to learn from: what a finished bundle makes of training captions, where the checker says that it obeyed (ours).
+
+    python -m marey.models.hgm3.practice models/hgm3-starter DATA --run RUN
+
+Asked for mostly are sequences, which captures show and the model obeys least; who fails may try again. What is kept
+lies in the run folder, where the masked stage finds it: one round of Gulcehre et al. 2023, "Reinforced Self-Training
+(ReST) for Language Modeling".
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from marey.checks.judge import Expectation, judge
+from marey.checks.rates import expectations
+from marey.core.errors import MareyError
+from marey.data.manifest import Clip
+from marey.data.prepared import PreparedData
+from marey.generation.export import finish
+from marey.generation.port import Request
+from marey.models.hgm3.generate import Generator
+from marey.text.pipeline import TextPipeline
+from marey.training.drawn import Drawn
+from marey.training.obedience import pipeline_of
+
+ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
+"""Shares of the captions by how many acts they ask for."""
+TRIES = 3
+
+Expected = tuple[Expectation, ...]
+
+
+@dataclass(frozen=True)
+class _Try:
+    """A caption of a clip, and how often it was tried in vain."""
+
+    clip: int
+    caption: str
+    expected: Expected
+    failed: int = 0
+
+
+def practise(
+    generator: Generator,
+    pipeline: TextPipeline,
+    prepared: PreparedData,
+    captions: int,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Drawn:
+    """Draw motions for training captions, and keep those that obey.
+
+    Args:
+        generator: the loaded bundle.
+        pipeline: how it reads prompts.
+        prepared: the data whose captions are asked for.
+        captions: how many, each up to `TRIES` times.
+        seed: of the choice and of the motions.
+        progress: told how many obeyed, now and then.
+    """
+    rng = np.random.default_rng(seed)
+    waiting = deque(_chosen(prepared.clips, captions, rng))
+    settings, kept, drawn = generator.settings({}), list[tuple[int, torch.Tensor]](), 0
+    asked, obeyed = Counter[int](), Counter[int]()
+    while waiting:
+        some = [waiting.popleft() for _ in range(min(generator.batch, len(waiting)))]
+        features = pipeline.features([each.caption for each in some])
+        requests = [Request(text, int(rng.integers(2**31))) for text in features]
+        for each, request, made in zip(some, requests, generator.generate(requests, settings), strict=True):
+            assert made is not None  # nothing drops rows here
+            clip = finish(generator, request, made, settings)
+            passed = judge(clip.joints, clip.fps, each.expected).passed
+            asked[len(each.expected)] += 1
+            obeyed[len(each.expected)] += passed
+            if passed:
+                kept.append((each.clip, torch.from_numpy(made.tokens.astype(np.int64)).T))
+            elif each.failed + 1 < TRIES:
+                waiting.append(_Try(each.clip, each.caption, each.expected, each.failed + 1))
+        drawn += len(some)
+        shares = ", ".join(f"{obeyed[acts]}/{asked[acts]} of {acts}" for acts in sorted(asked))
+        progress(f"{drawn} drawn, {len(waiting)} to come; obeyed by acts: {shares}")
+    return Drawn.of(kept)
+
+
+def _chosen(clips: Sequence[Clip], count: int, rng: np.random.Generator) -> list[_Try]:
+    """Captions of training clips whose acts can be checked; rare pairs of acts oftener than they occur."""
+    groups: dict[int, dict[Expected, list[int]]] = defaultdict(lambda: defaultdict(list))
+    for number, clip in enumerate(clips):
+        expected = expectations(clip.acts, clip.sides)
+        if clip.split == "train" and clip.captions and expected is not None and len(expected) in ACTS:
+            groups[len(expected)][expected].append(number)
+    shares = np.array([ACTS[acts] for acts in groups])
+    chosen: list[_Try] = []
+    for acts in rng.choice(list(groups), count, p=shares / shares.sum()) if groups else ():
+        weights = np.sqrt([len(members) for members in groups[acts].values()])
+        expected = list(groups[acts])[rng.choice(len(weights), p=weights / weights.sum())]
+        clip = int(rng.choice(groups[acts][expected]))
+        chosen.append(_Try(clip, str(rng.choice(clips[clip].captions)), expected))
+    return chosen
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw with a bundle, and leave what obeyed in a run folder."""
+    parser = argparse.ArgumentParser(prog="python -m marey.models.hgm3.practice", description=__doc__)
+    parser.add_argument("bundle", help="name or path; the run must have its tokenizer (`marey train hgm3 unpack`)")
+    parser.add_argument("data", type=Path, help="prepared folder")
+    parser.add_argument("--run", type=Path, required=True, help="run folder")
+    parser.add_argument("--captions", type=int, default=3600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, default=0)
+    chosen = parser.parse_args(arguments)
+    generator = Generator.load(chosen.bundle, threads=chosen.threads)
+    prepared = PreparedData.open(chosen.data)
+    drawn = practise(
+        generator, pipeline_of(generator), prepared, chosen.captions, chosen.seed,
+        lambda line: print(f"\r{line}", end="", file=sys.stderr),  # noqa: T201
+    )  # fmt: skip
+    print(file=sys.stderr)  # noqa: T201
+    drawn.write(chosen.run, generator.networks.tokenizer, prepared)
+    print(f"{len(drawn.clips)} motions kept")  # noqa: T201
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except MareyError as error:
+        sys.exit(f"{error}")

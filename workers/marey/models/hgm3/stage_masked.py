@@ -1,0 +1,210 @@
+"""Training stage of the masked transformer F_θ and the loss predictor G_φ: hard token mining (HGM³ Sec. 3.2-3.3)."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from marey.data.manifest import Clip
+from marey.models.hgm3.conditions import LEVELS, GraphBatch
+from marey.models.hgm3.config import HGM3Config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.model import LossPredictor, MaskedTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.ema import update_average, warm_momentum
+from marey.nn.losses import ranking_loss, token_losses
+from marey.nn.masking import easy_to_hard_mask, mask_counts
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs, pieces_of
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A piece of a batch of (clip, caption) pairs, with everything random already drawn."""
+
+    tokens: Tensor  # (B, n) base tokens, -1 beyond a clip's own length
+    lengths: Tensor  # (B,)
+    graphs: GraphBatch
+    progress: Tensor  # τ (B,)
+    noise: Tensor  # (B, n)
+    dropped: Tensor  # (B,) bool: without condition, at every level and for G
+    level: Tensor  # (B,) condition level
+
+    def select(self, rows: Tensor) -> Sample:
+        """The samples at `rows`, cut to their longest."""
+        size = int(self.lengths[rows].max())
+        return Sample(
+            self.tokens[rows, :size],
+            self.lengths[rows],
+            self.graphs.select(rows),
+            self.progress[rows],
+            self.noise[rows, :size],
+            self.dropped[rows],
+            self.level[rows],
+        )
+
+    def at_level(self, level: int) -> Sample:
+        """The same samples, noise and τ under another condition."""
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return Sample(**{**fields, "level": torch.full_like(self.level, level)})
+
+
+class MaskedModule(nn.Module):
+    """Student F and G, and the teacher of G (eq. 6)."""
+
+    def __init__(self, config: HGM3Config) -> None:
+        super().__init__()
+        self.masked = MaskedTransformer(config)
+        self.predictor = LossPredictor(config)
+        self.teacher = copy.deepcopy(self.predictor).requires_grad_(False)
+
+
+class MaskedStage:
+    """F and G trained together."""
+
+    name = "masked"
+
+    def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
+        self.config = config
+        self.optimisation = config.train_masked
+        self.tokens, self.captions = tokens, captions
+        self.module = MaskedModule(config).to(tokens.tokens.device)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
+        normalizer = self.module.masked.text.normalizer
+        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
+        normalizer.mean.copy_(mean)
+        normalizer.std.copy_(std)
+        with torch.no_grad():
+            self.module.masked.head.bias.copy_(tokens.log_shares(config.tokenizer.codes)[0])
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """F (with the graph) and G apart."""
+        return [list(self.module.masked.parameters()), list(self.module.predictor.parameters())]
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """L_rec + L_pred (eq. 7, 12, 13), averaged over levels."""
+        rng, c = context.rng, self.config
+        clips = self.pairs.draw(rng, self.optimisation.batch)
+        sample = self.sample(clips, rng)
+        mining = c.mining
+        alpha = 0.0
+        if mining.mask == "hard":
+            alpha = mining.alpha_start + context.fraction * (mining.alpha_end - mining.alpha_start)  # eq. 8
+        one = mining.levels_per_step == 1
+        samples = [sample] if one else [sample.at_level(level) for level in range(LEVELS)]
+        rec = sample.noise.new_zeros(())
+        pred = sample.noise.new_zeros(())
+        counted = sample.noise.new_zeros(())
+        correct = sample.noise.new_zeros(())
+        for piece in (p for s in samples for p in _pieces(s)):
+            losses, masked, right, ranking = self._piece(piece, alpha)
+            rec = rec + (losses * masked).sum()
+            pred = pred + ranking.sum() / (self.optimisation.batch * len(samples))
+            counted = counted + masked.sum()
+            correct = correct + (right & masked).sum()
+        rec = rec / counted.clamp(min=1)
+        logs = {
+            "loss": (rec + pred).detach(),
+            "reconstruction": rec.detach(),
+            "ranking": pred.detach(),
+            "accuracy": correct / counted.clamp(min=1),
+            "alpha": torch.tensor(alpha),
+        }
+        return rec + pred, logs
+
+    def after_step(self, context: StepContext) -> None:
+        """Eq. 6: the teacher follows the student."""
+        momentum = warm_momentum(self.config.mining.momentum, context.step)
+        update_average(self.module.teacher, self.module.predictor, momentum)
+
+    def sample(self, clips: NDArray[np.int64], rng: np.random.Generator) -> Sample:
+        """Draw phase, caption, τ, noise, drop and level for each clip."""
+        device = self.tokens.tokens.device
+        phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
+        tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
+        captions = self.captions.choose(clips, rng)
+        return Sample(
+            tokens[..., 0],
+            lengths,
+            self.captions.graphs(captions),
+            torch.from_numpy(rng.random(len(clips), np.float32)).to(device),
+            torch.from_numpy(rng.random(tokens.shape[:2], np.float32)).to(device),
+            torch.from_numpy(rng.random(len(clips)) < self.config.condition.drop).to(device),
+            torch.from_numpy(rng.integers(LEVELS, size=len(clips))).to(device),
+        )
+
+    def masks(self, sample: Sample, nodes: Tensor, alpha: float) -> Tensor:
+        """Tokens to mask (B, n): the hardest by the teacher, which sees the unmasked tokens; the rest at random."""
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        counts = mask_counts(sample.progress, sample.lengths)
+        if alpha == 0:
+            return easy_to_hard_mask(torch.zeros_like(sample.noise), sample.noise, valid, counts, 0.0)
+        teacher = self.module.teacher.eval()
+        with torch.no_grad():
+            difficulty = self._predict(teacher, sample, nodes, valid)
+        return easy_to_hard_mask(difficulty, sample.noise, valid, counts, alpha)
+
+    def _piece(self, sample: Sample, alpha: float) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """ℓ (B, n), mask (B, n), which were right (B, n), ranking loss (B,)."""
+        model = self.module.masked
+        valid = frame_mask(sample.lengths, sample.tokens.shape[1])
+        nodes = model.text(sample.graphs)  # C, (B, S, W)
+        masked = self.masks(sample, nodes.detach(), alpha)
+        targets = sample.tokens.clamp(min=0)
+        condition = model.condition(nodes, sample.dropped)
+        visible = model.condition.visible(sample.graphs.present, sample.level, sample.dropped)
+        logits = model(self._shown(targets, masked), valid, condition, visible, masked)
+        losses = token_losses(logits, targets)
+        predicted = self._predict(self.module.predictor, sample, nodes.detach(), valid)
+        return losses, masked, logits.argmax(-1) == targets, ranking_loss(predicted, losses, masked)
+
+    def _predict(self, predictor: LossPredictor, sample: Sample, nodes: Tensor, valid: Tensor) -> Tensor:
+        condition = predictor.condition(nodes, sample.dropped)
+        visible = predictor.condition.visible(sample.graphs.present, sample.level, sample.dropped)
+        return predictor(sample.tokens.clamp(min=0), valid, condition, visible)
+
+    def _shown(self, targets: Tensor, masked: Tensor) -> Tensor:
+        """What stands in the place of masked tokens: [MASK] (eq. 3), or now and then another token (MoMask)."""
+        mining, codes = self.config.mining, self.config.tokenizer.codes
+        shown = targets.masked_fill(masked, self.module.masked.mask_token)
+        if mining.replace_random == 0 and mining.replace_mask == 1:
+            return shown
+        draw = torch.rand_like(targets, dtype=torch.float32)
+        foreign = masked & (draw < mining.replace_random)
+        rest = masked & ~foreign & (torch.rand_like(draw) >= mining.replace_mask)
+        shown = torch.where(foreign, torch.randint_like(targets, codes), shown)
+        return torch.where(rest, targets, shown)
+
+    @torch.no_grad()
+    def validate(self) -> Mapping[str, float]:
+        """Cross-entropy and accuracy of random masks on validation clips, per level of condition."""
+        rng = np.random.default_rng(0)
+        totals = np.zeros((LEVELS, 3))
+        ranks = 0.0
+        for clips in self.pairs.validation_batches(self.optimisation.batch):
+            sample = self.sample(clips, rng)
+            for level in range(LEVELS):
+                for piece in _pieces(sample.at_level(level)):
+                    losses, masked, right, ranking = self._piece(piece, 0.0)
+                    totals[level] += [
+                        float((losses * masked).sum()),
+                        float((right & masked).sum()),
+                        float(masked.sum()),
+                    ]
+                    ranks += float(ranking.sum()) / (LEVELS * len(self.pairs.validation))
+        names = ("motion", "action", "specific")
+        loss = {f"reconstruction/{n}": float(t[0] / t[2]) for n, t in zip(names, totals, strict=True)}
+        accuracy = {f"accuracy/{n}": float(t[1] / t[2]) for n, t in zip(names, totals, strict=True)}
+        return loss | accuracy | {"ranking": ranks}
+
+
+def _pieces(sample: Sample) -> Iterator[Sample]:
+    for rows in pieces_of(sample.lengths):
+        yield sample.select(rows)

@@ -1,0 +1,152 @@
+"""Training stages of the residual transformer (HGM³ App. A.2) and of the length estimator (after MoMask)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from marey.data.manifest import Clip
+from marey.models.hgm3.config import HGM3Config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.model import LengthEstimator, ResidualTransformer
+from marey.nn.convolution import frame_mask
+from marey.nn.losses import token_losses
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs, pieces_of
+
+
+class ResidualStage:
+    """Level v + 1 from the true levels up to v; one random level a sample."""
+
+    name = "residual"
+
+    def __init__(
+        self,
+        config: HGM3Config,
+        clips: Sequence[Clip],
+        tokens: TokenData,
+        captions: CaptionData,
+        codebooks: Tensor,
+    ) -> None:
+        self.config = config
+        self.optimisation = config.train_residual
+        self.tokens, self.captions = tokens, captions
+        self.module = ResidualTransformer(config).to(tokens.tokens.device)
+        self.module.set_codebooks(codebooks)
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens)
+        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
+        self.module.normalizer.mean.copy_(mean)
+        self.module.normalizer.std.copy_(std)
+        with torch.no_grad():
+            self.module.bias.copy_(tokens.log_shares(config.tokenizer.codes)[1:])
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """One group."""
+        return [list(self.module.parameters())]
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Mean cross-entropy over the tokens of the drawn levels (App. A.2, eq. 1, as a mean)."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        losses, right, counts = self._batch(clips, context.rng, None)
+        total = counts.sum().clamp(min=1)
+        loss = losses.sum() / total
+        return loss, {"loss": loss.detach(), "accuracy": right.sum() / total}
+
+    def after_step(self, context: StepContext) -> None:
+        """Nothing."""
+
+    @torch.no_grad()
+    def validate(self) -> Mapping[str, float]:
+        """Cross-entropy and accuracy on validation clips, per level."""
+        rng = np.random.default_rng(0)
+        result: dict[str, float] = {}
+        for level in range(1, self.module.levels):
+            sums = torch.zeros(3)
+            for clips in self.pairs.validation_batches(self.optimisation.batch):
+                sums += torch.stack([v.sum().cpu() for v in self._batch(clips, rng, level)])
+            result[f"loss/{level}"] = float(sums[0] / sums[2])
+            result[f"accuracy/{level}"] = float(sums[1] / sums[2])
+        return result
+
+    def _batch(
+        self, clips: NDArray[np.int64], rng: np.random.Generator, level: int | None
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Summed loss, right answers and tokens (B,) of a batch; `level` None = one drawn a sample."""
+        device = self.tokens.tokens.device
+        phases = torch.from_numpy(rng.integers(self.tokens.phases, size=len(clips))).to(device)
+        tokens, lengths = self.tokens.batch(torch.from_numpy(clips).to(device), phases, self.config.max_tokens)
+        sentences = self.captions.sentences(self.captions.choose(clips, rng))
+        drawn = rng.integers(1, self.module.levels, size=len(clips))
+        levels = torch.from_numpy(drawn).to(device) if level is None else torch.full_like(lengths, level)
+        dropped = torch.from_numpy(rng.random(len(clips)) < self.config.residual_drop).to(device)
+        pieces = []
+        for rows in pieces_of(lengths):
+            size = int(lengths[rows].max())
+            pieces.append(self._piece(tokens[rows, :size], lengths[rows], sentences[rows], levels[rows], dropped[rows]))
+        losses, right, counts = (torch.cat(parts) for parts in zip(*pieces, strict=True))
+        return losses, right, counts
+
+    def _piece(
+        self, tokens: Tensor, lengths: Tensor, sentences: Tensor, levels: Tensor, dropped: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        model = self.module
+        valid = frame_mask(lengths, tokens.shape[1])
+        below = [model.embed(tokens[..., v], v) * (levels > v)[:, None, None].float() for v in range(model.levels - 1)]
+        logits = model(torch.stack(below).sum(0), valid, levels, model.sentence(sentences, dropped))
+        targets = tokens.gather(-1, levels[:, None, None].expand(-1, tokens.shape[1], 1)).squeeze(-1)
+        losses = token_losses(logits, targets) * valid
+        right = (logits.argmax(-1) == targets) & valid
+        return losses.sum(1), right.sum(1).float(), valid.sum(1).float()
+
+
+class LengthStage:
+    """Number of tokens from the sentence, as it is natural: looped and held clips are as long as they were drawn to be,
+    and a hand that stays up for long looks like a wave."""
+
+    name = "length"
+
+    def __init__(self, config: HGM3Config, clips: Sequence[Clip], tokens: TokenData, captions: CaptionData) -> None:
+        self.config = config
+        self.optimisation = config.train_length
+        self.captions = captions
+        self.pairs = Pairs(clips, tokens, captions, config.min_tokens, natural=True)
+        self.lengths = tokens.lengths[:, 0].clamp(max=config.max_tokens)
+        self.module = LengthEstimator(config).to(tokens.tokens.device)
+        mean, std = captions.statistics(self.pairs.train.tolist(), config.condition)
+        self.module.normalizer.mean.copy_(mean)
+        self.module.normalizer.std.copy_(std)
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """One group."""
+        return [list(self.module.parameters())]
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """Cross-entropy of the length class."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        loss, error = self._batch(clips, context.rng)
+        return loss, {"loss": loss.detach(), "error_tokens": error}
+
+    def after_step(self, context: StepContext) -> None:
+        """Nothing."""
+
+    @torch.no_grad()
+    def validate(self) -> Mapping[str, float]:
+        """Cross-entropy and mean absolute error of the expected length, in tokens."""
+        rng = np.random.default_rng(0)
+        found = [self._batch(clips, rng) for clips in self.pairs.validation_batches(self.optimisation.batch)]
+        return {
+            "loss": float(np.mean([float(loss) for loss, _ in found])),
+            "error_tokens": float(np.mean([float(error) for _, error in found])),
+        }
+
+    def _batch(self, clips: NDArray[np.int64], rng: np.random.Generator) -> tuple[Tensor, Tensor]:
+        lengths = self.lengths[torch.from_numpy(clips).to(self.lengths.device)]
+        logits = self.module(self.captions.sentences(self.captions.choose(clips, rng))).float()
+        expected = (torch.softmax(logits, -1) * torch.arange(1, logits.shape[1] + 1, device=logits.device)).sum(-1)
+        return F.cross_entropy(logits, lengths - 1), (expected - lengths).abs().mean().detach()

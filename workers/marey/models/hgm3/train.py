@@ -1,0 +1,80 @@
+"""Training HGM³: tokenizer, tokens, masked transformer, residual transformer, length estimator, then the bundle."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import torch
+
+from marey.models.hgm3.assembly import RECIPE
+from marey.models.hgm3.config import HGM3Config
+from marey.models.hgm3.data import CaptionData
+from marey.models.hgm3.stage_masked import MaskedStage
+from marey.models.hgm3.stage_residual import LengthStage, ResidualStage
+from marey.models.hgm3.tokenizer import Tokenizer
+from marey.nn.devices import choose_device
+from marey.training.drawn import load_drawn
+from marey.training.loop import start_process_group
+from marey.training.motions import MotionData, load_tokens
+from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
+
+
+def train_stage(name: str, options: TrainOptions[HGM3Config]) -> dict[str, float]:
+    """Train one stage and write its part; returns its metrics. `all` is all of them.
+
+    Raises:
+        NotFound: a stage it builds on has not finished, or captions have no text features.
+        InvalidInput: no such stage, or parts of another configuration.
+    """
+    if name == "all":
+        return train_all(RECIPE, train_stage, options)
+    RECIPE.check_name(name)
+    start_process_group()
+    use_threads(options.threads)
+    device = choose_device(options.device)
+    data = MotionData.load(options.prepared, device)
+    torch.manual_seed(options.seed)
+    if name == "tokenizer":
+        return _train_tokenizer(options, data)
+    texts = CaptionTexts.load(data.prepared)
+    captions = CaptionData.of(texts, data.prepared.caption_counts, options.config.condition, device)
+    tokenizer = load_tokenizer(options, data)
+    tokens = load_tokens(options.run, tokenizer, data)
+    codebooks = tokenizer.quantizer.codebooks
+    torch.manual_seed(options.seed)
+    clips = data.prepared.clips
+    data = dataclasses.replace(data, features=data.features[:0])  # the tokens are enough: give the memory back
+    if name == "masked":
+        drawn = load_drawn(options.run, tokenizer, data.prepared)
+        if drawn is not None:
+            clips, tokens, captions = drawn.extend(clips, tokens, captions)
+        stage = MaskedStage(options.config, clips, tokens, captions)
+    elif name == "residual":
+        stage = ResidualStage(options.config, clips, tokens, captions, codebooks)
+    else:
+        stage = LengthStage(options.config, clips, tokens, captions)
+    metrics = RECIPE.train(stage, options)
+    finish(stage.module, options, name, metrics, data.prepared.sha256)
+    return metrics
+
+
+def _train_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> dict[str, float]:
+    stage = TokenizerStage(options.config, data, Tokenizer(options.config))
+    metrics = RECIPE.train(stage, options) | stage.test()
+    finish(stage.module, options, stage.name, metrics, data.prepared.sha256)
+    return metrics
+
+
+def load_tokenizer(options: TrainOptions[HGM3Config], data: MotionData) -> Tokenizer:
+    """The run's trained tokenizer, with the statistics of the data it was trained on.
+
+    Raises:
+        NotFound: not trained yet.
+        InvalidInput: trained with another configuration.
+    """
+    part = RECIPE.part("tokenizer", options.config, options.run)
+    tokenizer = Tokenizer(options.config).to(data.features.device)
+    tokenizer.load_state_dict(part.state)
+    return tokenizer.eval().requires_grad_(False)

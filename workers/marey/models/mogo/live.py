@@ -1,0 +1,293 @@
+"""Live sessions of one bundle: prompts in, finished frames out; all sessions move on together, one frame a step.
+
+A session goes through three kinds of state, each with a row for every session: keys and values of the transformer
+(`Streams`), the past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). What a session
+must keep elsewhere, to go on after its worker died, are its tokens, its prompts and where their acts began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from marey.bundles import choose_bundle
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.core.settings import settings as configuration
+from marey.generation.port import Request
+from marey.models.mogo.bundle import MODEL
+from marey.models.mogo.generate import Generator, Settings
+from marey.models.mogo.streaming import Streams
+from marey.models.mogo.tokenizer import DecoderState
+from marey.motion.features import HeadingLayout
+from marey.motion.live import LiveMotion, LiveState
+from marey.nn.packed import is_small
+from marey.runtime.live.port import LiveFrame, Show
+from marey.streams.acts import Begun
+from marey.streams.frames import Frame
+from marey.text.features import TextFeatures
+from marey.text.graph import Node, SemanticGraph
+from marey.text.keys import as_served
+from marey.text.pipeline import TextPipeline
+
+WARM_CALLS = 3
+"""Compiled code watches two calls and is made ready in the third."""
+
+
+@dataclass
+class _Session:
+    """Frames shown, the number of the prompt in force, and what the session is called among the streams."""
+
+    shown: int
+    prompt: int
+    stream: int
+
+
+@dataclass(frozen=True)
+class _Paused:
+    """All that a session is, while it takes no part in steps."""
+
+    stream: dict[str, torch.Tensor]
+    decoded: DecoderState
+    body: LiveState
+
+
+class LiveRoom:
+    """Sessions of one loaded bundle; they join, are steered and leave between frames. Not thread-safe."""
+
+    def __init__(self, generator: Generator, capacity: int, settings: Settings | None = None) -> None:
+        """Make room for `capacity` sessions, all drawn with the same settings.
+
+        Raises:
+            InvalidBundle: a layout whose root cannot be followed frame by frame.
+            InvalidInput: settings out of range.
+        """
+        if not isinstance(generator.layout, HeadingLayout):
+            where = str(generator.bundle.path)
+            raise InvalidBundle(f"layout {generator.layout.name!r} has no live decoder", where=where)
+        self.generator = generator
+        inference = (settings or Settings()).inference(generator.config.inference)
+        self.skeleton = generator.layout.skeleton
+        self.capacity = capacity
+        self._streams = Streams(generator.packed(capacity), capacity, inference)
+        self._streams.prepare()
+        self._motion = LiveMotion(generator.layout, self.skeleton)
+        self._rows: list[int] = []  # the session in each row of the two states below
+        self._decoded = generator.tokenizer.decoder.start(0)
+        self._body = self._motion.start(0)
+        self._sessions: dict[int, _Session] = {}
+        self._paused: dict[int, _Paused] = {}
+        self._started = 0
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    @property
+    def fps(self) -> float:
+        """Frames of a second."""
+        return self.generator.limits.fps
+
+    @property
+    def bundle(self) -> str:
+        """The exact bundle."""
+        return self.generator.bundle.reference
+
+    @property
+    def model(self) -> str:
+        """The queue that makes clips of recordings."""
+        return MODEL
+
+    @property
+    def min_frames(self) -> int:
+        """The shortest clip."""
+        return self.generator.limits.min_frames
+
+    @property
+    def levels(self) -> int:
+        """V, codes of a frame."""
+        return self.generator.config.tokenizer.levels
+
+    def start(
+        self,
+        text: TextFeatures,
+        seed: int,
+        *,
+        past: NDArray[np.int16] | None = None,
+        prompt: int = 0,
+        began: Begun | None = None,
+    ) -> int:
+        """A new session, or one that another worker began.
+
+        Args:
+            text: of the prompt in force.
+            seed: of its random numbers.
+            past: (n, V) tokens of all its frames so far: it goes on behind them, continuous with what was shown.
+            prompt: number of the prompt in force, counted from 0.
+            began: the act of it that plays, and since when; None = the first begins now.
+
+        Returns:
+            the session's name in all other methods.
+
+        Raises:
+            InvalidInput: no room, features of another encoder, a seed out of range, tokens that are none, or an act
+                that the prompt does not have.
+        """
+        self.generator.limits.check(Request(text, seed))
+        if len(self) == self.capacity:  # paused ones keep their room
+            raise InvalidInput(f"all {self.capacity} sessions are taken", hint="Stop one first.")
+        decoder = self.generator.tokenizer.decoder.start(1)
+        body = self._motion.start(1)
+        columns = None
+        if past is not None and len(past):
+            columns = self.generator.columns(past)
+            features, decoder = self.generator.tokenizer.decode_next(columns[None], decoder)
+            body = self._motion.after(features[0].cpu().numpy())
+        acts, lasts = self.generator.acts(text)
+        stream = self._streams.start(acts, seed, lasts=lasts, past=columns, began=began)
+        self._started += 1
+        self._sessions[self._started] = _Session(0 if columns is None else len(columns), prompt, stream)
+        self._join(self._started, decoder, body)
+        return self._started
+
+    def steer(self, session: int, text: TextFeatures) -> None:
+        """Another prompt, in force from the next frame on.
+
+        Raises:
+            InvalidInput: no such session, it is paused, or features of another encoder.
+        """
+        self.generator.limits.check(Request(text, 0))
+        about = self._playing(session)
+        self._streams.steer(about.stream, *self.generator.acts(text))
+        about.prompt += 1
+
+    def stop(self, session: int) -> None:
+        """Forget a session, paused or not.
+
+        Raises:
+            InvalidInput: there is none of that name.
+        """
+        if session not in self._paused:
+            self._streams.stop(self._playing(session).stream)
+            self._leave(session)
+        self._paused.pop(session, None)
+        del self._sessions[session]
+
+    def pause(self, session: int) -> None:
+        """Leave a session out of the steps until `resume`; its room stays its own.
+
+        Raises:
+            InvalidInput: no such session, or it is paused.
+        """
+        about = self._playing(session)
+        row = self._rows.index(session)
+        decoded, body = self._decoded.select(torch.tensor([row])), self._body.take([row])
+        self._paused[session] = _Paused(self._streams.save(about.stream), decoded, body)
+        self._streams.stop(about.stream)
+        self._leave(session)
+
+    def resume(self, session: int) -> None:
+        """Let a paused session go on: with the very frames that it would have shown.
+
+        Raises:
+            InvalidInput: it is not paused.
+        """
+        if session not in self._paused:
+            raise InvalidInput(f"session {session} is not paused")
+        kept = self._paused.pop(session)
+        self._sessions[session].stream = self._streams.resume(kept.stream)
+        self._join(session, kept.decoded, kept.body)
+
+    @torch.inference_mode()
+    def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
+        """The next frames of one session alone, at once; the others stand still meanwhile.
+
+        Raises:
+            InvalidInput: no such session, or it is paused.
+        """
+        stream = self._playing(session).stream
+        row = self._rows.index(session)
+        decoded, body = self._decoded.select(torch.tensor([row])), self._body.take([row])
+        self._leave(session)
+        others = self._rows, self._decoded, self._body
+        self._rows, self._decoded, self._body = [session], decoded, body
+        made = [self._shown(self._streams.step(stream))[session] for _ in range(frames)]
+        decoded, body = self._decoded, self._body
+        self._rows, self._decoded, self._body = others
+        self._join(session, decoded, body)
+        return made
+
+    @torch.inference_mode()
+    def step(self) -> dict[int, LiveFrame]:
+        """The next frame of every session that is not paused."""
+        drawn = self._streams.step()
+        return self._shown(drawn) if drawn else {}
+
+    def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
+        """Frames of the columns that were drawn for the sessions in the rows."""
+        columns = torch.stack([drawn[self._sessions[session].stream] for session in self._rows])  # (S, V)
+        features, self._decoded = self.generator.tokenizer.decode_next(columns[:, None], self._decoded)
+        shown, self._body = self._motion.step(features[:, 0].cpu().numpy(), self._body)
+        tokens = columns.cpu().numpy().astype(np.int16)
+        frames: dict[int, LiveFrame] = {}
+        for row, session in enumerate(self._rows):
+            about = self._sessions[session]
+            left, left_toe, right, right_toe = shown.contacts[row].tolist()
+            stands = (left, left_toe, right, right_toe)
+            frame = Frame(about.shown, shown.root[row], shown.rotations[row], stands, about.prompt)
+            frames[session] = LiveFrame(frame, tokens[row], self._streams.act(about.stream))
+            about.shown += 1
+        return frames
+
+    def _playing(self, session: int) -> _Session:
+        if session not in self._sessions:
+            raise InvalidInput(f"there is no session {session}", hint="It was stopped, or never started.")
+        if session in self._paused:
+            raise InvalidInput(f"session {session} is paused", hint="Resume it first.")
+        return self._sessions[session]
+
+    def _join(self, session: int, decoded: DecoderState, body: LiveState) -> None:
+        self._rows.append(session)
+        self._decoded = DecoderState.join((self._decoded, decoded))
+        self._body = LiveState.join((self._body, body))
+
+    def _leave(self, session: int) -> None:
+        kept = [row for row, name in enumerate(self._rows) if name != session]
+        self._rows = [self._rows[row] for row in kept]
+        self._decoded = self._decoded.select(torch.tensor(kept, dtype=torch.long))
+        self._body = self._body.take(kept)
+
+
+def create_show() -> Show:
+    """What the live loop of `marey worker mogo` serves: the bundle that this machine has.
+
+    Raises:
+        NotFound, InvalidBundle: there is none, or a damaged one.
+    """
+    chosen = configuration()
+    bundle = choose_bundle(MODEL, config=chosen)
+    if bundle.manifest.text is None:
+        raise InvalidBundle("it does not read prompts", where=str(bundle.path))
+    generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
+    if is_small(generator.transformer):
+        torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
+    pipeline = TextPipeline.load(as_served(bundle.manifest.text))
+    return Show(
+        open_room=lambda slots: _warm(LiveRoom(generator, slots), pipeline),
+        parse=lambda prompt: pipeline.features([prompt])[0],
+        device=str(generator.device),
+    )
+
+
+def _warm(room: LiveRoom, pipeline: TextPipeline) -> LiveRoom:
+    """The room, whose first frames will not wait for what torch does once. No rewriter is asked: it may cost money."""
+    words = ("a", "person", "stands")
+    graph = SemanticGraph(" ".join(words), words, (Node(0, "motion", " ".join(words), (0, 1, 2)),), ())
+    session = room.start(TextFeatures(graph.text, graph.text, graph, pipeline.encode(graph)), 0)
+    for _ in range(WARM_CALLS):
+        pipeline.labeller.label([words])
+        room.step()
+    room.stop(session)
+    return room

@@ -1,0 +1,97 @@
+"""What MOGO's networks are trained on beside what all tokenizers are (eq. 6 and eq. 11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from marey.models.mogo.config import TokenizerConfig
+from marey.models.mogo.model import NOT_ASKED, RQHCTransformer
+from marey.models.mogo.tokenizer import Tokenizer
+
+
+def scale_penalty(model: Tokenizer, config: TokenizerConfig) -> Tensor:
+    """The last term of eq. 6: what holds scales at one and biases at zero; added to `tokenizer_loss`."""
+    return config.regularizer * model.quantizer.regularizer()
+
+
+@dataclass(frozen=True)
+class LevelSums:
+    """Over all codes asked for, level by level: all (V,)."""
+
+    losses: Tensor  # cross-entropies
+    right: Tensor  # codes that were the likeliest
+    asked: Tensor  # codes
+
+    def __add__(self, other: LevelSums) -> LevelSums:
+        """Both together."""
+        return LevelSums(self.losses + other.losses, self.right + other.right, self.asked + other.asked)
+
+    @property
+    def means(self) -> Tensor:
+        """(V,) cross-entropy of a code."""
+        return self.losses / self.asked.clamp(min=1)
+
+    def loss(self, first_level: float) -> Tensor:
+        """Eq. 11 as a mean over codes (ours: its sum would weigh clips by their length), `first_level` times the weight
+        on level 0."""
+        weights = torch.ones_like(self.losses)
+        weights[0] = first_level
+        return (weights * self.means).sum() / weights.sum()
+
+
+def level_sums(model: RQHCTransformer, states: Tensor, targets: Tensor, share: float = 1.0) -> LevelSums:
+    """How well states predict codes.
+
+    Args:
+        model: to score them.
+        states: (B, n, L, w) from `RQHCTransformer.states`.
+        targets: (B, V, n) from `next_targets`.
+        share: of the frames asked at all levels, drawn at random; the others are asked at level 0 alone (ours). Without
+            a depth head there is nothing to be saved by less than 1.
+    """
+    targets, states = targets.transpose(1, 2).flatten(0, 1), states.flatten(0, 1)
+    whole = targets[:, -1] != NOT_ASKED  # the end of a clip is asked at level 0 alone
+    if share < 1:
+        whole &= torch.rand(len(whole), device=whole.device) < share
+    brief = (targets[:, 0] != NOT_ASKED) & ~whole
+    codes = targets[whole]
+    every = model.score(model.refine(states[whole], codes[:, :-1]))  # (N, V, K + 1)
+    first = model.score(model.refine(states[brief][:, :1], codes[:0].new_empty(int(brief.sum()), 0)))
+    sums = _sums(every, codes)
+    alone = _sums(first, targets[brief][:, :1])
+    padding = (0, model.levels - 1)
+    return sums + LevelSums(F.pad(alone.losses, padding), F.pad(alone.right, padding), F.pad(alone.asked, padding))
+
+
+def ahead_loss(model: RQHCTransformer, states: Tensor, targets: Tensor, seam: Tensor | None, share: float) -> Tensor:
+    """Cross-entropy of level 0 further ahead (`MOGOConfig.ahead`), a mean over what is asked; 0 where nothing is.
+
+    Args:
+        model: to score with.
+        states: (B, n, L, w) from `RQHCTransformer.states`.
+        targets: (B, V, n) from `next_targets`.
+        seam: (B,) as in `states`: before a steer nobody can tell what comes after it.
+        share: of the frames that are asked, drawn at random.
+    """
+    losses: list[Tensor] = []
+    size, position = states.shape[1], torch.arange(states.shape[1], device=states.device)
+    for distance, project in zip(model.config.ahead, model.ahead, strict=True):
+        wanted = targets[:, 0, distance:]
+        now = position[: max(size - distance, 0)]
+        asked = (wanted != NOT_ASKED) & (wanted != model.end) & (torch.rand(wanted.shape, device=wanted.device) < share)
+        if seam is not None:
+            asked &= (now >= seam[:, None]) | (now + distance < seam[:, None])
+        logits = model.score(project(states[:, : len(now), 0][asked])[:, None])[:, 0]
+        losses.append(F.cross_entropy(logits, wanted[asked], reduction="sum") / asked.sum().clamp(min=1))
+    return torch.stack(losses).mean() if losses else states.new_zeros(())
+
+
+def _sums(logits: Tensor, codes: Tensor) -> LevelSums:
+    """Of logits (N, m, K + 1) and codes (N, m), none of them NOT_ASKED: m levels."""
+    losses = F.cross_entropy(logits.flatten(0, 1), codes.flatten(), reduction="none").view(codes.shape).sum(0)
+    right = (logits.detach().argmax(-1) == codes).sum(0)
+    return LevelSums(losses, right, right.new_full(right.shape, len(codes)))

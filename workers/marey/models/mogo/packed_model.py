@@ -1,0 +1,58 @@
+"""The inference twin of a model: matrices packed or in fewer bits, steps compiled, position terms computed once; any
+number of `Streams` share it."""
+
+from __future__ import annotations
+
+import copy
+
+import torch
+import torch.nn.functional as F
+
+from marey.models.mogo.depth import DepthStep
+from marey.models.mogo.model import RQHCTransformer, TrunkStep
+from marey.nn.compiled import Module, compiled
+from marey.nn.packed import is_small, lower_linears, pack_linears
+
+MOST_GROUPED = 8
+"""Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
+
+
+def sessions_of_product(model: RQHCTransformer, sessions: int) -> int:
+    """`group` of a `PackedModel` that serves up to so many `sessions` well: large weights are read once for all."""
+    return 1 if is_small(model) else min(sessions, MOST_GROUPED)
+
+
+class PackedModel:
+    """A model ready to draw frame by frame; it takes a tenth of a second and more to make, so make it once."""
+
+    def __init__(self, model: RQHCTransformer, *, dtype: torch.dtype = torch.float32, group: int = 1) -> None:
+        """Copy and pack a model.
+
+        Args:
+            model: stays as it is.
+            dtype: of the matrices; bfloat16 halves what a frame reads. On a GPU also of the keys and values that
+                sessions keep.
+            group: sessions that share the products of large matrices on a CPU (see `GroupedLinear`).
+        """
+        self.network = copy.deepcopy(model).eval().requires_grad_(False)
+        self.device = self.network.head.weight.device
+        self.blocks = self.network.trunk.layers
+        self.terms = [block.attention.terms(self.network.trunk.sinusoids).contiguous() for block in self.blocks]
+        clock = self.network.clock
+        told = torch.arange(self.network.config.max_frames + 1, device=self.device)
+        # the last row, `UNTOLD`: nothing
+        self.times = None if clock is None else F.pad(clock(told), (0, 0, 0, 1))
+        on_cpu = self.device.type == "cpu"
+        self.kept = torch.float32 if on_cpu else dtype  # type of keys and values
+        if on_cpu:
+            pack_linears(self.network, dtype, group=group)
+        else:
+            lower_linears(self.network, dtype)
+        # elsewhere calls are recorded and replayed, and a compiler that looks on would record itself
+        made = compiled if on_cpu else _as_it_is
+        self.steps = [made(TrunkStep(block)) for block in self.blocks]
+        self.depth = None if self.network.depth is None else made(DepthStep(self.network.depth))
+
+
+def _as_it_is(module: Module) -> Module:
+    return module

@@ -1,0 +1,89 @@
+"""Training stage of the RQHC-Transformer: all levels of all frames of a batch at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import add
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from marey.data.manifest import Clip
+from marey.models.mogo.config import MOGOConfig
+from marey.models.mogo.losses import LevelSums, ahead_loss, level_sums
+from marey.models.mogo.model import RQHCTransformer, next_targets
+from marey.models.mogo.samples import MIN_FRAMES, Sample, Samples
+from marey.models.mogo.steers import Steers
+from marey.training.loop import StepContext
+from marey.training.motions import TokenData
+from marey.training.pairs import Pairs
+from marey.training.sentences import SentenceData, text_statistics
+
+
+class TransformerStage:
+    """The stage; what it draws is `samples`."""
+
+    name = "transformer"
+
+    def __init__(
+        self,
+        config: MOGOConfig,
+        clips: Sequence[Clip],
+        tokens: TokenData,
+        captions: SentenceData,
+        steers: Steers | None = None,
+        network: type[RQHCTransformer] = RQHCTransformer,
+    ) -> None:
+        self.config = config
+        self.optimisation = config.train_transformer
+        self.module = network(config).to(tokens.tokens.device)
+        self.pairs = Pairs(clips, tokens, captions, MIN_FRAMES)
+        self.samples = Samples(clips, tokens, captions, steers, config.max_frames)
+        spoken = captions.sentence[captions.captions_of(self.pairs.train.tolist())]
+        mean, std = text_statistics(captions.strings, spoken)
+        self.module.prompt.mean.copy_(mean)
+        self.module.prompt.std.copy_(std)
+        acts, frames = self.samples.acts_said(self.pairs.train)
+        self.module.pace.fit(self.module.prompt.standardised(captions.sentences(acts)), frames)
+        with torch.no_grad():  # the head starts at how often codes occur
+            self.module.head.bias[: self.module.codes] = tokens.log_shares(self.module.codes).logsumexp(0)
+
+    def clip_groups(self) -> Sequence[Sequence[nn.Parameter]]:
+        """One group."""
+        return [list(self.module.parameters())]
+
+    def loss(self, context: StepContext) -> tuple[Tensor, Mapping[str, Tensor]]:
+        """One batch in pieces."""
+        clips = self.pairs.draw(context.rng, self.optimisation.batch)
+        pieces = list(self.samples.collate(self.samples.draw(clips, context.rng)).pieces())
+        found = [self._losses(piece, self.config.depth.share) for piece in pieces]
+        sums = reduce(add, [levels for levels, _ in found])
+        ahead = torch.stack([later for _, later in found]).mean()
+        loss, means = sums.loss(self.config.first_level), sums.means.detach()
+        shown = {"loss": loss.detach(), "level_0": means[0], "level_last": means[-1], "ahead": ahead.detach()}
+        return loss + self.config.ahead_weight * ahead, shown
+
+    def after_step(self, context: StepContext) -> None:
+        """Nothing."""
+
+    @torch.no_grad()
+    def validate(self) -> Mapping[str, float]:
+        """Cross-entropy and accuracy of validation clips, per level; the same stretches of them every time."""
+        rng = np.random.default_rng(0)
+        batches = self.pairs.validation_batches(self.optimisation.batch)
+        stretches = ([self.samples.of_clip(int(clip), rng) for clip in clips] for clips in batches)
+        pieces = (piece for some in stretches for piece in self.samples.collate(some).pieces())
+        found = [self._losses(piece, 1.0) for piece in pieces]
+        sums = reduce(add, [levels for levels, _ in found])
+        metrics = {"loss": float(sums.loss(self.config.first_level))}
+        metrics["ahead"] = float(torch.stack([later for _, later in found]).mean())
+        metrics |= {f"loss/{level}": float(mean) for level, mean in enumerate(sums.means)}
+        return metrics | {f"accuracy/{level}": float(share) for level, share in enumerate(sums.right / sums.asked)}
+
+    def _losses(self, piece: Sample, share: float) -> tuple[LevelSums, Tensor]:
+        states = self.module.states(piece.prompts, piece.tokens, skipped=piece.skipped, seam=piece.seam)
+        targets = next_targets(piece.tokens, piece.lengths, self.module.end, ends=piece.ends, skipped=piece.skipped)
+        ahead = ahead_loss(self.module, states, targets, piece.seam, share)
+        return level_sums(self.module, states, targets, share), ahead

@@ -1,0 +1,266 @@
+"""Motion that is drawn frame by frame: cached keys and values, many sessions in one forward.
+
+`StreamState` holds everything a session is, as plain tensors; `Streams` moves all of them on by one frame a `step`. A
+session's cache has 1 + W slots for each layer and lane: slot 0 keeps position 0 (the prompt) for good, frame p stands
+in slot 1 + (p - 1) mod W, so that an endless motion needs no more memory and no copy. A lane is a level, twice where
+guidance wants a second branch. The attention always reads all slots: tokens depend neither on how long the sessions
+beside one are, nor on how many there are (`marey.nn.sampling.uniform`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import torch
+from torch import Tensor
+
+from marey.core.errors import InvalidInput
+from marey.models.mogo.attention import RelativeAttention
+from marey.models.mogo.config import InferenceConfig
+from marey.models.mogo.next_frame import NextFrame
+from marey.models.mogo.packed_model import PackedModel
+from marey.models.mogo.plan import PLAN, Plan
+from marey.models.mogo.replay import Replayed
+from marey.models.mogo.state import NEVER, StreamState
+from marey.streams.acts import Begun
+
+
+class Streams:
+    """Sessions that share the forward passes of one model; they join, leave and are steered between steps."""
+
+    def __init__(
+        self,
+        packed: PackedModel,
+        capacity: int,
+        config: InferenceConfig | None = None,
+    ) -> None:
+        """Make room for `capacity` sessions.
+
+        Args:
+            packed: the model, shared with other streams.
+            capacity: sessions at most.
+            config: None = the model's own.
+
+        Raises:
+            InvalidInput: a window beyond what the model was trained for.
+        """
+        self.packed, self.model = packed, packed.network
+        self.config = config or self.model.config.inference
+        self.window, self.farthest = self.config.window, self.model.config.max_frames
+        if not 1 <= self.window <= self.farthest:
+            raise InvalidInput(
+                f"a window of {self.window} frames", hint=f"This model can look back 1 to {self.farthest} frames."
+            )
+        self.branches = 1 if self.config.guidance == self.config.upper_guidance == 1 else 2
+        self.state = StreamState.empty(packed, capacity, self.branches, self.window)
+        self.capacity = capacity
+        self.sessions: list[int] = []  # the session in each row: the active rows come first
+        self._next = NextFrame(packed, self.state, self.config)
+        self._draw: Callable[[int], Tensor] = self._next
+        if packed.device.type == "cuda":
+            self._draw = Replayed(self._next, capacity, packed.device)
+        self._plans: dict[int, Plan] = {}
+        self._made: dict[int, int] = {}  # frames of each session: the host never asks the device for what it knows
+        self._started = 0
+
+    def prepare(self) -> None:
+        """Do now what the first frames would wait for, where there is anything."""
+        if isinstance(self._draw, Replayed):
+            self._draw.prepare()
+
+    def start(
+        self,
+        sentence: Tensor,
+        seed: int,
+        *,
+        ends_from: int = NEVER,
+        lasts: Sequence[int] | None = None,
+        past: Tensor | None = None,
+        skipped: int = 0,
+        began: Begun | None = None,
+    ) -> int:
+        """A new session; its first frame comes with the next step.
+
+        Args:
+            sentence: (W,) sentence features, or (A, W) of acts in order: where END is drawn the next one is steered to.
+            seed: of its random numbers.
+            ends_from: END of the last act may be drawn after so many frames (no length was asked for).
+            lasts: frames (A,) that each act usually takes: where another comes it is over then although END was not
+                drawn, and END may be drawn near it only. None = an act goes on until END is drawn.
+            past: (m, V) columns that were made before, to go on behind them: the last window is read in one pass.
+                What it goes on with is continuous with them, not what the lost session would have drawn bit for bit.
+            skipped: frames that were made before `past`.
+            began: the act that plays behind `past`, and the frame of the session at which it began; None = the first
+                act begins behind them.
+
+        Returns:
+            the session's name in all other methods.
+
+        Raises:
+            InvalidInput: no room, `skipped` without `past`, or an act that is none of these or still to come.
+        """
+        if skipped and (past is None or len(past) == 0):
+            raise InvalidInput("a session goes on behind frames that are not given")
+        before = 0 if past is None else len(past)
+        acts = len(torch.atleast_2d(sentence))
+        if began is not None and not (0 <= began.act < acts and 0 <= began.frame <= skipped + before):
+            raise InvalidInput(f"{began} is no place among {acts} acts and {skipped + before} frames", where="began")
+        row = self._take_row()
+        past = self.state.last.new_zeros(0, self.model.levels) if past is None else past[-self.window :]
+        mine = self.state.row(row)
+        mine["memory"].zero_()  # a number that is none would go on through slots that are hidden
+        mine["seeds"].fill_(seed)
+        mine["skipped"].fill_(skipped + before - len(past))
+        mine["made"].fill_(skipped + before)
+        mine["last"].copy_(past[-1] if len(past) else torch.full_like(mine["last"], -1))
+        session = self.sessions[row]
+        plan = self._plans[session] = Plan.of(sentence, ends_from, lasts)
+        self._made[session] = skipped + before
+        self._begin(row, plan, past, began)
+        return session
+
+    def steer(self, session: int, sentence: Tensor, lasts: Sequence[int] | None = None) -> None:
+        """Another prompt, (W,) or (A, W) with `lasts` as in `start`, from the next frame on: position 0 alone is
+        computed anew, on each level; what the frames so far were told stays."""
+        plan = self._plans[session] = Plan.of(sentence, NEVER, lasts)
+        self._begin(self._row(session), plan)
+
+    def act(self, session: int) -> int:
+        """Number of the act that plays, among those of the prompt in force."""
+        return self._plans[session].number
+
+    def stop(self, session: int) -> None:
+        """Forget a session; its row goes to the last one."""
+        row, last = self._row(session), len(self.sessions) - 1
+        if row != last:
+            source = self.state.row(last)
+            for name, target in self.state.row(row).items():
+                target.copy_(source[name])
+        self.sessions[row] = self.sessions[last]
+        self.sessions.pop()
+        del self._plans[session], self._made[session]
+
+    def step(self, only: int | None = None) -> dict[int, Tensor]:
+        """Draw one frame of every session, or of one alone: its column (V,) of tokens, -1 where it has ended."""
+        if only is not None:
+            self._exchange(self._row(only), 0)
+        rows = len(self.sessions) if only is None else 1
+        if not rows:
+            return {}
+        for row, plan in self._unfinished(rows):
+            if self._made[self.sessions[row]] >= plan.until:
+                self._begin(row, plan)
+        column = self._draw(rows)
+        while due := self._due(column):
+            for row, plan in due:  # the first frame of the next act comes in place of END; others draw what they drew
+                self._begin(row, plan)
+            column = self._draw(rows)
+        self.accept(column)
+        return dict(zip(self.sessions[:rows], column.unbind(), strict=True))
+
+    def states(self) -> Tensor:
+        """Trunk states (s, L, w) of the active rows, from which their next frame is drawn."""
+        return self._next.states(len(self.sessions))
+
+    def accept(self, columns: Tensor) -> None:
+        """Take columns (s, V) as the next frame of the first s rows, drawn or known."""
+        rows = len(columns)
+        self.state.last[:rows] = columns
+        self.state.made[:rows] += 1
+        for session in self.sessions[:rows]:
+            self._made[session] += 1
+
+    def save(self, session: int) -> dict[str, Tensor]:
+        """All of a session as plain tensors in the host's memory: a device has less. `resume` goes on with the very
+        tokens that it would have drawn."""
+        tensors = {name: part.to("cpu", copy=True) for name, part in self.state.row(self._row(session)).items()}
+        return {**tensors, **self._plans[session].save()}
+
+    def resume(self, saved: Mapping[str, Tensor]) -> int:
+        """A session from what `save` gave.
+
+        Raises:
+            InvalidInput: no room, or a session of another model, window or guidance.
+        """
+        row = self._take_row()
+        mine = self.state.row(row)
+        tensors = {name: part for name, part in saved.items() if name not in PLAN}
+        if {n: t.shape for n, t in tensors.items()} != {n: t.shape for n, t in mine.items()}:
+            self.sessions.pop()
+            raise InvalidInput("the saved session is of another model, window or guidance")
+        for name, part in mine.items():
+            part.copy_(saved[name])
+        session = self.sessions[row]
+        self._plans[session], self._made[session] = Plan.load(saved), int(saved["made"])
+        return session
+
+    def _unfinished(self, rows: int) -> list[tuple[int, Plan]]:
+        """Those of the first rows that have acts to come."""
+        plans = ((row, self._plans[session]) for row, session in enumerate(self.sessions[:rows]))
+        return [(row, plan) for row, plan in plans if len(plan.acts)]
+
+    def _due(self, columns: Tensor) -> list[tuple[int, Plan]]:
+        """Rows that have acts to come and have just drawn END."""
+        unfinished = self._unfinished(len(columns))
+        ended = (columns[:, 0] < 0).tolist() if unfinished else []
+        return [(row, plan) for row, plan in unfinished if ended[row]]
+
+    def _begin(self, row: int, plan: Plan, past: Tensor | None = None, began: Begun | None = None) -> None:
+        """Tell a row the next act of its plan, or the one that plays already."""
+        began = began or Begun(self._made[self.sessions[row]], 0)
+        act = plan.take(began.frame, began.act)
+        mine = self.state.row(row)
+        mine["began"].fill_(began.frame)
+        mine["stops"].fill_(plan.stops)
+        self._read(row, act, self.state.last.new_zeros(0, self.model.levels) if past is None else past)
+        shortest = began.frame + self.model.config.min_frames if began.frame or len(plan.acts) else 0
+        ends_from = max(shortest, plan.earliest, 0 if len(plan.acts) else plan.ends_from)
+        mine["ends_from"].fill_(ends_from)
+        mine["ended"].fill_(False)
+
+    @torch.no_grad()
+    def _read(self, row: int, sentence: Tensor, past: Tensor) -> None:
+        """Write position 0, and behind it frames `past` (n, V), into a row's memory; one pass for all of it."""
+        null = torch.arange(self.branches, device=past.device) > 0
+        prompt, told = self.model.prompt(sentence.expand(self.branches, -1), null)  # (branches, V, w), (branches, w)
+        skipped = self.state.skipped[row]
+        position = skipped + torch.arange(len(past), device=past.device)  # of each frame, less 1
+        frames = self.model.columns(past[None].expand(self.branches, -1, -1)) + told[:, None, None]
+        if self.packed.times is not None:
+            frames[0] += self._next.time(1 + position, self.state.began[row], self.state.stops[row])
+        x = torch.cat([prompt[:, :, None], frames], 2).flatten(0, 2)  # (L · (1 + n), w): one product for all of them
+        self.state.told[row] = told.repeat_interleave(self.model.lanes, 0)
+        reach = self.model.reach(len(past), skipped=skipped.expand(self.branches))
+        slots = torch.cat([position.new_zeros(1), 1 + position % self.window])
+        for layer, block in enumerate(self.packed.blocks):
+
+            def attend(h: Tensor, i: int = layer, attention: RelativeAttention = block.attention) -> Tensor:
+                query, key, value = (part.unflatten(0, (-1, len(slots))) for part in attention.project(h))
+                for kept, part in zip(self.state.memory[i, :, row], (key, value), strict=True):
+                    kept[:, :, slots] = part.permute(2, 0, 1, 3).to(kept.dtype)  # (L, 1 + n, H, w / H), heads first
+                return attention.out(attention.mix(query, key, value, self.packed.terms[i], reach).flatten(0, 1))
+
+            x = block(x, attend)
+        self.state.opening[row] = self.model.trunk.norm(x.unflatten(0, (-1, len(slots)))[:, 0])
+
+    def _take_row(self) -> int:
+        if len(self.sessions) == self.capacity:
+            raise InvalidInput(f"all {self.capacity} sessions are taken", hint="Stop one first.")
+        self._started += 1
+        self.sessions.append(self._started)
+        return len(self.sessions) - 1
+
+    def _exchange(self, row: int, other: int) -> None:
+        """Let two sessions change rows."""
+        if row != other:
+            second = self.state.row(other)
+            for name, first in self.state.row(row).items():
+                kept = first.clone()
+                first.copy_(second[name])
+                second[name].copy_(kept)
+            self.sessions[row], self.sessions[other] = self.sessions[other], self.sessions[row]
+
+    def _row(self, session: int) -> int:
+        if session not in self.sessions:
+            raise InvalidInput(f"there is no session {session}", hint="It was stopped, or never started.")
+        return self.sessions.index(session)

@@ -1,0 +1,97 @@
+"""Training MOGO: the MoSA-VQ tokenizer, then the RQHC-Transformer on its tokens."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from marey.models.mogo.assembly import RECIPE
+from marey.models.mogo.config import MOGOConfig
+from marey.models.mogo.losses import scale_penalty
+from marey.models.mogo.model import RQHCTransformer
+from marey.models.mogo.rollouts import Rollouts
+from marey.models.mogo.samples import MIN_FRAMES
+from marey.models.mogo.stage_transformer import TransformerStage
+from marey.models.mogo.steers import Steers, load_steers
+from marey.models.mogo.tokenizer import Tokenizer
+from marey.nn.devices import choose_device
+from marey.training.loop import start_process_group
+from marey.training.motions import MotionData, load_tokens
+from marey.training.pairs import Pairs
+from marey.training.sentences import SentenceData
+from marey.training.staging import TrainOptions, finish, train_all, use_threads
+from marey.training.texts import CaptionTexts
+from marey.training.tokenizing import TokenizerStage
+
+
+def train_stage(name: str, options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    """Train one stage and write its part; returns its metrics. `all` is both.
+
+    Raises:
+        NotFound: the tokenizer has not finished, or captions have no text features.
+        InvalidInput: no such stage, or parts of another configuration.
+    """
+    if name == "all":
+        return train_all(RECIPE, train_stage, options)
+    RECIPE.check_name(name)
+    start_process_group()
+    use_threads(options.threads)
+    return _train_tokenizer(options) if name == "tokenizer" else _train_transformer(options)
+
+
+def _train_tokenizer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    data = _data(options)
+    tokenizer = Tokenizer(options.config)
+    config = options.config
+    stage = TokenizerStage(config, data, tokenizer, lambda: scale_penalty(tokenizer, config.tokenizer))
+    metrics = RECIPE.train(stage, options) | stage.test()
+    finish(stage.module, options, stage.name, metrics, data.prepared.sha256)
+    return metrics
+
+
+def _train_transformer(options: TrainOptions[MOGOConfig]) -> dict[str, float]:
+    stage, sha256 = transformer_stage(options)
+    metrics = RECIPE.train(stage, options)
+    finish(stage.module, options, stage.name, metrics, sha256)
+    return metrics
+
+
+def transformer_stage(
+    options: TrainOptions[MOGOConfig], network: type[RQHCTransformer] = RQHCTransformer
+) -> tuple[TransformerStage, str]:
+    """The transformer's stage on the tokens of the run, made where they are missing, and the hash of the data.
+
+    Features are read for that alone: their memory is free again behind it.
+    """
+    data = _data(options)
+    device = data.features.device
+    tokenizer = Tokenizer(options.config).to(device)
+    tokenizer.load_state_dict(RECIPE.part("tokenizer", options.config, options.run).state)
+    tokens = load_tokens(options.run, tokenizer.eval().requires_grad_(False), data)
+    texts, width = CaptionTexts.load(data.prepared), options.config.condition.text_width
+    captions = SentenceData.of_sentences(texts, data.prepared.caption_counts, width, device)
+    torch.manual_seed(options.seed)
+    clips = data.prepared.clips
+    steers = _steers(options, tokenizer, data, Pairs(clips, tokens, captions, MIN_FRAMES), captions)
+    return TransformerStage(options.config, clips, tokens, captions, steers, network), data.prepared.sha256
+
+
+def _data(options: TrainOptions[MOGOConfig]) -> MotionData:
+    torch.manual_seed(options.seed)
+    return MotionData.load(options.prepared, choose_device(options.device))
+
+
+def _steers(
+    options: TrainOptions[MOGOConfig], tokenizer: Tokenizer, data: MotionData, pairs: Pairs, captions: SentenceData
+) -> Steers | None:
+    """Steered motions between training clips of one act each; some leave what the finished model draws, if any has."""
+    if not options.config.steers:
+        return None
+    single = np.array([not data.prepared.clips[int(clip)].seams for clip in pairs.train])
+    clips, weights = pairs.train[single].tolist(), pairs.weights[single].tolist()
+    rollouts = None
+    if options.warm and options.config.rollouts:
+        model = RQHCTransformer(options.config).to(data.features.device)
+        model.load_state_dict(RECIPE.part("transformer", options.config, options.run).state)
+        rollouts = Rollouts(model, tokenizer, captions)
+    return load_steers(options.run, options.config, tokenizer, data, clips, weights, rollouts)
