@@ -209,7 +209,7 @@ class _Fault:
     def _watch(self, job: UUID) -> float:
         with self._platform.client() as client:
             watch_job(client, str(job), quiet=True)
-        return time.monotonic() - self._zero
+        return max(0.0, time.monotonic() - self._zero)  # 0: it returned during the fault, which did not concern it
 
 
 if __name__ == "__main__":
