@@ -20,7 +20,7 @@ from uuid import uuid4
 import httpx2
 
 from benchmarks.platform import BUNDLE, Platform, forget_peak, marey, peak_megabytes, platform
-from marey.cli.client import SUBMIT_BUSY_SECONDS, SUBMIT_TIMEOUT
+from marey.client.transport import SUBMIT_BUSY_SECONDS, SUBMIT_TIMEOUT
 
 BODIES, MEGABYTES, ITEMS = 6, 56, 99_000
 BARS = {"resident peak": (400, "MB"), "spooled peak": (256, "MB"), "small request, p95": (500, "ms")}

@@ -16,7 +16,7 @@ import httpx2
 import psutil
 
 from benchmarks.platform import BUNDLE, Platform, marey, platform, processor_seconds
-from marey.cli.fetching import PARALLEL, Download, plan
+from marey.client.fetching import PARALLEL, Download, plan
 from marey.db import transaction
 from marey.jobs import (
     AssetDigest,

@@ -24,7 +24,7 @@ from pathlib import Path
 import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
-from marey.cli.client import Client
+from marey.client.transport import Transport
 from marey.core.settings import REPOSITORY
 from marey.db import create_engine
 from marey.models.mogo.bundle import random_bundle
@@ -57,7 +57,7 @@ def main() -> None:
     print(f"Without a frame after a kill -9: median {statistics.median(gaps):.2f} s of {spread} (goal 3 s)\n")
 
 
-def _first_frame(marey: Marey, client: Client) -> float:
+def _first_frame(marey: Marey, client: Transport) -> float:
     began = time.perf_counter()
     stream = client.post_once("/v1/streams", PROMPT)
     with socket_of(marey, stream["id"]) as socket:
@@ -67,7 +67,7 @@ def _first_frame(marey: Marey, client: Client) -> float:
     return took
 
 
-def _gap_of_a_kill(marey: Marey, client: Client, server: Serving) -> float:
+def _gap_of_a_kill(marey: Marey, client: Transport, server: Serving) -> float:
     """Seconds between the last frame of the worker that is killed and the first of the other."""
     environment = server.children()["live"].environ()
     with _second_worker(environment):

@@ -25,8 +25,8 @@ import httpx2
 
 from benchmarks.bench_text import LONG
 from benchmarks.platform import marey
-from marey.cli.client import Client
-from marey.cli.place import Server, read_server
+from marey.client.place import Server, read_server
+from marey.client.transport import Transport
 from marey.core.errors import MareyError
 from tests.support.marey import REPOSITORY, Marey
 
@@ -49,7 +49,7 @@ class Crowd:
 
 def main() -> None:
     """Print each bar."""
-    with _server() as server, Client(server) as client:
+    with _server() as server, Transport(server) as client:
         prompts = [f"a person walks {number} steps and then waves" for number in range(GENERATED)]
         job = client.submit([{"prompt": prompt, "model": "hgm3"} for prompt in prompts])["id"]
         _until(lambda: client.get(f"/v1/jobs/{job}")["counters"]["succeeded"] > 0, "the worker generates")
@@ -77,7 +77,7 @@ def _long(number: int) -> str:
     return f"{LONG}. then {LONG}, {number} times. after that {LONG}"
 
 
-def _parse(client: Client, number: int) -> float:
+def _parse(client: Transport, number: int) -> float:
     began = time.perf_counter()
     client.post("/v1/texts/parse", {"prompts": [f"{LONG} {number} {each}" for each in range(PROMPTS)]})
     return time.perf_counter() - began
@@ -87,7 +87,7 @@ def _crowd(server: Server) -> Crowd:
     """All at once, in a process of their own: threads of the one that measures would delay what it sees."""
 
     def ask(number: int) -> bool:
-        with Client(server) as client:
+        with Transport(server) as client:
             try:
                 client.post("/v1/texts/parse", {"prompts": [_long(100 * number + each) for each in range(PROMPTS)]})
             except MareyError:
@@ -151,7 +151,7 @@ def _server() -> Iterator[Server]:
         server = read_server(home)
         assert server is not None
         _until(lambda: httpx2.get(f"{server.url}/readyz").status_code == 200, "the server is ready")
-        with Client(server, timeout=60) as client:
+        with Transport(server, timeout=60) as client:
             _until(lambda: _parses(client), "texts are parsed")
             yield server
     finally:
@@ -160,7 +160,7 @@ def _server() -> Iterator[Server]:
         shutil.rmtree(home, ignore_errors=True)
 
 
-def _parses(client: Client) -> bool:
+def _parses(client: Transport) -> bool:
     try:
         client.post("/v1/texts/parse", {"prompts": ["a person walks"]})
     except MareyError:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import psutil
 
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.db import transaction
 from marey.tenants import create_key
@@ -74,9 +74,9 @@ class Platform(Cluster):
             }
         )
 
-    def client(self) -> Client:
+    def client(self) -> Transport:
         """The command line's client."""
-        return Client(Server(self.url, self.key))
+        return Transport(Server(self.url, self.key))
 
     def process(self, name: str) -> psutil.Process:
         """A process of it by name."""

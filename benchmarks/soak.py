@@ -25,8 +25,8 @@ from cryptography.fernet import Fernet
 
 from benchmarks.platform import BUNDLE, Platform, platform
 from benchmarks.trend import Trend, fit
-from marey.cli.client import Client
-from marey.cli.fetching import download_all, plan
+from marey.client.fetching import download_all, plan
+from marey.client.transport import Transport
 from marey.core.errors import Conflict, MareyError
 from marey.db import transaction
 from marey.storage import open_store
@@ -108,7 +108,7 @@ def _hand(cluster: Platform, seed: int, stopping: threading.Event, done: Counter
             stopping.wait(PAUSE)
 
 
-def _one_job(client: Client, chance: random.Random, done: Counter[str]) -> None:
+def _one_job(client: Transport, chance: random.Random, done: Counter[str]) -> None:
     salt = chance.randrange(10**9)
     lines = [
         {"prompt": f"walk {salt} and turn {number} times", "model": BUNDLE, "tags": ["soak"]}
@@ -132,7 +132,7 @@ def _one_job(client: Client, chance: random.Random, done: Counter[str]) -> None:
     client.delete(f"/v1/jobs/{job}")
 
 
-def _fetch(client: Client, job: str, done: Counter[str]) -> None:
+def _fetch(client: Transport, job: str, done: Counter[str]) -> None:
     with tempfile.TemporaryDirectory(prefix="marey-soak-") as folder:
         planned = plan(client.pages(f"/v1/jobs/{job}/items", limit=1000), Path(folder), None)
         files = [file for _, of_item in planned for file in of_item]

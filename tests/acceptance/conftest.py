@@ -44,7 +44,7 @@ def offline(models: Path, tmp_path: Path) -> Marey:
 @pytest.fixture
 def elsewhere(marey: Marey, tmp_path: Path) -> Marey:
     """The command line of another machine: it knows the server by URL and key alone."""
-    from marey.cli.place import read_server
+    from marey.client.place import read_server
 
     server = read_server(marey.home)
     assert server is not None

@@ -12,8 +12,8 @@ from uuid import uuid4
 
 import pytest
 
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import NotFound, Unauthenticated
 from tests.servers.ports import free_ports
 from tests.support.marey import Marey, Serving
@@ -126,11 +126,11 @@ def test_the_text_service_needs_no_database_and_wants_the_secret_of_the_api(offl
     process = replace(offline, environment=own).start("text", "serve")
     try:
         wait_for_port(port)
-        with Client(Server(f"http://127.0.0.1:{port}", "shared")) as alone:
+        with Transport(Server(f"http://127.0.0.1:{port}", "shared")) as alone:
             assert alone.post("/v1/texts/parse", {"prompts": ["a person bows"]})["items"][0]["text"] == "a person bows"
             with pytest.raises(NotFound):
                 alone.get("/v1/jobs")
-        with Client(Server(f"http://127.0.0.1:{port}", "another")) as stranger, pytest.raises(Unauthenticated):
+        with Transport(Server(f"http://127.0.0.1:{port}", "another")) as stranger, pytest.raises(Unauthenticated):
             stranger.post("/v1/texts/parse", {"prompts": ["a person bows"]})
     finally:
         process.terminate()

@@ -17,7 +17,7 @@ from typing import Any
 REPOSITORY = Path(__file__).resolve().parents[2]
 ROOTS = ("shared", "services", "workers")
 DEFINE_ERRORS = (
-    *("marey.cli.text_files", "marey.items.item", "marey.jobs.errors", "marey.embedded.server"),
+    *("marey.client.text_files", "marey.items.item", "marey.jobs.errors", "marey.embedded.server"),
     *("marey.runtime.faults", "marey.streams.redis", "marey.text.rewriters"),
 )
 """Modules that add to the tree of errors."""
@@ -216,7 +216,7 @@ def queue() -> Any:
 def files() -> Any:
     """Keys of the files that the product writes."""
     from marey.bundles.manifest import BundleManifest, TextSpec
-    from marey.cli.manifest import COLUMNS
+    from marey.client.manifest import COLUMNS
     from marey.data import manifest as prepared
     from marey.evaluator.report import Report
     from marey.items.item import FIELDS

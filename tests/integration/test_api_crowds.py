@@ -10,8 +10,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from marey.cli.client import Client
 from marey.cli.watching import watch_job
+from marey.client.transport import Transport
 from marey.core.errors import Busy
 from marey.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of, wait_until
@@ -87,7 +87,7 @@ def test_a_key_that_follows_all_it_may_is_told_to_come_back_and_others_are_let_i
             assert watch_job(client, job, quiet=True)["state"] == "cancelled", "it looks instead of following"
 
 
-def _opens(client: Client, path: str) -> bool:
+def _opens(client: Transport, path: str) -> bool:
     try:
         with client.stream(path, SSE):
             return True

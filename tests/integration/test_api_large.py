@@ -12,8 +12,8 @@ import pytest
 from fastapi import FastAPI
 
 from marey.api.app import create_app
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.spool import IN_MEMORY
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer
@@ -68,7 +68,7 @@ def test_a_large_body_waits_is_refused_and_is_taken_once_there_is_room(app: tupl
             assert unsized.status_code == 503, "what does not say its length needs room once it is long"
             small = http.post("/v1/jobs", json={"items": items()[:2]})
             assert small.status_code == 202
-            with Client(Server(url, key)) as client:
+            with Transport(Server(url, key)) as client:
                 submitted: list[str] = []
                 waiting = threading.Thread(target=lambda: submitted.append(client.submit(items())["id"]))
                 waiting.start()

@@ -12,7 +12,7 @@ import httpx2
 import pytest
 from pydantic import SecretStr
 
-from marey.cli.fetching import ATTEMPTS, Download, download_all
+from marey.client.fetching import ATTEMPTS, Download, download_all
 from marey.core.errors import Unreachable
 from marey.core.hashing import sha256_of
 from marey.db import create_engine, transaction

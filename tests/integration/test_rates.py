@@ -12,8 +12,8 @@ import sqlalchemy as sa
 
 from marey.api import rates
 from marey.api.rates import Rates
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import Busy
 from marey.core.settings import Settings
 from marey.db import transaction
@@ -141,7 +141,7 @@ def test_the_command_line_ends_with_5_when_it_may_not_ask_again_soon(
 ) -> None:
     url, secret = limited
     monkeypatch.setattr("time.sleep", lambda seconds: None)
-    with Client(Server(url, secret)) as client:
+    with Transport(Server(url, secret)) as client:
         for _ in range(3):
             client.get("/v1/jobs")
         with pytest.raises(Busy, match="class read") as refused:

@@ -21,8 +21,8 @@ from pydantic import SecretStr
 
 from marey.api.app import create_app, protocol_options
 from marey.bundles import BundleWriter, TextSpec
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.db import create_engine, transaction
 from marey.jobs import (
@@ -57,9 +57,9 @@ class LiveApi:
     engine: sa.Engine
     store: AssetStore
 
-    def client(self) -> Client:
+    def client(self) -> Transport:
         """The command line's client, with all scopes."""
-        return Client(Server(self.url, self.key))
+        return Transport(Server(self.url, self.key))
 
     def http(self, *scopes: str) -> httpx2.Client:
         """A plain HTTP client; with `scopes`, a key that has only these."""

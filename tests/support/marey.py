@@ -18,8 +18,8 @@ from typing import Any
 import psutil
 from websockets.sync.client import ClientConnection, connect
 
-from marey.cli.client import Client
-from marey.cli.place import read_server
+from marey.client.place import read_server
+from marey.client.transport import Transport
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 MIGRATIONS = REPOSITORY / "migrations" / "marey" / "migrations"
@@ -107,11 +107,11 @@ class Marey:
         with self.client() as client:
             return list(client.pages("/v1/jobs", limit=1000))
 
-    def client(self) -> Client:
+    def client(self) -> Transport:
         """The HTTP client on this home's server: asking it costs no new process."""
         server = read_server(self.home)
         assert server is not None
-        return Client(server)
+        return Transport(server)
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ import threading
 import time
 from pathlib import Path
 
-from marey.cli.client import Client
-from marey.cli.fetching import Download, download_all
-from marey.cli.live.link import Link
-from marey.cli.place import Server
+from marey.client.fetching import Download, download_all
+from marey.client.link import Link
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.hashing import sha256_of
 from tests.support.live_api import LiveApi
 from tests.support.live_streams import Hand
@@ -19,7 +19,7 @@ CONTENT = bytes(range(256)) * 1000
 
 def submit_watch_and_fetch(url: str, api: LiveApi, folder: Path) -> list[float]:
     """Submit a job, follow its events while it is worked on, and fetch a file; times at which events came."""
-    with Client(Server(url, api.key)) as client:
+    with Transport(Server(url, api.key)) as client:
         job = client.submit([{"prompt": "a person walks"}, {"prompt": "a person waves"}])
         hands = threading.Timer(1.0, api.work, args=(CONTENT,), kwargs={"batch": 1, "pause": 0.5})
         hands.start()

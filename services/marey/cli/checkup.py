@@ -16,7 +16,7 @@ from marey.core.private_home import FOLDER_MODE, is_open
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
-    from marey.cli.place import Server
+    from marey.client.place import Server
     from marey.core.settings import Settings
 
 ANSWER_SECONDS, LIVE_SECONDS = 10.0, 5.0
@@ -64,8 +64,8 @@ def _extra(name: str, package: str, commands: str) -> Check:
 
 
 def _home() -> Check:
-    from marey.cli.fetching import check_folder
-    from marey.cli.place import home
+    from marey.client.fetching import check_folder
+    from marey.client.place import home
 
     folder = home()
     with contextlib.suppress(OSError):  # what hinders is told by the check
@@ -81,8 +81,8 @@ def _home() -> Check:
 
 
 def _server() -> Check:
-    from marey.cli.client import Client
-    from marey.cli.place import find_server
+    from marey.client.place import find_server
+    from marey.client.transport import Transport
     from marey.core.errors import Unreachable
 
     try:
@@ -92,7 +92,7 @@ def _server() -> Check:
     except MareyError as error:
         return broken("server", error)
     try:
-        with Client(server, timeout=ANSWER_SECONDS, attempts=2) as client:
+        with Transport(server, timeout=ANSWER_SECONDS, attempts=2) as client:
             client.get("/v1/jobs", limit=1)
     except MareyError as error:
         return (_stalled(server, error) if isinstance(error, Unreachable) else None) or broken("server", error)

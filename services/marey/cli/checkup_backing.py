@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from marey.cli.database import engine_of, settings_here
 from marey.cli.findings import Check, broken, free_space
-from marey.cli.place import read_server
 from marey.cli.ports import try_port
+from marey.client.place import read_server
 from marey.core.errors import MareyError, Unreachable
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from marey.cli import console
-from marey.cli.client import Client
-from marey.cli.place import Server, find_server
 from marey.cli.watching import watch_job
+from marey.client.place import Server, find_server
+from marey.client.transport import Transport
 from marey.core.errors import MareyError, NotFound, TimedOut, Unreachable
 
 OUT = Path("out/demo")
@@ -127,7 +127,7 @@ def _is_ready() -> bool:
 def _run() -> list[dict[str, Any]]:
     from marey.cli.commands.fetch import fetch_job
 
-    with Client.here() as client:
+    with Transport.here() as client:
         job = client.submit([dict(item) for item in PROMPTS], name="demo")
         watch_job(client, job["id"], timeout=JOB_SECONDS)
         return fetch_job(client, job["id"], OUT, template="{name}", overwrite=True)

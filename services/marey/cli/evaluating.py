@@ -22,7 +22,7 @@ from marey.items.evaluation_prompts import PromptCheck
 from marey.items.item import InvalidItems, Problem, outside_range
 
 if TYPE_CHECKING:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
 OPEN = frozenset({"planned", "generating", "scoring"})
 TEST = "test"
@@ -108,7 +108,7 @@ class Asked:
     def _prompts(self) -> dict[str, Any]:
         if self.split in SPLITS:
             return {"split": self.split}
-        from marey.cli.rows import read_evaluation_prompts
+        from marey.client.rows import read_evaluation_prompts
 
         if self.extra_columns is ExtraColumns.TAG:
             raise InvalidInput("prompts of an evaluation have no tags", where="--extra-columns", hint="Choose ignore.")
@@ -129,8 +129,8 @@ class Asked:
     @contextmanager
     def in_source(self) -> Generator[None]:
         """In here a server's `InvalidItems` about the prompts names the file and its lines."""
-        from marey.cli.rows import located
-        from marey.cli.text_files import where_of
+        from marey.client.rows import located
+        from marey.client.text_files import where_of
 
         try:
             yield
@@ -148,11 +148,11 @@ def _range_check(bundle: str) -> PromptCheck:
     found: list[dict[str, Any] | None] = []
 
     def model() -> dict[str, Any] | None:
-        from marey.cli.client import Client
+        from marey.client.transport import Transport
 
         if not found:
             try:
-                with Client.here() as client:
+                with Transport.here() as client:
                     found.append(client.get(f"/v1/models/{quote(bundle, safe='')}"))
             except MareyError:
                 found.append(None)
@@ -169,7 +169,7 @@ def _range_check(bundle: str) -> PromptCheck:
 
 
 def watch_evaluation(
-    client: Client, evaluation: str, *, timeout: float | None = None, quiet: bool = False
+    client: Transport, evaluation: str, *, timeout: float | None = None, quiet: bool = False
 ) -> dict[str, Any]:
     """Look until an evaluation is over; how it ended.
 
@@ -293,9 +293,9 @@ def _wait_hint(evaluation: str) -> str:
 
 def show_runs(path: str, limit: int | None, as_json: bool, *, full_ids: bool = False, **params: Any) -> None:
     """The runs of a listing, newest first."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.pages(path, limit=console.page_size(limit), **params)
         console.listing(found, RUN_COLUMNS, _run_cell, as_json=as_json, limit=limit, full_ids=full_ids)
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from marey.cli.names import DEFAULT_TEMPLATE
+from marey.client.names import DEFAULT_TEMPLATE
 
 
 class FileFormat(StrEnum):

@@ -11,7 +11,7 @@ from marey.cli import console
 from marey.core.errors import InvalidInput, NotFound
 
 if TYPE_CHECKING:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
 FORMS = "its id, the last 8 digits of it, a name, or last"
 MOTION_FORMS = "an id, the last 8 digits of it, JOB:INDEX, JOB:INDEX.VARIANT, or last"
@@ -49,7 +49,7 @@ def whole_id(text: str) -> str | None:
         return None
 
 
-def find(client: Client, kind: str, text: str, *, webhook: str | None = None) -> Reference:
+def find(client: Transport, kind: str, text: str, *, webhook: str | None = None) -> Reference:
     """Resolve a reference; the server is asked where it is not a whole id.
 
     Raises:
@@ -62,13 +62,13 @@ def find(client: Client, kind: str, text: str, *, webhook: str | None = None) ->
     return choose(kind, text, matches)
 
 
-def find_all(client: Client, kind: str, texts: Iterable[str], *, webhook: str | None = None) -> list[Reference]:
+def find_all(client: Transport, kind: str, texts: Iterable[str], *, webhook: str | None = None) -> list[Reference]:
     """`find` for several, before anything is done to one of them."""
     found = [find(client, kind, text, webhook=webhook) for text in texts]
     return list({each.id: each for each in found}.values())
 
 
-def named(client: Client, path: str, found: Iterable[Reference]) -> Iterator[Reference]:
+def named(client: Transport, path: str, found: Iterable[Reference]) -> Iterator[Reference]:
     """Each with its name, so that a verb that cannot be taken back says what it met.
 
     Args:

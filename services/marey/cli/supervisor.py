@@ -17,9 +17,9 @@ from typing import IO
 
 from marey.cli import console
 from marey.cli.children import Child, marey, metrics_port, stop_all
-from marey.cli.place import Server, read_server, write_server
 from marey.cli.ports import try_port
 from marey.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
+from marey.client.place import Server, read_server, write_server
 from marey.core.errors import Conflict, InvalidInput, MareyError
 from marey.core.private_home import make_private, open_private
 from marey.core.settings import Settings

@@ -6,15 +6,13 @@ import time
 from typing import Any
 
 from marey.cli import console
-from marey.cli.client import Client
+from marey.client.transport import PATIENCE, Transport
 from marey.core.errors import Busy, ItemsFailed, TimedOut, Unreachable
 
 ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
-PATIENCE = 180.0
-"""Seconds without a reachable server after which following gives up."""
 
 
-def watch_job(client: Client, job: str, *, timeout: float | None = None, quiet: bool = False) -> dict[str, Any]:
+def watch_job(client: Transport, job: str, *, timeout: float | None = None, quiet: bool = False) -> dict[str, Any]:
     """Follow the job's events until it has ended; a lost connection is taken up where it broke.
 
     Args:

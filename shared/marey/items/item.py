@@ -56,7 +56,7 @@ whole."""
 MAX_NAME = 100
 NAME = re.compile(rf"[^\W_][^/\\]{{0,{MAX_NAME - 1}}}")
 """A name begins with a letter or digit of any script and holds no separators; characters that do not show are refused
-besides. The client derives the file name from it (`marey.cli.names`)."""
+besides. The client derives the file name from it (`marey.client.names`)."""
 RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
 """Names that Windows keeps for devices."""
 MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")

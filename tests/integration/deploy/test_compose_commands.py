@@ -13,8 +13,8 @@ import pytest
 import redis
 import sqlalchemy as sa
 
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer
 from tests.servers.swift import ACCESS_KEY, SECRET_KEY, Swift
@@ -81,7 +81,7 @@ def test_prompts_become_motions_of_both_models(stack: Stack, tmp_path: Path) -> 
 
 def test_the_parser_parses_for_the_api(stack: Stack) -> None:
     server = Server(stack.client.environment["MAREY_SERVER"], stack.client.environment["MAREY_KEY"])
-    with Client(server) as client:
+    with Transport(server) as client:
         parsed = client.post("/v1/texts/parse", {"prompts": ["a person walks"]})
     assert parsed["items"][0]["text"] == "a person walks"
 

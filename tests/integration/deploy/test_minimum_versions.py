@@ -9,8 +9,8 @@ import pytest
 import sqlalchemy as sa
 
 from marey.cli import checkup_backing as backing
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.versions import POSTGRES, REDIS
 from marey.db import create_engine, downgrade, transaction, upgrade
 from marey.jobs import server_version
@@ -62,7 +62,7 @@ def test_jobs_events_and_files(api: LiveApi, tmp_path: Path) -> None:
 
 
 def test_live_streams(api: LiveApi, queue: str) -> None:
-    with Client(Server(api.url, api.key)) as client, redis_client(queue) as frames:
+    with Transport(Server(api.url, api.key)) as client, redis_client(queue) as frames:
         stream = client.post_once("/v1/streams", WALK)["id"]
         watch_a_stream(api.url, api, Hand(api.engine, frames, stream))
 

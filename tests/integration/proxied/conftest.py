@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 import redis
 
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.settings import Settings
 from marey.embedded import EmbeddedServer
 from marey.runtime.queue import redis_client
@@ -66,7 +66,7 @@ def frames(valkey: EmbeddedServer) -> Iterator[redis.Redis]:
 @pytest.fixture
 def hand(api: LiveApi, frames: redis.Redis) -> Iterator[Hand]:
     """A live stream of `api.key` that waits, and what shows it."""
-    with Client(Server(api.url, api.key)) as client:
+    with Transport(Server(api.url, api.key)) as client:
         stream = client.post_once("/v1/streams", WALK)["id"]
         yield Hand(api.engine, frames, stream)
         client.delete(f"/v1/streams/{stream}")

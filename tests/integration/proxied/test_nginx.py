@@ -10,10 +10,10 @@ from urllib.parse import urlsplit
 import httpx2
 import pytest
 
-from marey.cli import client as client_module
-from marey.cli.client import Client
-from marey.cli.live.link import Link
-from marey.cli.place import Server
+from marey.client import transport
+from marey.client.link import Link
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import InvalidInput, TooLarge, Unauthenticated, Unreachable
 from tests.servers.nginx import PROGRAM, Nginx
 from tests.servers.ports import free_ports
@@ -73,7 +73,7 @@ def test_live_streams_pass(nginx: Nginx, api: LiveApi, hand: Hand) -> None:
 
 
 def test_a_body_of_more_than_nginx_takes_by_default_passes(nginx: Nginx, api: LiveApi) -> None:
-    with Client(Server(nginx.url, api.key)) as client:
+    with Transport(Server(nginx.url, api.key)) as client:
         found = client.submit(({"prompt": f"a person walks {n} steps"} for n in range(40_000)), validate_only=True)
     assert found["items"] == 40_000
 
@@ -88,10 +88,10 @@ def test_a_name_that_is_not_allowed_is_refused_by_the_api(nginx: Nginx, api: Liv
 
 def test_plain_http_is_led_to_https(nginx: Nginx, api: LiveApi) -> None:
     server = Server(f"http://localhost:{nginx.http_port}", api.key)
-    with Client(server) as client, pytest.raises(InvalidInput, match="a redirect to https://localhost\n"):
+    with Transport(server) as client, pytest.raises(InvalidInput, match="a redirect to https://localhost\n"):
         client.get("/v1/jobs")
     with (
-        Client(Server(nginx.url.replace("https", "http"), api.key)) as client,
+        Transport(Server(nginx.url.replace("https", "http"), api.key)) as client,
         pytest.raises(InvalidInput, match="Begin MAREY_SERVER with https"),
     ):
         client.get("/v1/jobs")
@@ -100,13 +100,13 @@ def test_plain_http_is_led_to_https(nginx: Nginx, api: LiveApi) -> None:
 def test_only_fetching_passes_to_the_store(nginx: Nginx, authority: Authority) -> None:
     with httpx2.Client(verify=authority.trusting()) as http:
         assert http.put(f"https://localhost:{nginx.store_port}/marey/x", content=b"x").status_code == 403
-        with pytest.raises(Unauthenticated), Client(Server(nginx.url, "wrong")) as client:
+        with pytest.raises(Unauthenticated), Transport(Server(nginx.url, "wrong")) as client:
             client.get("/v1/jobs")
 
 
 def test_without_the_size_a_large_body_is_told_with_what_to_set(without: Without, api: LiveApi) -> None:
     nginx = without("client_max_body_size")
-    with Client(Server(nginx.url, api.key)) as client, pytest.raises(TooLarge, match="client_max_body_size 64m"):
+    with Transport(Server(nginx.url, api.key)) as client, pytest.raises(TooLarge, match="client_max_body_size 64m"):
         client.submit({"prompt": f"a person walks {n} steps"} for n in range(40_000))
 
 
@@ -128,10 +128,10 @@ def test_without_the_upgrade_a_stream_is_told_with_what_to_set(
 def test_an_api_that_is_away_is_unreachable(
     swift: Swift, authority: Authority, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client_module, "FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.01)
     nobody = f"127.0.0.1:{free_ports(1)[0]}"
     with Nginx(tmp_path / "nginx", authority, api=nobody, store=swift.endpoint) as nginx:
-        with Client(Server(nginx.url, "key")) as client, pytest.raises(Unreachable, match="answered 502"):
+        with Transport(Server(nginx.url, "key")) as client, pytest.raises(Unreachable, match="answered 502"):
             client.get("/v1/jobs")
         with Link(Server(nginx.url, "key"), "x", patience=0.2) as link, pytest.raises(Unreachable, match="HTTP 502"):
             receive_until_refused(link)

@@ -9,9 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from marey.cli.client import Client
-from marey.cli.live.link import Link
-from marey.cli.place import Server
+from marey.client.link import Link
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import Unreachable
 from marey.core.settings import Settings
 from tests.servers.receiver import Authority
@@ -71,7 +71,7 @@ def test_jobs_events_files_and_streams_work_with_it(
 
 def test_without_it_each_says_what_to_set_and_tries_once(url: str, front: TlsFront, api: LiveApi) -> None:
     began = time.monotonic()
-    with Client(Server(url, api.key)) as client:
+    with Transport(Server(url, api.key)) as client:
         for call in (lambda: client.get("/v1/jobs"), lambda: list(client.events("x"))):
             with pytest.raises(Unreachable, match="certificate of the server is not trusted") as told:
                 call()
@@ -96,7 +96,7 @@ def test_another_name_than_that_of_the_certificate_is_refused(
 ) -> None:
     monkeypatch.setenv("MAREY_CA_FILE", str(authority.file))
     url = f"https://127.0.0.1:{front.port}"
-    with Client(Server(url, api.key)) as client, pytest.raises(Unreachable, match=r"not trusted .*127\.0\.0\.1"):
+    with Transport(Server(url, api.key)) as client, pytest.raises(Unreachable, match=r"not trusted .*127\.0\.0\.1"):
         client.get("/v1/jobs")
 
 

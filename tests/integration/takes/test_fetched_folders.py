@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from marey.cli.client import Client
 from marey.cli.commands.fetch import fetch_job
-from marey.cli.manifest import RECORD, remove_left, write_manifest
-from marey.cli.place import Server
+from marey.client.manifest import RECORD, remove_left, write_manifest
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
@@ -127,7 +127,7 @@ def test_names_of_a_manifest_do_not_lead_out_of_the_folder(marey: Command, job: 
     assert len(files(folder)) == 21
 
 
-class Breaking(Client):
+class Breaking(Transport):
     """A client whose command is interrupted, or whose server is lost, at its twelfth file."""
 
     def __init__(self, server: Server, error: BaseException) -> None:

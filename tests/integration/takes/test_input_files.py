@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.cli.csv_cells import restore
-from marey.cli.manifest import NAME, RAW_COLUMNS
+from marey.client.csv_cells import restore
+from marey.client.manifest import NAME, RAW_COLUMNS
 from marey.core.characters import find_forbidden
 from marey.db import transaction
 from marey.jobs import tables

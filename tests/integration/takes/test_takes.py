@@ -10,7 +10,7 @@ from uuid import uuid4
 import httpx2
 import pytest
 
-from marey.cli.manifest import COLUMNS
+from marey.client.manifest import COLUMNS
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
 

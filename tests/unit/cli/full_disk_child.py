@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from marey.cli.client import Client
-from marey.cli.fetching import Download, download_all
-from marey.cli.lines import Lines
-from marey.cli.manifest import COLUMNS, write_manifest
-from marey.cli.place import Server
+from marey.client.fetching import Download, download_all
+from marey.client.lines import Lines
+from marey.client.manifest import COLUMNS, write_manifest
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import MareyError
 from marey.core.hashing import sha256_of
 from marey.core.spool import IN_MEMORY
@@ -78,7 +78,7 @@ class Files(BaseHTTPRequestHandler):
 
 def fetch(folder: Path, port: int) -> None:
     wanted = Download("/file", hashlib.sha256(BIG).hexdigest(), len(BIG), folder / "clip.npz")
-    with Client(Server(f"http://127.0.0.1:{port}", "key")) as client:
+    with Transport(Server(f"http://127.0.0.1:{port}", "key")) as client:
         download_all(client, [wanted], overwrite=False, done=lambda _: None)
 
 

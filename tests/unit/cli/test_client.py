@@ -10,9 +10,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from marey.cli import client as client_module
-from marey.cli.client import Client
-from marey.cli.place import Server
+from marey.client import transport
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
 from marey.items.item import InvalidItems
 
@@ -25,15 +25,15 @@ class Script:
     asked: list[tuple[str, str | None, bytes]] = field(default_factory=list)
 
 
-Scripted = Callable[..., tuple[Client, Script]]
+Scripted = Callable[..., tuple[Transport, Script]]
 
 
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
-    monkeypatch.setattr(client_module, "FIRST_PAUSE", 0.001)
+    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
     servers: list[ThreadingHTTPServer] = []
 
-    def start(*answers: tuple[int, object]) -> tuple[Client, Script]:
+    def start(*answers: tuple[int, object]) -> tuple[Transport, Script]:
         script = Script([(code, json.dumps(body).encode()) for code, body in answers])
 
         class Handler(BaseHTTPRequestHandler):
@@ -57,7 +57,7 @@ def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
         server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         servers.append(server)
-        return Client(Server(f"http://127.0.0.1:{server.server_port}", "key")), script
+        return Transport(Server(f"http://127.0.0.1:{server.server_port}", "key")), script
 
     yield start
     for server in servers:
@@ -89,7 +89,7 @@ def test_a_server_that_stays_away_is_unreachable_after_five_attempts(
     client, script = scripted(*[(503, problem("unreachable"))] * 9)
     with client, pytest.raises(Unreachable):
         client.get("/v1/jobs")
-    assert len(script.asked) == client_module.ATTEMPTS
+    assert len(script.asked) == transport.ATTEMPTS
 
 
 @pytest.mark.parametrize(
@@ -134,8 +134,8 @@ def test_what_must_not_be_done_twice_is_sent_once(scripted: Scripted) -> None:
 
 
 def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client_module, "ATTEMPTS", 1)
-    monkeypatch.setattr(client_module, "BUSY_SECONDS", 0.0)
+    monkeypatch.setattr(transport, "ATTEMPTS", 1)
+    monkeypatch.setattr(transport, "BUSY_SECONDS", 0.0)
     client, _ = scripted((429, problem("busy", hint="Stop one.")))
     with client, pytest.raises(Busy, match=r"no\n  Stop one\.") as caught:
         client.get("/v1/jobs")
@@ -145,7 +145,7 @@ def test_a_quota_that_is_used_up_is_5(scripted: Scripted, monkeypatch: pytest.Mo
 def test_a_server_that_is_busy_is_waited_for_longer_than_one_that_is_broken(
     scripted: Scripted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(client_module, "LONGEST_PAUSE", 0.001)
+    monkeypatch.setattr(transport, "LONGEST_PAUSE", 0.001)
     busy = (503, problem("overloaded"))
     client, script = scripted(*[busy] * 12, (200, {"id": "job"}))
     with client:
@@ -155,16 +155,16 @@ def test_a_server_that_is_busy_is_waited_for_longer_than_one_that_is_broken(
     client, script = scripted(*[(503, problem("unreachable"))] * 12)
     with client, pytest.raises(Unreachable):
         client.submit([{"prompt": "walk"}])
-    assert len(script.asked) == client_module.ATTEMPTS
+    assert len(script.asked) == transport.ATTEMPTS
 
 
 def test_a_server_that_stays_busy_is_given_up(scripted: Scripted, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client_module, "BUSY_SECONDS", 0.001)
+    monkeypatch.setattr(transport, "BUSY_SECONDS", 0.001)
     client, script = scripted(*[(503, problem("overloaded"))] * 12)
     with client, pytest.raises(Overloaded) as refused:
         client.get("/v1/jobs")
     assert refused.value.exit_code == 4
-    assert len(script.asked) == client_module.ATTEMPTS
+    assert len(script.asked) == transport.ATTEMPTS
 
 
 def test_text_that_no_request_can_hold_is_refused_with_what_to_do(scripted: Scripted) -> None:
@@ -210,4 +210,4 @@ def test_what_no_url_can_hold_is_a_wrong_input(scripted: Scripted) -> None:
     with client, pytest.raises(InvalidInput, match="cannot be asked for"):
         client.get("/v1/models/x\x1b[31m")
     with pytest.raises(InvalidInput, match="is no address"):
-        Client(Server("http://127.0.0.1:9/\x1b[31m", "key"))
+        Transport(Server("http://127.0.0.1:9/\x1b[31m", "key"))

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.cli import manifest
-from marey.cli.csv_cells import join_tags, protect, restore, split_tags, write_csv
-from marey.cli.manifest import COLUMNS, NAME, NUMBERS, RAW_COLUMNS, row_of, write_manifest
-from marey.cli.rows import items_from_file
+from marey.client import manifest
+from marey.client.csv_cells import join_tags, protect, restore, split_tags, write_csv
+from marey.client.manifest import COLUMNS, NAME, NUMBERS, RAW_COLUMNS, row_of, write_manifest
+from marey.client.rows import items_from_file
 from marey.core.characters import find_forbidden
 from marey.items.item import Item, read_item
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from marey.cli.client import Client
-from marey.cli.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
-from marey.cli.place import Server
+from marey.client.fetching import ATTEMPTS, BLOCK, Download, download_all, plan
+from marey.client.place import Server
+from marey.client.transport import Transport
 from marey.core.errors import InvalidFile
 
 ITEM: dict[str, Any] = {
@@ -65,7 +65,7 @@ def endless() -> Iterator[str]:
 
 def test_no_more_is_read_than_the_size_that_was_told(tmp_path: Path, endless: str) -> None:
     wanted = Download("/file", "0" * 64, 1000, tmp_path / "a.npz")
-    with Client(Server(endless, "key")) as client, pytest.raises(InvalidFile, match="another sha256"):
+    with Transport(Server(endless, "key")) as client, pytest.raises(InvalidFile, match="another sha256"):
         download_all(client, [wanted], overwrite=False, done=lambda _: None)
     assert list(tmp_path.iterdir()) == []
     assert Endless.sent < ATTEMPTS * 100 * BLOCK

@@ -18,6 +18,6 @@ def test_the_command_line_imports_no_server_and_no_numbers() -> None:
 
 
 def test_the_client_needs_nothing_but_its_own_packages() -> None:
-    code = "import marey.cli.client, marey.cli.watching, marey.cli.fetching, sys; print(*sys.modules)"
+    code = "import marey.client.transport, marey.cli.watching, marey.client.fetching, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(HEAVY[:-1]) & set(done.stdout.split())

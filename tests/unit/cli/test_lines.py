@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from marey.cli.lines import PIECE, Lines
+from marey.client.lines import PIECE, Lines
 from marey.core.errors import InvalidInput
 from marey.core.spool import IN_MEMORY
 

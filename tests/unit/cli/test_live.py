@@ -9,12 +9,12 @@ import time
 import numpy as np
 import pytest
 
-from marey.cli.live import link as link_module
 from marey.cli.live.frames import Head, head_of
-from marey.cli.live.link import Link
 from marey.cli.live.pace import Pace
 from marey.cli.live.steering import message_of
-from marey.cli.place import Server
+from marey.client import link as link_module
+from marey.client.link import Link
+from marey.client.place import Server
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 from marey.streams.frames import Frame, encode_frame
 from tests.support.stream_server import KEY, STREAM, Plan, StreamServer

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.cli.names import (
+from marey.client.names import (
     DEFAULT_TEMPLATE,
     FileNames,
     Naming,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from marey.cli.place import Server, find_server
+from marey.client.place import Server, find_server
 from marey.core.errors import InvalidFile, Unauthenticated
 
 URL = "https://marey.example.com"

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from marey.cli import client as client_module
-from marey.cli.client import ATTEMPTS, Client
-from marey.cli.live import link as link_module
-from marey.cli.live.link import Link
-from marey.cli.place import Server
+from marey.client import link as link_module
+from marey.client import transport
+from marey.client.link import Link
+from marey.client.place import Server
+from marey.client.transport import ATTEMPTS, Transport
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, TooLarge, TooSlow, Unreachable
 from tests.servers.receiver import Authority
 from tests.support.proxied import receive_until_refused
@@ -59,7 +59,7 @@ Start = Callable[..., Proxy]
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
-    monkeypatch.setattr(client_module, "FIRST_PAUSE", 0.001)
+    monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
     started: list[Proxy] = []
 
     def begin(status: int, body: bytes = NGINX, **headers: str) -> Proxy:
@@ -89,7 +89,7 @@ def test_a_page_of_a_proxy_is_told_as_such(
     start: Start, status: int, error: type[MareyError], said: str, requests: int
 ) -> None:
     proxy = start(status)
-    with Client(proxy.server) as client, pytest.raises(error, match=r"a proxy \(nginx/1.22.1\) answered") as told:
+    with Transport(proxy.server) as client, pytest.raises(error, match=r"a proxy \(nginx/1.22.1\) answered") as told:
         client.submit([{"prompt": "a person walks"}])
     assert said in str(told.value)
     assert proxy.requests == requests
@@ -98,7 +98,7 @@ def test_a_page_of_a_proxy_is_told_as_such(
 def test_a_name_that_would_control_a_terminal_is_not_shown(start: Start) -> None:
     proxy = start(404, Server="x\x1b[2J")
     proxy.http.RequestHandlerClass.server_version = "evil\x1b[2J"  # pyright: ignore[reportAttributeAccessIssue]
-    with Client(proxy.server) as client, pytest.raises(InvalidInput) as told:
+    with Transport(proxy.server) as client, pytest.raises(InvalidInput) as told:
         client.get("/v1/jobs")
     assert "\x1b" not in str(told.value)
     assert "a proxy or another server answered 404" in str(told.value)
@@ -117,17 +117,17 @@ def test_a_name_that_would_control_a_terminal_is_not_shown(start: Start) -> None
 def test_neither_a_redirect_nor_a_page_counts_as_done(
     start: Start, status: int, headers: dict[str, str], said: str, verb: str
 ) -> None:
-    with Client(start(status, **headers).server) as client, pytest.raises(InvalidInput) as told:
+    with Transport(start(status, **headers).server) as client, pytest.raises(InvalidInput) as told:
         getattr(client, verb)("/v1/jobs")
     assert said in str(told.value)
 
 
 def test_https_to_a_port_of_http_and_the_reverse_are_told(start: Start) -> None:
     proxy = start(400, PLAIN)
-    with Client(proxy.server) as client, pytest.raises(InvalidInput, match="Begin MAREY_SERVER with https"):
+    with Transport(proxy.server) as client, pytest.raises(InvalidInput, match="Begin MAREY_SERVER with https"):
         client.get("/v1/jobs")
     secure = Server(proxy.url.replace("http", "https"), "key")
-    with Client(secure) as client, pytest.raises(InvalidInput, match="Begin MAREY_SERVER with http:"):
+    with Transport(secure) as client, pytest.raises(InvalidInput, match="Begin MAREY_SERVER with http:"):
         client.get("/v1/jobs")
     with Link(proxy.server, "s") as link, pytest.raises(InvalidInput, match="Begin MAREY_SERVER with https"):
         link.receive(1)
@@ -164,6 +164,6 @@ def test_a_socket_refused_by_the_api_is_told_in_its_words_and_by_a_proxy_in_ours
 def test_a_file_of_authorities_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MAREY_CA_FILE", str(tmp_path / "none.pem"))
     with pytest.raises(InvalidInput, match="cannot be read") as told:
-        Client(Server("http://127.0.0.1:1", "key"))
+        Transport(Server("http://127.0.0.1:1", "key"))
     assert told.value.where == "MAREY_CA_FILE"
     assert Authority.make(tmp_path).file.exists()

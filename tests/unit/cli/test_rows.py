@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.cli.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
+from marey.client.rows import defaults_of, evaluation_prompts_from_file, items_from_file, items_from_prompts
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import InvalidItems, Item

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.cli.rows import read_file, right_items
-from marey.cli.tables import ExtraColumns, csv_rows, delimiter_of
+from marey.client.rows import read_file, right_items
+from marey.client.tables import ExtraColumns, csv_rows, delimiter_of
 from marey.items.item import COLUMNS, InvalidItems, Item, Unreadable
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from marey.cli import rows
-from marey.cli.rows import evaluation_prompts_from_file, items_from_file
-from marey.cli.text_files import MAX_LINE
+from marey.client import rows
+from marey.client.rows import evaluation_prompts_from_file, items_from_file
+from marey.client.text_files import MAX_LINE
 from marey.core.errors import InvalidFile, InvalidInput, MareyError, TooLarge
 from marey.items.item import MAX_BODY_BYTES, MAX_ITEMS, InvalidItems, Item
 
@@ -25,7 +25,7 @@ MEMORY_MIB = 64
 MEASURED = """
 import re, sys
 from pathlib import Path
-from marey.cli.rows import items_from_file
+from marey.client.rows import items_from_file
 from marey.core.errors import TooLarge
 def peak():  # of this program alone: ru_maxrss begins at what the parent had
     return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1])

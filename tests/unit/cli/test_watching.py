@@ -11,10 +11,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from marey.api.jobs.events import PING_SECONDS
-from marey.cli import client as client_module
-from marey.cli.client import QUIET_SECONDS, Client
-from marey.cli.place import Server
 from marey.cli.watching import watch_job
+from marey.client import transport
+from marey.client.place import Server
+from marey.client.transport import QUIET_SECONDS, Transport
 
 COUNTERS = {"succeeded": 1, "failed": 0, "dead": 0, "cancelled": 0}
 
@@ -67,7 +67,7 @@ class Deaf:
 
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> Iterator[Deaf]:
-    monkeypatch.setattr(client_module, "QUIET_SECONDS", 0.1)
+    monkeypatch.setattr(transport, "QUIET_SECONDS", 0.1)
     deaf = Deaf()
     yield deaf
     deaf.server.shutdown()
@@ -75,7 +75,7 @@ def deaf(monkeypatch: pytest.MonkeyPatch) -> Iterator[Deaf]:
 
 
 def test_a_watcher_whose_stream_carries_pings_alone_looks_at_the_job_itself(deaf: Deaf) -> None:
-    with Client(Server(f"http://127.0.0.1:{deaf.server.server_port}", "key")) as client:
+    with Transport(Server(f"http://127.0.0.1:{deaf.server.server_port}", "key")) as client:
         began = time.monotonic()
         assert watch_job(client, "j", quiet=True)["state"] == "succeeded"
     assert time.monotonic() - began < 15

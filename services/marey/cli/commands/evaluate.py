@@ -58,10 +58,10 @@ def run(
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), **{key: value for key, value in (("name", name), ("comment", comment)) if value}}
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
     waits = wait or fail_on_regression
-    with Client.here() as client:
+    with Transport.here() as client:
         if baseline is not None:
             body["baseline"] = find(client, "evaluation", baseline).id
         with asked.in_source():
@@ -82,9 +82,9 @@ def wait_for(
     as_json: console.Json = False,
 ) -> None:
     """Wait until a run is over; exits 6 if it failed or was cancelled."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         _follow(
             client, find(client, "evaluation", run).id, timeout, fail_on_regression=fail_on_regression, as_json=as_json
         )
@@ -104,9 +104,9 @@ def list_runs(
 @app.command()
 def show(run: Run, as_json: console.Json = False) -> None:
     """Show a run: what is measured, how it stands and why, and its numbers."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         run = find(client, "evaluation", run).id
         found = client.get(f"/v1/evaluations/{run}")
     if as_json:
@@ -138,12 +138,12 @@ def report(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Fetch the report of a run that is done."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
     kind = "md" if output is None else output.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
         raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
-    with Client.here() as client:
+    with Transport.here() as client:
         run = find(client, "evaluation", run).id
         found = client.get(f"/v1/evaluations/{run}")
         file = next((file for file in found["reports"] if file["format"] == kind), None)
@@ -158,7 +158,7 @@ def report(
             with client.stream(url) as response:
                 console.result(response.read().decode().rstrip("\n"))
             return
-        from marey.cli.fetching import Download, check_folder, download_all
+        from marey.client.fetching import Download, check_folder, download_all
 
         check_folder(output.parent)
         download = Download(url, file["sha256"], file["size"], output)
@@ -176,9 +176,9 @@ def compare(
     as_json: console.Json = False,
 ) -> None:
     """Compare two runs of the same prompts and evaluator, motion against motion, by paired bootstrap."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         earlier, later = (find(client, "evaluation", each).id for each in (before, after))
         found = client.get(f"/v1/evaluations/{later}/comparison", before=earlier)
     if as_json:
@@ -191,9 +191,9 @@ def compare(
 @app.command()
 def cancel(runs: Runs, as_json: console.Json = False) -> None:
     """Cancel runs and the jobs that work for them; what was made stays."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for each in find_all(client, "evaluation", runs):
             client.delete(f"/v1/evaluations/{each.id}")
             found = client.get(f"/v1/evaluations/{each.id}")

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console, options
-from marey.cli.names import check_template
 from marey.cli.references import FORMS, find_all
+from marey.client.names import check_template
 from marey.core.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from marey.cli.client import Client
-    from marey.cli.fetching import Download
+    from marey.client.fetching import Download
+    from marey.client.transport import Transport
 
     Planned = list[tuple[dict[str, Any], list[Download]]]
 
@@ -47,10 +47,10 @@ def fetch(
 
     Of several jobs, each has its folder.
     """
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
     check_template(name_template)
-    with Client.here() as client:
+    with Transport.here() as client:
         found = find_all(client, "job", jobs)
         for job in found:
             folder = output if len(found) == 1 else output / job.id
@@ -61,7 +61,7 @@ def fetch(
 
 
 def write_job(
-    client: Client,
+    client: Transport,
     job: str,
     folder: Path,
     formats: Sequence[options.FileFormat] | None,
@@ -88,7 +88,7 @@ def write_job(
 
 
 def fetch_job(
-    client: Client,
+    client: Transport,
     job: str,
     folder: Path,
     formats: Sequence[options.FileFormat] | None = None,
@@ -104,8 +104,8 @@ def fetch_job(
         only: items with a motion of which this was said.
         prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from marey.cli.fetching import check_folder, make_folders, plan
-    from marey.cli.manifest import check_manifest, remove_left, write_manifest
+    from marey.client.fetching import check_folder, make_folders, plan
+    from marey.client.manifest import check_manifest, remove_left, write_manifest
 
     wanted = [f.value for f in formats] if formats else None
     said = None if only is None else only.value
@@ -130,8 +130,8 @@ def fetch_job(
     return [output_line(item, files) for item, files in planned]
 
 
-def _download(client: Client, downloads: Sequence[Download], done: set[Path], *, overwrite: bool) -> None:
-    from marey.cli.fetching import download_all
+def _download(client: Transport, downloads: Sequence[Download], done: set[Path], *, overwrite: bool) -> None:
+    from marey.client.fetching import download_all
 
     with console.bar() as bar:
         task = bar.add_task("fetching", total=len(downloads))
@@ -145,7 +145,7 @@ def _download(client: Client, downloads: Sequence[Download], done: set[Path], *,
 
 def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, overwrite: bool) -> None:
     """The manifest of a fetch that broke off. What ended it will be told, so not what fails here."""
-    from marey.cli.manifest import write_manifest
+    from marey.client.manifest import write_manifest
 
     whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
     with suppress(MareyError):
@@ -158,7 +158,7 @@ def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, ov
 
 
 def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
-    from marey.cli.manifest import row_of
+    from marey.client.manifest import row_of
 
     return [
         row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})

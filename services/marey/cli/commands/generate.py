@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli import console, options, rows
+from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
 from marey.cli.extras import needs_extra
-from marey.cli.names import FileNames, Naming, check_template, slug
+from marey.client import rows
+from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
 from marey.items.item import MAX_SEED, Item, Problem
 
@@ -53,8 +54,8 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Make motions here and now, without a server or a queue."""
-    from marey.cli.fetching import check_folder, make_folders
     from marey.cli.roles.oneshot import OneShot
+    from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
     defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)

@@ -48,9 +48,9 @@ def list_jobs(
     as_json: console.Json = False,
 ) -> None:
     """List jobs, newest first."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.pages("/v1/jobs", state=state.value if state else None, limit=console.page_size(limit))
         console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
@@ -58,9 +58,9 @@ def list_jobs(
 @app.command()
 def show(job: Job, as_json: console.Json = False) -> None:
     """Show a job, and why its items failed."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         job = find(client, "job", job).id
         found = client.get(f"/v1/jobs/{job}")
         place = client.get(f"/v1/jobs/{job}/queue")
@@ -155,9 +155,9 @@ def comment(
 @app.command()
 def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = find_all(client, "job", jobs)
         console.confirm(f"Delete {listed(found)} with all motions?", yes=yes)
         for job in named(client, "/v1/jobs", found):
@@ -172,9 +172,9 @@ def erase(
     as_json: console.Json = False,
 ) -> None:
     """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         wanted = find_all(client, "job", jobs)
         console.confirm(f"Forget the prompts of {listed(wanted)} for good?", yes=yes)
         for job in named(client, "/v1/jobs", wanted):
@@ -188,10 +188,10 @@ def erase(
 
 
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
-    from marey.cli.client import Client
     from marey.cli.watching import check_ended, watch_job
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         ended = watch_job(client, find(client, "job", job).id, timeout=timeout, quiet=quiet)
     if as_json:
         console.result_json(ended)
@@ -199,9 +199,9 @@ def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> Non
 
 
 def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for job in find_all(client, "job", jobs):
             found = client.post(f"/v1/jobs/{job.id}/{verb}", **params)
             if as_json:
@@ -211,9 +211,9 @@ def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
 
 
 def _change(job: str, patch: dict[str, Any], as_json: bool, reason: str | None = None) -> None:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.patch(f"/v1/jobs/{find(client, 'job', job).id}", patch, reason=reason)
     if as_json:
         console.result_json(found)

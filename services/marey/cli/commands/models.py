@@ -76,15 +76,15 @@ def fetch(
 def _server_named() -> bool:
     import os
 
-    from marey.cli.place import home
+    from marey.client.place import home
 
     return bool(os.environ.get("MAREY_SERVER")) or (home() / "server.json").exists()
 
 
 def _ask(path: str) -> Any:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         return client.get(path)
 
 

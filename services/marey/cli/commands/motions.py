@@ -14,7 +14,7 @@ from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
 app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
 
@@ -53,7 +53,7 @@ def list_motions(
     as_json: console.Json = False,
 ) -> None:
     """List motions that fit everything given, newest first."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
     params: dict[str, Any] = {
         "tag": tags,
@@ -62,7 +62,7 @@ def list_motions(
         "review": [review.value for review in reviews] if reviews else None,
         "limit": console.page_size(limit),
     }
-    with Client.here() as client:
+    with Transport.here() as client:
         if job is not None:
             params["job"] = find(client, "job", job).id
         found = client.pages("/v1/motions", **params)
@@ -93,9 +93,9 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
 
     Said twice, it is done once; to go on, re-roll the new motion.
     """
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for some in _ids(client, motions):
             for take in client.post("/v1/motions/reroll", {"motions": some, "comment": comment})["items"]:
                 if as_json:
@@ -106,9 +106,9 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
 
 
 def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: bool) -> None:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for some in _ids(client, motions):
             body = {"motions": some, "verdict": verdict, "comment": comment}
             for motion in client.post("/v1/motions/review", body):
@@ -118,7 +118,7 @@ def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: 
                     console.say(f"{motion['id']} {review_of(motion) or Review.NEW.value}")
 
 
-def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:
+def _ids(client: Transport, motions: list[str]) -> Iterator[list[str]]:
     """The ids, each once, so many as one request takes at a time.
 
     Raises:

@@ -20,8 +20,8 @@ from marey.core.errors import Conflict, InvalidInput, NotFound
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from marey.cli.client import Client
     from marey.cli.drawing import Drawers
+    from marey.client.transport import Transport
 
 ENDINGS = (".html", ".htm", ".png")
 PER_PAGE = 400
@@ -55,9 +55,9 @@ def review(
 
     A .png of up to 24 motions shows a row of each; one of more shows tiles.
     """
-    from marey.cli.client import Client
     from marey.cli.drawing import Drawers
     from marey.cli.extras import needs_extra
+    from marey.client.transport import Transport
 
     try:
         import marey.viz.gallery  # noqa: F401
@@ -65,7 +65,7 @@ def review(
         raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
         raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="The ending says what to draw.")
-    with Client.here() as client:
+    with Transport.here() as client:
         job = find(client, "job", job).id
         found, more = _motions(client, job, reviews, tags, skip, limit)
         name = client.get(f"/v1/jobs/{job}")["name"] or f"Job {job}"
@@ -138,7 +138,7 @@ def _check_free(paths: Sequence[Path], *, overwrite: bool) -> None:
 
 
 def _motions(
-    client: Client, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
+    client: Transport, job: str, reviews: list[Review] | None, tags: list[str] | None, skip: int, limit: int
 ) -> tuple[list[dict[str, Any]], bool]:
     """The motions to show, in the order of the job's items, and True if there are more.
 
@@ -211,9 +211,9 @@ def _page(
     html_gallery(cards, path, title=title, count=count, earlier=earlier, later=later)
 
 
-def _fetch(client: Client, motions: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
+def _fetch(client: Transport, motions: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
     """The motions' npz, fetched eight at a time into a folder."""
-    from marey.cli.fetching import Download, download_all
+    from marey.client.fetching import Download, download_all
 
     downloads = [_download(motion, folder, Download) for motion in motions]
     download_all(client, downloads, overwrite=False, done=lambda _: None)

@@ -55,9 +55,9 @@ def add(
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client, asked.in_source():
+    with Transport.here() as client, asked.in_source():
         if baseline is not None:
             body["baseline"] = find(client, "evaluation", baseline).id
         made = client.post_once("/v1/schedules", body)
@@ -71,9 +71,9 @@ def add(
 @app.command("list")
 def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List schedules, newest first: when they are due, and how their last runs ended."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.pages("/v1/schedules", limit=console.PAGE)
         console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
 
@@ -93,9 +93,9 @@ def resume(schedules: Ids, as_json: console.Json = False) -> None:
 @app.command()
 def run(schedule: Id, as_json: console.Json = False) -> None:
     """Run a schedule's evaluation now, beside its times; prints the run's id."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         made = client.post_once(f"/v1/schedules/{find(client, 'schedule', schedule).id}/run", None)
     if as_json:
         console.result_json(made)
@@ -111,9 +111,9 @@ def history(
     as_json: console.Json = False,
 ) -> None:
     """List the runs of a schedule, newest first."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         wanted = find(client, "schedule", schedule).id
     evaluating.show_runs(f"/v1/schedules/{wanted}/evaluations", limit, as_json, full_ids=full_ids)
 
@@ -121,9 +121,9 @@ def history(
 @app.command()
 def delete(schedules: Ids, yes: console.Yes = False) -> None:
     """Delete schedules; their runs stay."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = find_all(client, "schedule", schedules)
         console.confirm(f"Delete {listed(found)}?", yes=yes)
         for each in named(client, "/v1/schedules", found):
@@ -132,9 +132,9 @@ def delete(schedules: Ids, yes: console.Yes = False) -> None:
 
 
 def _change(schedules: list[str], as_json: bool, **changes: object) -> None:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for each in find_all(client, "schedule", schedules):
             found = client.patch(f"/v1/schedules/{each.id}", changes)
             if as_json:

@@ -13,9 +13,9 @@ from marey.cli import console, options
 from marey.core.errors import InvalidInput, MareyError, NotFound
 
 if TYPE_CHECKING:
-    from marey.cli.client import Client
     from marey.cli.live.frames import Recording
     from marey.cli.live.steering import Interrupts
+    from marey.client.transport import Transport
 
 COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
 
@@ -64,12 +64,12 @@ def stream(
     body = _body(prompt, seconds=seconds, seed=seed, model=model, name=name)
     recording = _recording(output, overwrite=overwrite)
     if fetch is not None:
-        from marey.cli.fetching import check_folder
+        from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything begins
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         with Interrupts() as interrupts:
             result, error = _follow(client, body, recording, interrupts, slow=slow, as_json=as_json)
         _write_result(result, as_json=as_json)
@@ -104,12 +104,12 @@ def _recording(path: Path | None, *, overwrite: bool) -> Recording | None:
 
 
 def _follow(
-    client: Client, body: dict[str, Any], recording: Recording | None, interrupts: Interrupts, *, slow: Slow,
+    client: Transport, body: dict[str, Any], recording: Recording | None, interrupts: Interrupts, *, slow: Slow,
     as_json: bool,
 ) -> tuple[dict[str, Any], MareyError | None]:  # fmt: skip
     """The line of the stream, and what went wrong; what came until then stays."""
     from marey.cli.live.follow import Follower
-    from marey.cli.live.link import Link
+    from marey.client.link import Link
 
     begun = client.post_once("/v1/streams", body)
     with Link(client.server, begun["id"], slow=slow.value) as link:
@@ -135,7 +135,7 @@ def _filled(result: dict[str, Any]) -> str:
     return "; in the file, those around them stand in." if result["file"] else "."
 
 
-def _fetch(client: Client, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
+def _fetch(client: Transport, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
     from marey.cli.commands.fetch import write_job
     from marey.cli.watching import check_ended, watch_job
 

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marey.cli import console, options, rows
-from marey.cli.names import check_template
+from marey.cli import console, options
+from marey.client import rows
+from marey.client.names import check_template
 from marey.core.errors import InvalidInput, MareyError
 from marey.items.item import InvalidItems
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from marey.cli.lines import Lines
+    from marey.client.lines import Lines
 
 
 def submit(
@@ -49,12 +50,12 @@ def submit(
     as_json: console.Json = False,
 ) -> None:
     """Put prompts into the queue of a server; prints the job's id."""
-    from marey.cli.client import Client
-    from marey.cli.lines import Lines
+    from marey.client.lines import Lines
+    from marey.client.transport import Transport
 
     check_template(name_template)
     if fetch is not None:
-        from marey.cli.fetching import check_folder
+        from marey.client.fetching import check_folder
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = rows.defaults_of(
@@ -64,7 +65,7 @@ def submit(
     with Lines(item.as_json() for item in reader) as lines:
         if reader.total:
             raise _all_problems(reader, lines)
-        with Client.here() as client:
+        with Transport.here() as client:
             with reader.in_source():
                 job = client.submit(
                     lines,
@@ -89,11 +90,11 @@ def submit(
 
 def _all_problems(reader: rows.PromptReader, lines: Lines) -> InvalidItems:
     """List the problems of the rows, with those that only the server can find; submit nothing."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
     try:
         if len(lines):
-            with Client.here() as client:
+            with Transport.here() as client:
                 client.submit(lines, validate_only=True)
     except InvalidItems as error:
         reader.add(reader.located(error.problems))

@@ -10,7 +10,7 @@ import typer
 
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
-from marey.cli.rows import right_items
+from marey.client.rows import right_items
 from marey.core.private_home import UMASK
 
 if TYPE_CHECKING:

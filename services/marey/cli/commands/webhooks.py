@@ -13,7 +13,7 @@ from marey.cli.references import FORMS, find, find_all, listed, named, of_view
 from marey.core.errors import ItemsFailed, TimedOut
 
 if TYPE_CHECKING:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
 app = typer.Typer(
     help="Signed messages to your own server when jobs, streams and evaluations end.", no_args_is_help=True
@@ -47,9 +47,9 @@ def add(
 ) -> None:
     """Be told of what happens from now on; prints the webhook's id and its signing secret, this once."""
     body = {"url": url, **({"events": events} if events else {}), **({"name": name} if name else {})}
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         made = client.post_once("/v1/webhooks", body)
     if as_json:
         console.result_json(made)
@@ -61,9 +61,9 @@ def add(
 @app.command("list")
 def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
     """List webhooks, newest first."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.pages("/v1/webhooks", limit=console.PAGE)
         console.listing(found, COLUMNS, _cell, as_json=as_json, full_ids=full_ids)
 
@@ -71,9 +71,9 @@ def list_webhooks(full_ids: console.FullIds = False, as_json: console.Json = Fal
 @app.command()
 def show(webhook: Id, as_json: console.Json = False) -> None:
     """Show a webhook."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = client.get(f"/v1/webhooks/{find(client, 'webhook', webhook).id}")
     if as_json:
         console.result_json(found)
@@ -103,9 +103,9 @@ def rotate(
     as_json: console.Json = False,
 ) -> None:
     """Sign with another secret; prints it, this once. Until the overlap ends messages carry both signatures."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         webhook = find(client, "webhook", webhook).id
         made = client.post_once(f"/v1/webhooks/{webhook}/rotate?overlap_hours={overlap_hours:g}", None)
     if as_json:
@@ -118,9 +118,9 @@ def rotate(
 @app.command()
 def remove(webhooks: Ids, yes: console.Yes = False) -> None:
     """Remove webhooks, with their deliveries and log."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         found = find_all(client, "webhook", webhooks)
         console.confirm(f"Remove {listed(found)}?", yes=yes)
         for each in named(client, "/v1/webhooks", found):
@@ -140,9 +140,9 @@ def deliveries(
     as_json: console.Json = False,
 ) -> None:
     """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         webhook = find(client, "webhook", webhook).id
         if event is not None:
             event = find(client, "delivery", event, webhook=webhook).id
@@ -166,9 +166,9 @@ def replay(
     """Deliver once more, under the same ids and with all tries."""
     if bool(events) == failed:
         raise typer.BadParameter("give ids of events, or --failed")
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         webhook = find(client, "webhook", webhook).id
         path = f"/v1/webhooks/{webhook}/deliveries"
         given = [each.id for each in find_all(client, "delivery", events or (), webhook=webhook)]
@@ -189,9 +189,9 @@ def send_test(
     as_json: console.Json = False,
 ) -> None:
     """Send a message of the type `webhook.test`, once; prints its id."""
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         webhook = find(client, "webhook", webhook).id
         found = client.post_once(f"/v1/webhooks/{webhook}/test", None)
         if wait:
@@ -206,7 +206,7 @@ def send_test(
         console.say(f"it arrived: {found['status']}")
 
 
-def _tried(client: Client, found: dict[str, Any], timeout: float) -> dict[str, Any]:
+def _tried(client: Transport, found: dict[str, Any], timeout: float) -> dict[str, Any]:
     """A delivery once it has ended.
 
     Raises:
@@ -236,9 +236,9 @@ def _show_tries(found: dict[str, Any], as_json: bool) -> None:
 
 
 def _change(webhooks: list[str], as_json: bool, *, paused: bool) -> None:
-    from marey.cli.client import Client
+    from marey.client.transport import Transport
 
-    with Client.here() as client:
+    with Transport.here() as client:
         for each in find_all(client, "webhook", webhooks):
             found = client.patch(f"/v1/webhooks/{each.id}", {"paused": paused})
             if as_json:

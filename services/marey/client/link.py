@@ -13,10 +13,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidUpgrad
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from marey.cli.client import TYPE_PREFIX
-from marey.cli.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
-from marey.cli.place import Server, ca_file
-from marey.cli.watching import PATIENCE
+from marey.client.foreign import HTTP_TO_HTTPS, connection_failure, foreign_answer, no_upgrade
+from marey.client.place import Server, ca_file
+from marey.client.transport import PATIENCE, TYPE_PREFIX
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 from marey.core.tls import trusting_context
 

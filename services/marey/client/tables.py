@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from marey.cli import manifest
-from marey.cli.csv_cells import TAG_SEPARATOR, restore, split_tags
+from marey.client import manifest
+from marey.client.csv_cells import TAG_SEPARATOR, restore, split_tags
 from marey.core.characters import find_forbidden
 from marey.items.item import Unreadable
 

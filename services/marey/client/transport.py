@@ -12,9 +12,9 @@ from uuid import uuid4
 
 import httpx2
 
-from marey.cli.foreign import connection_failure, foreign_answer
-from marey.cli.lines import Lines
-from marey.cli.place import Server, ca_file, find_server
+from marey.client.foreign import connection_failure, foreign_answer
+from marey.client.lines import Lines
+from marey.client.place import Server, ca_file, find_server
 from marey.core import tracing
 from marey.core.errors import (
     Busy,
@@ -47,6 +47,8 @@ SUBMIT_TIMEOUT = 300.0
 """100,000 items take a quarter of a minute to write on a busy machine."""
 QUIET_SECONDS = 12.0
 """A server pings an event stream every 15 s."""
+PATIENCE = 180.0
+"""Seconds without a reachable server after which following a job or a stream gives up."""
 RETRIED = frozenset({429, 502, 503, 504})
 TYPE_PREFIX = "urn:marey:problem:"
 QUOTA = QuotaUsedUp.problem_type
@@ -62,7 +64,7 @@ _ERRORS: dict[str, type[MareyError]] = {
 }  # fmt: skip
 
 
-class Client:
+class Transport:
     """Talks to one server; safe to use from several threads.
 
     One idempotency key goes with every attempt of one `submit`, so a retry after a lost answer enqueues nothing twice.
@@ -82,11 +84,11 @@ class Client:
             raise InvalidInput(f"is no address: {error}", where=server.url, hint="Correct MAREY_SERVER.") from error
 
     @classmethod
-    def here(cls) -> Client:
+    def here(cls) -> Transport:
         """A client of the server that `MAREY_SERVER` or `server.json` names."""
         return cls(find_server())
 
-    def __enter__(self) -> Client:
+    def __enter__(self) -> Transport:
         return self
 
     def __exit__(self, *_: object) -> None:

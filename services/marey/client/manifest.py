@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from marey.cli.csv_cells import join_tags, restore, write_csv
+from marey.client.csv_cells import join_tags, restore, write_csv
 from marey.core.errors import Conflict, InvalidInput
 
 NAME = "manifest.csv"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marey.cli.client import Client
-from marey.cli.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
+from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
+from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, Unreachable
 from marey.core.hashing import sha256_of
 
@@ -113,7 +113,7 @@ def naming(item: dict[str, Any]) -> Naming:
 
 
 def download_all(
-    client: Client, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
+    client: Transport, downloads: Sequence[Download], *, overwrite: bool, done: Callable[[Download], None]
 ) -> None:
     """Fetch all files, or complain before the first one is touched.
 
@@ -166,7 +166,7 @@ def _is_there(download: Download, overwrite: bool) -> bool:
     return False
 
 
-def _download(client: Client, download: Download) -> Download:
+def _download(client: Transport, download: Download) -> Download:
     part = download.path.with_name(download.path.name + ".part")
     for attempt in range(1, ATTEMPTS + 1):
         try:
@@ -186,7 +186,7 @@ def _download(client: Client, download: Download) -> Download:
     )
 
 
-def _continue(client: Client, download: Download, part: Path) -> None:
+def _continue(client: Transport, download: Download, part: Path) -> None:
     have = part.stat().st_size if part.exists() else 0
     if have >= download.size:
         have = 0

@@ -10,8 +10,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
-from marey.cli.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
-from marey.cli.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
+from marey.client.tables import EXTRA_HINT, ExtraColumns, Lines, Rows, csv_rows, delimiter_of, is_blank
+from marey.client.text_files import GZIP_ENDING, UnreadableLine, open_text, where_of
 from marey.core.errors import InvalidInput
 from marey.items.evaluation_prompts import COLUMNS as EVALUATION_COLUMNS
 from marey.items.evaluation_prompts import EvaluationPrompt, PromptCheck, read_prompts
