@@ -59,17 +59,17 @@ format: $(STAMP) ## Format and fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(STAMP) ## Benchmarks; results belong in docs/performance.md
+bench: $(STAMP) ## Benchmarks; results belong in docs/reference/performance.md
 	$(BIN)/python -m benchmarks
 
-lock: $(STAMP) ## Write the locks and docs/dependencies.md anew
+lock: $(STAMP) ## Write the locks and docs/reference/dependencies.md anew
 	$(COMPILE) --extra server pyproject.toml -o requirements/server.lock
 	for extra in worker dev; do \
 	  $(COMPILE) --extra $$extra --override requirements/overrides.txt pyproject.toml requirements/torch-deps.in \
 	    requirements/encoder.in -o requirements/$$extra.lock; \
 	done
 	$(BIN)/pip install -q --no-deps --require-hashes -r requirements/dev.lock
-	$(BIN)/python -m requirements.dependencies docs/dependencies.md
+	$(BIN)/python -m requirements.dependencies docs/reference/dependencies.md
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis

@@ -1,4 +1,4 @@
-"""The live page in a real browser, against a server that speaks docs/streams.md and walks by itself."""
+"""The live page in a real browser, against a server that speaks docs/reference/streams.md and walks by itself."""
 
 from __future__ import annotations
 

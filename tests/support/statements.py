@@ -1,7 +1,7 @@
 """The SQL of workers: what they say to the database while they claim, renew, finish, fail, release and stream.
 
 `python -m tests.support.statements` writes it down for the newest migration; done once a release, so that the next one
-can be held to it (docs/deployment.md).
+can be held to it (docs/how-to/deployment.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A stand-in for the server of live streams: what docs/streams.md promises to a client, and no model.
+"""A stand-in for the server of live streams: what docs/reference/streams.md promises to a client, and no model.
 
 HTTP and WebSockets at one address, as there. The stream is a dancer's; how fast it goes, and what goes wrong with it,
 says a `Plan`.

@@ -1,4 +1,4 @@
-"""A small server that speaks docs/streams.md to a browser: a drawn walk in place of a model, and ways to trouble it.
+"""A small server for a browser (docs/reference/streams.md): a drawn walk in place of a model, and ways to trouble it.
 
 It serves the real page by the real route. Its streams are the walker of tests/support/walker.py; a steer turns it.
 """

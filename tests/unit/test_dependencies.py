@@ -81,9 +81,9 @@ def test_workers_run_without_the_packages_of_training() -> None:
 
 
 def test_the_page_of_dependencies_is_that_of_the_locks() -> None:
-    """Written anew by `make lock`, or `python -m requirements.dependencies docs/dependencies.md`."""
+    """Written anew by `make lock`, or `python -m requirements.dependencies docs/reference/dependencies.md`."""
     made = page().splitlines()
-    kept = (REPOSITORY / "docs" / "dependencies.md").read_text(encoding="utf-8").splitlines()
+    kept = (REPOSITORY / "docs" / "reference" / "dependencies.md").read_text(encoding="utf-8").splitlines()
     for number, line in enumerate(made):
         if NOT_INSTALLED in line:  # another platform leaves some out
             pattern = re.escape(line).replace(re.escape(NOT_INSTALLED), ".*")

@@ -17,7 +17,7 @@ FORMS = [path for path in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.y
 PINNED = re.compile(r"uses: [\w-]+/[\w-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+")
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = [*ROOT.glob("*.md"), *ROOT.glob(".github/*.md"), *ROOT.glob("models/*/README.md")]
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob(".github/*.md"), *ROOT.glob("models/*/README.md"), *ROOT.glob("docs/**/*.md")]
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
 
@@ -86,3 +86,11 @@ def test_the_version_is_written_in_one_place() -> None:
     second = re.compile(rf"^(VERSION|__version__)\s*=\s*[\"']{re.escape(project['version'])}", re.MULTILINE)
     assert [path for path in sources if second.search(path.read_text(encoding="utf-8"))] == []
     assert f"## [{project['version']}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_index_of_decisions_names_every_record() -> None:
+    folder = ROOT / "docs" / "decisions"
+    listed = re.findall(r"^\| (\d+) \| \[.+\]\((\S+)\) \| \w+", (folder / "README.md").read_text(), re.MULTILINE)
+    records = sorted(path.name for path in folder.glob("0*.md"))
+    assert [name for _, name in listed] == records
+    assert [int(number) for number, _ in listed] == [int(name[:4]) for name in records]

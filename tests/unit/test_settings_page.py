@@ -1,4 +1,4 @@
-"""docs/settings.md: a line for every variable that is read, none for one that is not, and the defaults as they are."""
+"""docs/reference/settings.md: a line for every variable that is read, none for another, the defaults as they are."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from marey.core.settings import BY_FILE, Settings
 from marey.runtime.child import NAME_VARIABLE, ROLE_VARIABLE
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PAGE = (REPOSITORY / "docs" / "settings.md").read_text(encoding="utf-8")
+PAGE = (REPOSITORY / "docs" / "reference" / "settings.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| `(MAREY_[A-Z0-9_]+)`( ¹)? \| (.*?) \| .* \|$", re.MULTILINE)
 ROWS = {name: (bool(by_file), default) for name, by_file, default in ROW.findall(PAGE)}
 READ = re.compile(r"environ(?:\.get\(|\[)\s*\"(MAREY_[A-Z0-9_]+)\"")
@@ -58,4 +58,4 @@ def test_what_may_come_by_file_is_marked() -> None:
 
 
 def test_the_readme_leads_there() -> None:
-    assert "(docs/settings.md)" in (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert "(docs/reference/settings.md)" in (REPOSITORY / "README.md").read_text(encoding="utf-8")

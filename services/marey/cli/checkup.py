@@ -154,7 +154,7 @@ def _reads(bundle: Bundle, config: Settings) -> Check:
         if spec.encoder_sha256 not in (None, weights_sha256(find_weights(spec.encoder, config=config))):
             here = find_weights(spec.encoder, config=config)
             message = f"{bundle.manifest.name} was trained with other weights of {spec.encoder!r} than those in {here}"
-            return Check(name, "bad", message, "Fetch those again, or train the bundle anew: docs/training.md.")
+            return Check(name, "bad", message, "Fetch those again, or train the bundle anew: docs/how-to/training.md.")
         if spec.labeller != NO_LABELLER:
             labeller = find_bundle(labeller_bundle(spec.labeller), config=config)
             if spec.labeller_sha256 not in (None, labeller.weights_sha256):

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from marey.core.errors import InvalidInput, MareyError, Refused, TooLarge, TooSlow, Unreachable
 from marey.core.tls import UNTRUSTED_HINT, verification_error
 
-GUIDE = "docs/proxy.md"
+GUIDE = "docs/how-to/proxy.md"
 HTTP_TO_HTTPS = "plain HTTP request was sent to HTTPS port"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ./_-]{0,40}")
 _SERVER_HINT = "Is MAREY_SERVER the address of a Marey server?"

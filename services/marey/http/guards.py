@@ -63,7 +63,7 @@ class UpgradeGuard:
         if scope["type"] == "http" and "sec-websocket-key" in Headers(scope=scope):
             error = UpgradeMissing(
                 "the WebSocket arrived as an ordinary request: a proxy does not pass on the upgrade",
-                hint="Let the proxy send HTTP/1.1 with the headers Upgrade and Connection: docs/proxy.md.",
+                hint="Let the proxy send HTTP/1.1 with the headers Upgrade and Connection: docs/how-to/proxy.md.",
             )
             await _refuse(error, scope, receive, send)
         else:

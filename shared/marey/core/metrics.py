@@ -1,4 +1,4 @@
-"""Every metric of the product; a process shows those of its part. `docs/operations.md` says what each is for.
+"""Every metric of the product; a process shows those of its part. `docs/how-to/operations.md` says what each is for.
 
 Labels are names from short lists: queues, states, stages, parts, routes. Tenants are the one label that grows with use;
 `MAX_TENANTS` of them have series of their own. Nothing here is an identifier of a job, an item or a key.

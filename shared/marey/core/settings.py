@@ -1,7 +1,7 @@
 """Every setting of the product, read once from the environment (prefix `MAREY_`) and checked there.
 
 Secrets may come by file: `MAREY_DATABASE_URL_FILE=/run/secrets/db` is read where `MAREY_DATABASE_URL` is unset.
-docs/settings.md has a line for each.
+docs/reference/settings.md has a line for each.
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ class Listener:
         raise InvalidInput(
             "the database address leads through a transaction pooler, which passes no notifications on (LISTEN)",
             where="MAREY_LISTEN_URL",
-            hint="Set it to the address of Postgres itself, or of a pool in session mode (docs/deployment.md).",
+            hint="Set it to the address of Postgres itself, or of a pool in session mode (docs/how-to/deployment.md).",
         )
 
 

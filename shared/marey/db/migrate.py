@@ -77,7 +77,8 @@ def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: s
 def check_revision(engine: sa.Engine) -> None:
     """Raise when the database lacks what this version needs.
 
-    A database of a newer version is fine: migrations only add (docs/deployment.md), and an upgrade migrates first.
+    A database of a newer version is fine: migrations only add, and an upgrade migrates first
+    (docs/how-to/deployment.md).
 
     Raises:
         Conflict: it is older, or not migrated at all, or its server is too old.

@@ -1,4 +1,4 @@
-"""The rule that lets a release run beside the one before it: a migration only adds (docs/deployment.md)."""
+"""The rule that lets a release run beside the one before it: a migration only adds (docs/how-to/deployment.md)."""
 
 from __future__ import annotations
 

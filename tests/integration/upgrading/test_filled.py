@@ -27,7 +27,7 @@ LOST: dict[str, tuple[str, Callable[[Row], bool]]] = {
     "0007": ("idempotency", lambda row: row["evaluation_id"] is not None),
 }
 """Rows that a step down drops though their table stays; all others only lose columns, or go with their table
-(docs/deployment.md)."""
+(docs/how-to/deployment.md)."""
 
 
 def rows_of(engine: sa.Engine) -> Tables:

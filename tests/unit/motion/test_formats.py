@@ -1,4 +1,4 @@
-"""docs/formats.md says how files are read: its examples run as they stand."""
+"""docs/reference/formats.md says how files are read: its examples run as they stand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from marey.motion.clip import KEYS
 from tests.support.walker import walker
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "formats.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "formats.md"
 
 
 def examples() -> list[str]:

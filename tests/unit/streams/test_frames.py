@@ -16,7 +16,7 @@ from marey.motion.rotations import angle_between, from_rotvec
 from marey.motion.skeleton import HUMANML3D
 from marey.streams.frames import HEADER, Frame, decode_frame, encode_frame, frame_bytes
 
-FORMATS = Path(__file__).resolve().parents[3] / "docs" / "formats.md"
+FORMATS = Path(__file__).resolve().parents[3] / "docs" / "reference" / "formats.md"
 
 
 def frame_of(seed=0, joints=22, **more) -> Frame:

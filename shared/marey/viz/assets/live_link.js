@@ -1,5 +1,5 @@
 "use strict";
-// The socket of a live stream (docs/streams.md): opened again, from the frame after the last one, when it breaks off.
+// The socket of a live stream (docs/reference/streams.md): opened again, from the frame after the last one, when it breaks off.
 const MareyLink = (() => {
   const PROTOCOL = "marey.stream.v1";
   const FIRST = 0.25; // s before the first try to come back; each further one waits twice as long

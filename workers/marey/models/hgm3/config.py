@@ -152,7 +152,7 @@ STARTER = HGM3Config(
     ),
     length_hidden=(128,),
     mining=MiningConfig(levels_per_step=1),
-    # With all conditions from the first pass on, two actions come in order more often (docs/results.md).
+    # With all conditions from the first pass on, two actions come in order more often (docs/research/log.md).
     inference=InferenceConfig(motion_steps=0, action_steps=0, temperature=0.5, residual_temperature=0.5),
     windows=(64, 64, 128),
     train_tokenizer=StageConfig(batch=64, learning_rate=6e-4, decay="cosine", ema=0.995),
