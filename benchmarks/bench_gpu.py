@@ -22,7 +22,7 @@ from marey.models.hgm3.bundle import random_bundle as random_hgm3
 from marey.models.hgm3.generate import Generator as HGM3Generator
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.streaming import Streams
 
 FRAMES = 200
@@ -89,7 +89,7 @@ def _sessions(generator: Generator) -> None:
 
 def _steps(generator: Generator, sessions: int) -> list[float]:
     """Seconds of each step, the shortest first."""
-    room = LiveRoom(generator, sessions)
+    room = LiveSessionPool(generator, sessions)
     for seed in range(sessions):
         room.start(text(generator), seed)
     _run(room.step, 20)

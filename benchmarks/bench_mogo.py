@@ -21,7 +21,7 @@ import torch
 from benchmarks.harness import measure, table
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator, Settings
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.streaming import Streams
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph
@@ -87,7 +87,7 @@ def _starter(generator: Generator) -> None:
     print(f"MOGO starter, finished frames, one thread, {FRAMES} of each session (goal of one: 100 frames/s)\n")
     print("| sessions | frames/s of each | frames/s of all | 99th percentile of a step |\n|---|---|---|---|")
     for sessions in (1, 2, 4, 8, 16, 32):
-        room = LiveRoom(generator, sessions)
+        room = LiveSessionPool(generator, sessions)
         for seed in range(sessions):
             room.start(text(generator), seed)
         _run(room.step, generator.config.inference.window)
@@ -102,7 +102,7 @@ def _starter(generator: Generator) -> None:
 
 
 def _first_frame(generator: Generator) -> None:
-    room, asked = LiveRoom(generator, 1), text(generator)
+    room, asked = LiveSessionPool(generator, 1), text(generator)
 
     def first() -> None:
         session = room.start(asked, 1)
@@ -114,7 +114,7 @@ def _first_frame(generator: Generator) -> None:
 
 def _memory(generator: Generator) -> None:
     """What is resident now: the peak of the process, which `paper` has set, would hide what a stream gathers."""
-    room = LiveRoom(generator, 1)
+    room = LiveSessionPool(generator, 1)
     room.start(text(generator), 1)
     _run(room.step, 500)
     before = _resident_mib()

@@ -16,7 +16,7 @@ from websockets.sync.client import ClientConnection
 from marey.db import create_engine
 from marey.motion.io.bvh import read_bvh
 from marey.streams import stream_acts
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 from marey.streams.frames import Frame, decode_frame
 from tests.support.marey import Marey, serving, socket_of
 
@@ -37,7 +37,7 @@ def wait_for(what: Callable[[], object]) -> None:
         time.sleep(0.1)
 
 
-def acts_of(engine: sa.Engine, stream: str) -> list[Begun]:
+def acts_of(engine: sa.Engine, stream: str) -> list[ActionStart]:
     with engine.connect() as conn:
         return stream_acts(conn, UUID(stream))
 
@@ -74,7 +74,7 @@ def test_a_stream_goes_on_after_a_kill_of_the_worker_that_shows_it(alone: Marey)
         ended = client.get(f"/v1/streams/{stream['id']}")
         assert ended["frames"] == len(shown)
         steered = next(frame.number for frame in after if frame.prompt == 1)
-        assert acts_of(engine, stream["id"]) == [*acts, Begun(steered, 0)]  # none began again
+        assert acts_of(engine, stream["id"]) == [*acts, ActionStart(steered, 0)]  # none began again
         engine.dispose()
         assert [prompt["prompt"] for prompt in ended["prompts"]] == [ACTS, "a person waves"]
         alone("jobs", "wait", ended["job"], "--timeout", 90, timeout=120).ok()

@@ -21,7 +21,7 @@ import sqlalchemy as sa
 
 from marey.db import transaction
 from marey.jobs.tables import item, lease
-from marey.runtime.faults import patiently
+from marey.runtime.faults import retry_unreachable
 from marey.runtime.status import read_status
 from marey.takes import collect_garbage
 from tests.chaos.driver import Cluster
@@ -136,7 +136,7 @@ class Breaker:
             with transaction(self._cluster.engine) as conn:
                 return conn.execute(ours).all()
 
-        rows = patiently(look, seconds=LIMIT)
+        rows = retry_unreachable(look, seconds=LIMIT)
         fault.held, fault.leases = [row.id for row in rows], list({row.token for row in rows})
         fault.at = now()
 
@@ -226,7 +226,7 @@ class Breaker:
 
     def _collect(self, _fault: Fault) -> None:
         """No fault: it must do no harm at any moment."""
-        patiently(lambda: collect_garbage(self._cluster.engine, self._place.store), seconds=LIMIT)
+        retry_unreachable(lambda: collect_garbage(self._cluster.engine, self._place.store), seconds=LIMIT)
 
     # --- waiting ---
 

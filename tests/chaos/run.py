@@ -24,7 +24,7 @@ from marey.db import transaction
 from marey.jobs import cancel
 from marey.jobs.states import OPEN
 from marey.jobs.tables import item, job, lease
-from marey.runtime.faults import patiently
+from marey.runtime.faults import retry_unreachable
 from marey.takes import collect_garbage
 from marey.tenants import Quotas, create_key, create_tenant
 from marey.tenants.types import DEFAULT_TENANT
@@ -230,12 +230,12 @@ class Run:
             with transaction(self.cluster.engine) as conn:
                 cancel(conn, DEFAULT_TENANT, self._probed)
 
-        patiently(end, seconds=LIMIT)
+        retry_unreachable(end, seconds=LIMIT)
 
     def _nearly_done(self) -> bool:
         if any(studio.is_alive() for studio in self.studios):
             return False
-        return patiently(self._open, seconds=LIMIT) < self.plan.items // 20
+        return retry_unreachable(self._open, seconds=LIMIT) < self.plan.items // 20
 
     def _check_clients(self) -> None:
         for client in (*self.studios, self.operator):

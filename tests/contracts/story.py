@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from marey.api.jobs.events import message
 from marey.db import transaction
 from marey.evaluations import EvaluationState
-from marey.evaluations.repository import tell_of_evaluation
+from marey.evaluations.repository import enqueue_evaluation_event
 from marey.jobs import (
     EventRow,
     ItemFailure,
@@ -31,7 +31,7 @@ from marey.jobs import (
     sweep,
 )
 from marey.streams import StreamState
-from marey.streams.repository import tell_of_stream
+from marey.streams.repository import enqueue_stream_event
 from marey.takes import erase, list_motions, reroll, review
 from marey.tenants import DEFAULT_TENANT
 from marey.webhooks import EventKind, claim_deliveries
@@ -46,8 +46,8 @@ def events(engine: sa.Engine) -> Any:
     jobs = [_worked(engine), _operated(engine)]
     with transaction(engine) as conn:
         stream = uuid4()
-        tell_of_stream(conn, DEFAULT_TENANT, stream, StreamState.ENDED, frames=20, job=jobs[0])
-        tell_of_evaluation(conn, DEFAULT_TENANT, uuid4(), EvaluationState.DONE, schedule=uuid4(), regressed=True)
+        enqueue_stream_event(conn, DEFAULT_TENANT, stream, StreamState.ENDED, frames=20, job=jobs[0])
+        enqueue_evaluation_event(conn, DEFAULT_TENANT, uuid4(), EvaluationState.DONE, schedule=uuid4(), regressed=True)
         rows = [event for job in jobs for event in events_after(conn, DEFAULT_TENANT, job)]
     with transaction(engine) as conn:
         due = claim_deliveries(conn, 100, each=100)

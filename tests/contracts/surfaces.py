@@ -195,7 +195,7 @@ def queue() -> Any:
     from marey.db.database import QUEUE_CHANNEL
     from marey.jobs import TEXT_QUEUE
     from marey.runtime.app import DRAIN, create_app
-    from marey.streams.bell import KEY
+    from marey.streams.notifier import KEY
     from marey.streams.redis import stream_key
 
     app = create_app("redis://127.0.0.1:6379/0")

@@ -19,7 +19,7 @@ import sqlalchemy as sa
 from marey.core.errors import NotFound
 from marey.core.spool import IN_MEMORY
 from marey.db import transaction
-from marey.jobs import WorkerBeat, beat, beat_scheduler, retire
+from marey.jobs import WorkerHeartbeat, beat, record_scheduler_heartbeat, retire
 from tests.support.live_api import BUNDLE, LiveApi, wait_until
 
 WALK, BOW = {"prompt": "a person walks"}, {"prompt": "a person bows"}
@@ -224,7 +224,7 @@ def test_events_are_pages_of_json(http: httpx2.Client) -> None:
 
 def test_a_stream_follows_a_job_to_its_end_and_then_says_so(api: LiveApi, http: httpx2.Client) -> None:
     job = str(submit(http, *[{"prompt": f"a person walks {i} steps"} for i in range(5)])["id"])
-    threading.Timer(0.3, api.work).start()
+    threading.Timer(0.3, api.telemetry).start()
     with api.client() as client:
         events = list(client.events(job))
         assert events[-1]["data"]["state"] == "succeeded"
@@ -409,17 +409,17 @@ def test_readiness_waits_for_a_model_and_then_no_longer(api: LiveApi) -> None:
     wait_until(lambda: failing() == ["model"])
     assert httpx2.get(f"{api.url}/readyz").status_code == 503
     with transaction(api.engine) as conn:
-        beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
+        beat(conn, WorkerHeartbeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
     wait_until(lambda: httpx2.get(f"{api.url}/readyz").json()["ready"])
     with transaction(api.engine) as conn:
-        beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu"))
+        beat(conn, WorkerHeartbeat("w", "hgm3", "here", 1, "cpu"))
     assert httpx2.get(f"{api.url}/readyz").status_code == 200
 
 
 def test_a_stalled_scheduler_is_told_and_leaves_the_api_ready(api: LiveApi) -> None:
     with transaction(api.engine) as conn:
-        beat(conn, WorkerBeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
-        beat_scheduler(conn, "stalled", host="here", pid=1)
+        beat(conn, WorkerHeartbeat("w", "hgm3", "here", 1, "cpu", bundle=BUNDLE))
+        record_scheduler_heartbeat(conn, "stalled", host="here", pid=1)
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 minute' WHERE id = 'stalled'"))
     wait_until(lambda: not httpx2.get(f"{api.url}/readyz").json()["checks"]["scheduler"]["ok"])
     wait_until(lambda: httpx2.get(f"{api.url}/readyz").json()["ready"])

@@ -13,7 +13,7 @@ import pytest
 
 from marey.db import transaction
 from marey.embedded import EmbeddedServer
-from marey.jobs import WorkerBeat, beat, retire
+from marey.jobs import WorkerHeartbeat, beat, retire
 from tests.support.evaluations import GENERATOR, JUDGE
 from tests.support.live_evaluations import Studio, studio
 
@@ -112,7 +112,7 @@ def test_an_evaluation_whose_queue_nobody_serves_says_so(place: Studio, http: ht
     waits = http.get(f"/v1/evaluations/{made['id']}").json()["waits_for"]
     assert waits == "a worker of the queue text: none is running"
     with transaction(place.api.engine) as conn:
-        beat(conn, WorkerBeat("w", "text", "host", 1, "cpu", None, None))
+        beat(conn, WorkerHeartbeat("w", "text", "host", 1, "cpu", None, None))
     assert http.get(f"/v1/evaluations/{made['id']}").json()["waits_for"] is None
     with transaction(place.api.engine) as conn:
         retire(conn, "w")

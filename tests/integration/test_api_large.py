@@ -17,7 +17,7 @@ from marey.client.transport import Transport
 from marey.core.spool import IN_MEMORY
 from marey.db import create_engine, transaction
 from marey.embedded import EmbeddedServer
-from marey.http.body_room import BodyRoom
+from marey.http.body_budget import BodyBudget
 from marey.tenants import create_key
 from tests.support.live_api import ApiThread, settings_of, wait_until
 from tests.support.raw_http import RawClient
@@ -36,7 +36,7 @@ def app(module_database_url: str, valkey: EmbeddedServer, tmp_path: Path) -> Ite
     engine.dispose()
     app = create_app(config)
     with ApiThread(config, app) as url:
-        app.state.context.body_room = BodyRoom(SIZE, SIZE, seconds=0.2)
+        app.state.context.body_budget = BodyBudget(SIZE, SIZE, seconds=0.2)
         yield app, url, key
 
 
@@ -52,7 +52,7 @@ def head(key: str, length: int) -> bytes:
 
 def test_a_large_body_waits_is_refused_and_is_taken_once_there_is_room(app: tuple[FastAPI, str, str]) -> None:
     api, url, key = app
-    room = api.state.context.body_room
+    room = api.state.context.body_budget
     headers = {"Authorization": f"Bearer {key}"}
     body = json.dumps({"items": items()})
     assert IN_MEMORY < len(body) <= SIZE

@@ -15,7 +15,7 @@ from marey.db import create_engine, transaction
 from marey.jobs import (
     JobState,
     Policy,
-    WorkerBeat,
+    WorkerHeartbeat,
     beat,
     cancel,
     claim,
@@ -370,13 +370,13 @@ def test_a_worker_is_live_while_it_beats(engine: sa.Engine) -> None:
     rules = Policy(worker_live=5)
     with transaction(engine) as conn:
         for n in range(3):
-            beat(conn, WorkerBeat(f"w{n}", "hgm3" if n else "text", "host", n, "cpu"))
+            beat(conn, WorkerHeartbeat(f"w{n}", "hgm3" if n else "text", "host", n, "cpu"))
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '6 seconds' WHERE id = 'w2'"))
         assert live_workers(conn, rules=rules) == {"text": 1, "hgm3": 1}
         assert {(row.id, row.live) for row in list_workers(conn, rules=rules)} == {
             *(("w0", True), ("w1", True), ("w2", False)),
         }
-        beat(conn, WorkerBeat("w2", "hgm3", "host", 2, "cpu", bundle="b@1"))
+        beat(conn, WorkerHeartbeat("w2", "hgm3", "host", 2, "cpu", bundle="b@1"))
         retire(conn, "w1")
         assert live_workers(conn, rules=rules) == {"text": 1, "hgm3": 1}
 

@@ -22,19 +22,19 @@ from marey.jobs import get_job, list_items
 from marey.jobs.states import ItemState
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
-from marey.runtime.live import keeper
-from marey.runtime.live.held import Held
+from marey.models.mogo.live import LiveSessionPool
+from marey.runtime.live import supervisor
+from marey.runtime.live.leased_stream import LeasedStream
 from marey.runtime.live.port import LiveFrame
 from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
-from marey.streams import StreamPrompt, StreamState, stream_acts, stream_prompts, told_prompts
-from marey.streams.acts import Begun
-from marey.streams.bell import Bell
+from marey.streams import StreamPrompt, StreamState, prompts_with_rewrites, stream_acts, stream_prompts
+from marey.streams.actions import ActionStart
 from marey.streams.control import Control
 from marey.streams.frames import Frame
-from marey.streams.reads import ReadAs
+from marey.streams.notifier import StreamNotifier
 from marey.streams.redis import LEASE_MS
+from marey.streams.rewrites import PromptRewrite
 from marey.streams.states import STREAM_TRANSITIONS
 from marey.text.features import TextFeatures
 from tests.support.live_loop import LiveWorker, Studio, parse
@@ -63,8 +63,8 @@ def studio(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Stud
 def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Iterator[Start]:
     workers: list[LiveWorker] = []
 
-    def begin(slots: int = 2, room: type[LiveRoom] = LiveRoom, **options: Any) -> LiveWorker:
-        workers.append(LiveWorker(engine, client, lambda: room(generator, slots), **options))
+    def begin(slots: int = 2, pool: type[LiveSessionPool] = LiveSessionPool, **options: Any) -> LiveWorker:
+        workers.append(LiveWorker(engine, client, lambda: pool(generator, slots), **options))
         return workers[-1]
 
     yield begin
@@ -75,13 +75,13 @@ def start(engine: sa.Engine, client: redis.Redis, generator: Generator) -> Itera
 def test_a_worker_hears_that_a_stream_has_begun(
     studio: Studio, start: Start, client: redis.Redis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "TAKE_SECONDS", 3600.0)  # after its first look at the rows it hears, or never knows
+    monkeypatch.setattr(supervisor, "TAKE_SECONDS", 3600.0)  # after its first look at the rows it hears, or never knows
     start()
     first = studio.begin("a person walks")
-    Bell(client).ring()
+    StreamNotifier(client).notify()
     studio.until(lambda: studio.row(first).state is StreamState.LIVE, "the first stream")
     second = studio.begin("a person waves")
-    Bell(client).ring()
+    StreamNotifier(client).notify()
     studio.until(lambda: studio.row(second).state is StreamState.LIVE, "the second stream")
 
 
@@ -144,7 +144,7 @@ def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, st
 
     def told() -> list[StreamPrompt]:
         with transaction(engine) as conn:
-            return told_prompts(conn, stream)
+            return prompts_with_rewrites(conn, stream)
 
     stream = studio.begin("a person walks")
     first = start(parse=rewriting)
@@ -156,9 +156,9 @@ def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, st
     studio.send(stream, Control("steer", "a person bows"))
     studio.until(lambda: len(told()) == 3, "the third prompt's record")
     assert [each.read for each in told()] == [
-        ReadAs("a person walks ahead"),
-        ReadAs("a person runs ahead"),
-        ReadAs("a person bows", "it changes the verbs"),
+        PromptRewrite("a person walks ahead"),
+        PromptRewrite("a person runs ahead"),
+        PromptRewrite("a person bows", "it changes the verbs"),
     ]
 
 
@@ -213,7 +213,7 @@ def test_after_a_kill_the_act_that_plays_goes_on_and_none_begins_again(studio: S
     turned = prompts_of(studio, stream)[1][0]
     studio.until(lambda: len(acts_of(studio, stream)) == 4, "the second act of that prompt")
     found = acts_of(studio, stream)
-    assert found[:3] == [*acts, Begun(turned, 0)]
+    assert found[:3] == [*acts, ActionStart(turned, 0)]
     assert found[3].act == 1
     shown = whole(studio, stream)
     assert turned == next(frame.number for frame in shown if frame.prompt == 1)
@@ -231,7 +231,7 @@ def test_a_stream_of_a_worker_that_did_not_record_acts_goes_on_with_its_first(
     recorded = studio.row(stream).frames
     start()
     studio.until(lambda: studio.row(stream).frames > recorded, "records of the other worker")
-    assert acts_of(studio, stream)[0] == Begun(recorded, 0)
+    assert acts_of(studio, stream)[0] == ActionStart(recorded, 0)
 
 
 def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio: Studio, start: Start) -> None:
@@ -249,21 +249,21 @@ def test_a_worker_that_stops_in_good_order_gives_its_streams_away_at_once(studio
 def test_a_frame_shown_while_the_worker_stops_is_written_down(
     studio: Studio, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Slow(LiveRoom):
+    class Slow(LiveSessionPool):
         def step(self) -> dict[int, LiveFrame]:
             made = super().step()
-            time.sleep(0.3)  # the keeper hears that it is over meanwhile
+            time.sleep(0.3)  # the supervisor hears that it is over meanwhile
             return made
 
-    released = keeper._released
+    released = supervisor._released
 
-    def late(held: Held) -> None:
+    def late(held: LeasedStream) -> None:
         time.sleep(0.6)  # the frame is shown under a lease that still holds
         released(held)
 
-    monkeypatch.setattr(keeper, "_released", late)
+    monkeypatch.setattr(supervisor, "_released", late)
     stream = studio.begin()
-    first = start(room=Slow)
+    first = start(pool=Slow)
     studio.until(lambda: studio.shown(stream) > 1, "frames")
     first.stop()
     assert studio.row(stream).frames == studio.shown(stream)
@@ -329,7 +329,7 @@ def test_a_queue_that_forgets_everything_costs_no_stream(studio: Studio, start: 
     assert studio.row(stream).state is StreamState.LIVE
 
 
-class Fragile(LiveRoom):
+class Fragile(LiveSessionPool):
     """Breaks, with all that is in it, at frame 5 of the stream with seed 13."""
 
     def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
@@ -343,7 +343,7 @@ class Fragile(LiveRoom):
 
 def test_a_stream_that_breaks_the_room_fails_alone(studio: Studio, start: Start) -> None:
     good, bad = studio.begin(seed=1), studio.begin(seed=13)
-    start(room=Fragile)
+    start(pool=Fragile)
     studio.until(lambda: studio.row(bad).state is StreamState.FAILED, "the failure")
     problem = studio.row(bad).problem
     assert problem is not None
@@ -450,7 +450,7 @@ def move(engine: sa.Engine, stream: UUID, state: StreamState) -> None:
         conn.execute(query, {"state": state, "id": stream})
 
 
-def acts_of(studio: Studio, stream: UUID) -> list[Begun]:
+def acts_of(studio: Studio, stream: UUID) -> list[ActionStart]:
     with transaction(studio.engine) as conn:
         return stream_acts(conn, stream)
 

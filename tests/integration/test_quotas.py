@@ -31,7 +31,7 @@ from marey.streams import NewStream, create_stream, end_stream, open_streams
 from marey.takes import list_motions
 from marey.tenants import (
     Quotas,
-    check_room,
+    check_quotas,
     create_key,
     create_tenant,
     get_tenant,
@@ -238,14 +238,14 @@ def test_a_look_at_the_room_tells_of_each_quota_and_refuses_as_a_submit_does(eng
     tenant = new_tenant(engine, queued=5, bytes=4 * EXPECTED_BYTES)
     submit_items(engine, 1, tenant=tenant)
     with transaction(engine) as conn:
-        queued, size = check_room(conn, tenant, 3)
+        queued, size = check_quotas(conn, tenant, 3)
         assert (queued.quota, queued.limit, queued.used, queued.left, queued.asked) == ("queued", 5, 1, 4, 3)
         assert (size.quota, size.used, size.left) == ("bytes", EXPECTED_BYTES, 3 * EXPECTED_BYTES)
         for count, quota in ((4, "bytes"), (5, "queued")):
             with pytest.raises(QuotaUsedUp) as refused:
-                check_room(conn, tenant, count)
+                check_quotas(conn, tenant, count)
             assert refused.value.quota == quota
-        assert check_room(conn, "default", 10**6) == ()
+        assert check_quotas(conn, "default", 10**6) == ()
 
 
 def test_a_finished_item_is_kept_though_it_is_larger_than_what_is_left(engine: sa.Engine) -> None:

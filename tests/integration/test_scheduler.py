@@ -21,20 +21,20 @@ from marey.core.settings import Settings
 from marey.db import QUEUE_CHANNEL, transaction
 from marey.jobs import (
     SchedulerRow,
-    WorkerBeat,
+    WorkerHeartbeat,
     beat,
-    beat_scheduler,
     claim,
     list_schedulers,
     list_workers,
     live_workers,
     pause,
+    record_scheduler_heartbeat,
     retire,
 )
 from marey.runtime.app import DRAIN, create_app
 from marey.runtime.queue import redis_client
+from marey.scheduler.components import EXIT_STALLED, note_progress, watch
 from marey.scheduler.main import scheduler_main
-from marey.scheduler.parts import EXIT_STALLED, note_progress, watch
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
 from marey.tenants.types import DEFAULT_TENANT
@@ -65,7 +65,7 @@ def relay(engine: sa.Engine, database_url: str, queue_url: str, lists: redis.Red
 def live(engine: sa.Engine, *names: str, queue: str = QUEUE) -> None:
     with transaction(engine) as conn:
         for name in names:
-            beat(conn, WorkerBeat(id=f"{name}/{queue}", queue=queue, host="here", pid=1, device="cpu"))
+            beat(conn, WorkerHeartbeat(id=f"{name}/{queue}", queue=queue, host="here", pid=1, device="cpu"))
 
 
 def wait(condition: Callable[[], bool], seconds: float = 20.0) -> None:
@@ -345,7 +345,7 @@ def test_scheduler_returns_lost_leases_and_stops_when_told(
 def run_alone(chosen: Settings, seconds: float, before: str = "pass") -> subprocess.Popen[str]:
     """A scheduler process that exits when a part makes no progress for `seconds`; `before`: what is run in it first."""
     code = (
-        "import marey.scheduler.main as main, marey.scheduler.parts as parts, marey.core.settings as settings; "
+        "import marey.scheduler.main as main, marey.scheduler.components as parts, marey.core.settings as settings; "
         f"parts.LOOK_SECONDS = {seconds / 4}; parts.STALL_SECONDS = {seconds}; main.BEAT_SECONDS = 0.2; "
         f"import sys, time; {before}; sys.exit(main.scheduler_main(settings.settings()))"
     )
@@ -386,7 +386,7 @@ def test_a_scheduler_says_that_it_works_until_it_is_told_to_stop(
     engine: sa.Engine, database_url: str, queue_url: str, tmp_path: Path
 ) -> None:
     with transaction(engine) as conn:
-        beat_scheduler(conn, "stalled", host="here", pid=1)
+        record_scheduler_heartbeat(conn, "stalled", host="here", pid=1)
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 minute'"))
     chosen = Settings(home=tmp_path, database_url=SecretStr(database_url), queue_url=SecretStr(queue_url))
     process = run_alone(chosen, seconds=60.0)

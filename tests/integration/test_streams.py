@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from marey.core.errors import Conflict, InvalidInput, Unreachable
 from marey.embedded import start_valkey
 from marey.runtime.queue import redis_client
-from marey.streams.bell import Bell
 from marey.streams.control import START, Control, ControlQueue
 from marey.streams.frames import Frame, decode_frame
+from marey.streams.notifier import StreamNotifier
 from marey.streams.redis import LEASE_MS, FrameStream, Gap, Lease, LeaseLost, StoredFrame
 
 ACTS = ["write", "renew", "lapse", "release", "take"]
@@ -429,21 +429,21 @@ def test_a_redis_that_is_full_is_unreachable_and_what_stands_can_be_read(short_h
 
 
 def test_every_worker_hears_the_bell_once(client: redis.Redis) -> None:
-    ours, theirs = Bell(client), Bell(client)
-    ours.rang(), theirs.rang()
-    assert (ours.rang(), theirs.rang()) == (False, False)
-    Bell(client).ring()
-    assert (ours.rang(), theirs.rang()) == (True, True)
-    assert (ours.rang(), theirs.rang()) == (False, False)
-    Bell(client).ring()
-    Bell(client).ring()
-    assert (ours.rang(), ours.rang()) == (True, False)
+    ours, theirs = StreamNotifier(client), StreamNotifier(client)
+    ours.poll(), theirs.poll()
+    assert (ours.poll(), theirs.poll()) == (False, False)
+    StreamNotifier(client).notify()
+    assert (ours.poll(), theirs.poll()) == (True, True)
+    assert (ours.poll(), theirs.poll()) == (False, False)
+    StreamNotifier(client).notify()
+    StreamNotifier(client).notify()
+    assert (ours.poll(), ours.poll()) == (True, False)
 
 
-def test_a_bell_without_redis_says_so(tmp_path: Path) -> None:
+def test_a_notifier_without_redis_says_so(tmp_path: Path) -> None:
     server = start_valkey(tmp_path)
     with redis_client(server.url) as client:
         server.stop()
-        for use in (Bell(client).ring, Bell(client).rang):
+        for use in (StreamNotifier(client).notify, StreamNotifier(client).poll):
             with pytest.raises(Unreachable):
                 use()

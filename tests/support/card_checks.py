@@ -25,7 +25,7 @@ from marey.models.hgm3.train import train_stage as train_hgm3
 from marey.models.mogo.bundle import random_bundle as random_mogo
 from marey.models.mogo.config import TINY, DepthConfig, MOGOConfig
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.streaming import Streams
@@ -57,7 +57,7 @@ def mogo(folder: Path) -> None:
         _step_never_waits(config)
     _same(Generator, random_mogo(folder / "random-mogo", "tiny").path)
     _batches_share_a_room(Generator.load(str(folder / "random-mogo"), device=CARD))
-    room = LiveRoom(Generator.load(str(folder / "random-mogo"), device=CARD), 4)
+    room = LiveSessionPool(Generator.load(str(folder / "random-mogo"), device=CARD), 4)
     first, second = room.start(text_features(0), 0), room.start(text_features(1), 1)
     room.steer(first, text_features(2, actions=1))
     waits.clear()

@@ -17,7 +17,7 @@ from marey.jobs import (
     NewJob,
     Policy,
     Review,
-    WorkerBeat,
+    WorkerHeartbeat,
     beat,
     begin_assets,
     cancel,
@@ -71,7 +71,7 @@ def fill(engine: sa.Engine) -> None:
     _evaluations(engine)
     _deliveries(engine)
     with transaction(engine) as conn:
-        beat(conn, WorkerBeat("w", "hgm3", "host", 7, "cpu", "tiny@0", "batch of tiny@0"))
+        beat(conn, WorkerHeartbeat("w", "hgm3", "host", 7, "cpu", "tiny@0", "batch of tiny@0"))
 
 
 def _tenants(engine: sa.Engine) -> None:

@@ -1,4 +1,4 @@
-"""A live worker inside the test's process: the real loop and keeper around a small room, on real Postgres and Redis."""
+"""A live worker inside the test's process: the real loop and supervisor around a small session pool."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ import sqlalchemy as sa
 
 from marey.core.errors import InvalidInput
 from marey.db import transaction
-from marey.jobs import WorkerBeat
-from marey.runtime.live.keeper import QUEUE, Keeper
+from marey.jobs import WorkerHeartbeat
 from marey.runtime.live.loop import LiveLoop
-from marey.runtime.live.port import Parse, Room
+from marey.runtime.live.port import Parse, SessionPool
+from marey.runtime.live.supervisor import QUEUE, StreamSupervisor
 from marey.streams import NewStream, StreamRow, create_stream, get_stream
 from marey.streams.control import Control, ControlQueue
 from marey.streams.frames import Frame, decode_frame
+from marey.streams.presence import ViewerPresence
 from marey.streams.redis import FrameStream, Gap
-from marey.streams.watch import Watch
 from marey.tenants import create_key
 from marey.text.features import TextFeatures
 from tests.support.prepared import text_features
@@ -50,32 +50,32 @@ class LiveWorker:
         self,
         engine: sa.Engine,
         client: redis.Redis,
-        open_room: Callable[[], Room],
+        open_pool: Callable[[], SessionPool],
         *,
         idle_seconds: float = 600.0,
         paused_seconds: float = 600.0,
         parse: Parse = parse,
     ) -> None:
         self._stopping = threading.Event()
-        self.loop = LiveLoop(open_room, lambda over: self.keeper.over(over))
-        beat = WorkerBeat(f"live-{id(self)}", QUEUE, "test", os.getpid(), "cpu", self.loop.room.bundle)
-        self.keeper = Keeper(
+        self.loop = LiveLoop(open_pool, lambda over: self.supervisor.over(over))
+        beat = WorkerHeartbeat(f"live-{id(self)}", QUEUE, "test", os.getpid(), "cpu", self.loop.pool.bundle)
+        self.supervisor = StreamSupervisor(
             engine, client, beat, parse, stopping=self._stopping,
             idle_seconds=idle_seconds, paused_seconds=paused_seconds,
         )  # fmt: skip
         self._thread = threading.Thread(target=self.loop.run, args=(self._stopping,), daemon=True)
-        self.keeper.serve(self.loop)
+        self.supervisor.serve(self.loop)
         self._thread.start()
 
     def stop(self) -> None:
         """As SIGTERM."""
         self._stopping.set()
-        for thread in (self._thread, self.keeper, self.keeper.renewer):
+        for thread in (self._thread, self.supervisor, self.supervisor.renewer):
             thread.join(PATIENCE)
 
     def kill(self) -> None:
         """Nothing is written or released any more."""
-        self.keeper._give_back = lambda: None  # pyright: ignore
+        self.supervisor._give_back = lambda: None  # pyright: ignore
         self.stop()
 
 
@@ -104,7 +104,7 @@ class Studio:
 
     def watch(self, stream: UUID) -> None:
         """Somebody looks."""
-        Watch(self.client, str(stream)).touch()
+        ViewerPresence(self.client, str(stream)).refresh()
 
     def frames(self, stream: UUID) -> list[Frame | Gap]:
         """All that Redis has."""

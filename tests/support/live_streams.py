@@ -24,8 +24,8 @@ from marey.models.mogo.bundle import random_bundle
 from marey.streams import StreamChunk, StreamState, add_chunk, end_stream, take_stream
 from marey.streams.control import START, Control, ControlQueue
 from marey.streams.frames import Frame, encode_frame
-from marey.streams.reads import ReadAs
 from marey.streams.redis import FrameStream
+from marey.streams.rewrites import PromptRewrite
 
 JOINTS = 22
 BUNDLE = "mogo-paperclip"
@@ -65,7 +65,7 @@ class Hand:
         return [encode_frame(frame) for frame in made]
 
     def note(
-        self, *prompts: tuple[int, str], state: StreamState | None = None, reads: Sequence[ReadAs] | None = None
+        self, *prompts: tuple[int, str], state: StreamState | None = None, reads: Sequence[PromptRewrite] | None = None
     ) -> None:
         """Put on record what was shown since."""
         count = self._next - self._noted

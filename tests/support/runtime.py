@@ -9,8 +9,7 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from marey.db import transaction
-from marey.jobs import Heartbeat as Answer
-from marey.jobs import Policy, heartbeat
+from marey.jobs import HeartbeatReply, Policy, heartbeat
 from marey.runtime.committer import Committer
 from marey.runtime.handler import Handler
 from marey.runtime.lease import Heartbeat
@@ -63,6 +62,6 @@ class Loop:
     def _tick(self) -> None:
         self.ticks += 1
 
-    def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
+    def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> HeartbeatReply:
         with transaction(self.engine) as conn:
             return heartbeat(conn, token, items, progressed=progressed, rules=self.rules)

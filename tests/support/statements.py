@@ -18,7 +18,7 @@ from sqlalchemy import event
 
 from marey.db import create_engine, transaction, upgrade
 from marey.embedded import start_postgres
-from marey.jobs import ItemFailure, WorkerBeat, beat, fail_items, heartbeat, leased_items, release, retire
+from marey.jobs import ItemFailure, WorkerHeartbeat, beat, fail_items, heartbeat, leased_items, release, retire
 from marey.streams import (
     NewStream,
     StreamChunk,
@@ -64,7 +64,7 @@ def work(engine: sa.Engine) -> set[str]:
     submit_items(engine, [new_item(k, name=f"take {k}", tags=("show=one",)) for k in range(8)], fail_early=0.5)
     with recording(engine, said):
         with transaction(engine) as conn:
-            beat(conn, WorkerBeat("w", "hgm3", "host", 7, "cpu", "tiny@0", "batch of tiny@0"))
+            beat(conn, WorkerHeartbeat("w", "hgm3", "host", 7, "cpu", "tiny@0", "batch of tiny@0"))
         parse_texts(engine)
         held = claim_some(engine, limit=3, prefer_batch_key="batch of tiny@0")
         with transaction(engine) as conn:

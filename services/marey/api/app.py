@@ -14,6 +14,7 @@ import uvicorn
 from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import APIRoute
 
+from marey.api.broadcaster import EventBroadcaster
 from marey.api.catalogue import Catalogue
 from marey.api.context import CONNECTIONS, Context
 from marey.api.docs.routes import router as docs_router
@@ -38,7 +39,6 @@ from marey.api.schedules.routes import router as schedules_router
 from marey.api.stream_hub import Hub
 from marey.api.streams.protocol import socket_options
 from marey.api.streams.routes import router as streams_router
-from marey.api.tailer import Tailer
 from marey.api.text_client import TextService
 from marey.api.texts.routes import router as texts_router
 from marey.api.webhooks.routes import router as webhooks_router
@@ -108,7 +108,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
         Vault.of(config)
     url = config.database_url.get_secret_value()
     engine = create_engine(url, pool_size=CONNECTIONS // 2, max_overflow=CONNECTIONS // 2)
-    tailer = Tailer(engine, config.notifications_url or url, message)
+    broadcaster = EventBroadcaster(engine, config.notifications_url or url, message)
     redis_url = config.streams_url or config.queue_url
     hub = None
     if redis_url is not None:
@@ -116,16 +116,16 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
     texts = TextService(config)
     store = open_store(config)
     readiness = Readiness(readiness_checks(config, engine, store))
-    shared = Context(config, engine, store, app.state.catalogue, tailer, Rates(config), texts, readiness, hub)
+    shared = Context(config, engine, store, app.state.catalogue, broadcaster, Rates(config), texts, readiness, hub)
     app.state.context = shared
-    tailer.start()
+    broadcaster.start()
     readiness.start()
     try:
         async with notified():
             yield
     finally:
         readiness.stop()
-        tailer.stop()
+        broadcaster.stop()
         await texts.close()
         app.state.context.rates.close()
         if hub is not None:

@@ -37,7 +37,7 @@ def authenticated(shared: Context, secret: str | None) -> ApiKey:
         return authenticate(conn, secret)
 
 
-def admit(shared: Context, key: ApiKey, scope: str, kind: str | None = None) -> None:
+def authorize(shared: Context, key: ApiKey, scope: str, kind: str | None = None) -> None:
     """Nothing, if the key has the scope and has not asked too often.
 
     Args:
@@ -62,7 +62,7 @@ def check_scope(key: ApiKey, scope: str) -> None:
 
 
 def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiKey, SecurityScopes], ApiKey]:
-    """A dependency: the caller's key, if `admit` lets it pass for the scopes that the route's `Security` names.
+    """A dependency: the caller's key, if `authorize` lets it pass for the scopes that the route's `Security` names.
 
     The OpenAPI document says them, too.
     """
@@ -71,7 +71,7 @@ def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiK
         asked: HTTPConnection, shared: Shared, key: Annotated[ApiKey, Depends(caller)], wanted: SecurityScopes
     ) -> ApiKey:
         for scope in wanted.scopes:
-            admit(shared, key, scope, kind)
+            authorize(shared, key, scope, kind)
         check_query(asked)  # only now: nobody unknown is told what a route takes
         return key
 

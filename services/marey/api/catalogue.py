@@ -7,7 +7,7 @@ import time
 
 from marey.bundles import choose_bundle
 from marey.core.settings import Settings
-from marey.jobs.offers import Offer, offer_of
+from marey.jobs.generators import GeneratorCapabilities, capabilities_of
 
 FRESH_SECONDS = 5.0
 """A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""
@@ -15,14 +15,14 @@ DEFAULT_MODEL = "hgm3"
 
 
 class Catalogue:
-    """Offers by the name they were asked for, remembered for a few seconds. Safe in threads."""
+    """GeneratorList by the name they were asked for, remembered for a few seconds. Safe in threads."""
 
     def __init__(self, config: Settings) -> None:
         self._config = config
-        self._offers: dict[str, tuple[float, Offer]] = {}
+        self._offers: dict[str, tuple[float, GeneratorCapabilities]] = {}
         self._lock = threading.Lock()
 
-    def offer(self, name: str | None) -> Offer:
+    def offer(self, name: str | None) -> GeneratorCapabilities:
         """The offer for a model (`hgm3`), a bundle or an exact bundle; None = the default model.
 
         Raises:
@@ -32,6 +32,6 @@ class Catalogue:
         with self._lock:
             made, offer = self._offers.get(wanted, (0.0, None))
             if offer is None or time.monotonic() - made > FRESH_SECONDS:
-                offer = offer_of(choose_bundle(wanted, config=self._config, verify=False), self._config)
+                offer = capabilities_of(choose_bundle(wanted, config=self._config, verify=False), self._config)
                 self._offers[wanted] = (time.monotonic(), offer)
         return offer

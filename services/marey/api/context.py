@@ -11,18 +11,18 @@ from anyio import CapacityLimiter
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from marey.api.broadcaster import EventBroadcaster
 from marey.api.catalogue import Catalogue
 from marey.api.rates import Rates
 from marey.api.readiness import Readiness
 from marey.api.stream_hub import Hub
-from marey.api.tailer import Tailer
 from marey.api.text_client import TextService
 from marey.core.errors import Unauthenticated
 from marey.core.metrics import EVENT_STREAMS
 from marey.core.settings import Settings
 from marey.db import Deadline, transaction
-from marey.http.body_room import BodyRoom
-from marey.http.places import Places, Shares
+from marey.http.body_budget import BodyBudget
+from marey.http.slots import SlotCounter, SlotLimits
 from marey.storage import AssetStore
 
 LARGE_THREADS = 1
@@ -37,24 +37,24 @@ class Context:
     engine: sa.Engine
     store: AssetStore
     catalogue: Catalogue
-    tailer: Tailer
+    broadcaster: EventBroadcaster
     rates: Rates
     texts: TextService
     readiness: Readiness
     """The cached checks of `/readyz`."""
     streams: Hub | None = None
     """None where no Redis is named."""
-    body_room: BodyRoom = field(default_factory=BodyRoom)
+    body_budget: BodyBudget = field(default_factory=BodyBudget)
     """For bodies too long for memory."""
     large_threads: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(LARGE_THREADS))
     """In which such bodies are read and written on; the threads of other requests stay free."""
-    event_streams: Places = field(init=False)
+    event_streams: SlotCounter = field(init=False)
     """Open streams of server-sent events."""
 
     def __post_init__(self) -> None:
         config = self.config
-        shares = Shares(config.event_streams, config.event_streams_per_tenant, config.event_streams_per_key)
-        self.event_streams = Places("event streams", shares, EVENT_STREAMS)
+        shares = SlotLimits(config.event_streams, config.event_streams_per_tenant, config.event_streams_per_key)
+        self.event_streams = SlotCounter("event streams", shares, EVENT_STREAMS)
 
 
 async def context(asked: HTTPConnection) -> Context:

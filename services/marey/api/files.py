@@ -39,7 +39,7 @@ class FileView(View):
 
 
 @dataclass(frozen=True)
-class Part:
+class RequestedFile:
     """How much of a file a request wants."""
 
     request: Request
@@ -51,10 +51,10 @@ class Part:
     ] = True
 
 
-AskedPart = Annotated[Part, Depends()]
+FileRequest = Annotated[RequestedFile, Depends()]
 
 
-def file_response(shared: Context, tenant: str, stem: str, file: FileView, part: Part) -> Response:
+def file_response(shared: Context, tenant: str, stem: str, file: FileView, part: RequestedFile) -> Response:
     """Answer a request for a file. Its ETag is its sha256; HEAD tells the whole file's size.
 
     Args:

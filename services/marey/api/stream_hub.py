@@ -9,7 +9,7 @@ from typing import TypeVar
 from anyio import CapacityLimiter, to_thread
 
 from marey.core.metrics import SOCKETS as SOCKETS_OPEN
-from marey.http.places import Places, Shares
+from marey.http.slots import SlotCounter, SlotLimits
 from marey.runtime.queue import redis_client
 
 Answer = TypeVar("Answer")
@@ -33,7 +33,7 @@ class Hub:
         self.redis = redis_client(url, max_connections=2 * SOCKETS)
         self._reads = CapacityLimiter(SOCKETS)
         self._calls = CapacityLimiter(CALLS)
-        self.places = Places("sockets", Shares(SOCKETS, tenant, key), SOCKETS_OPEN)
+        self.slots = SlotCounter("sockets", SlotLimits(SOCKETS, tenant, key), SOCKETS_OPEN)
 
     async def wait(self, read: Callable[[], Answer]) -> Answer:
         """What a read that waits gives; for one at a time of each socket. Who goes away does not wait for it."""

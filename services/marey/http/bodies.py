@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from marey.core.errors import InvalidInput, MareyError, TooLarge, TooSlow
 from marey.core.spool import IN_MEMORY, Spool
-from marey.http.body_room import BodyRoom
+from marey.http.body_budget import BodyBudget
 from marey.http.problems import problem_response
 from marey.items.item import MAX_BODY_BYTES
 
@@ -125,7 +125,7 @@ class BodyGuard:
     def __init__(self, app: ASGIApp, patience: Patience) -> None:
         self.app = app
         self.patience = patience
-        self.room = BodyRoom(OTHER_BODIES, OTHER_BODIES)
+        self.room = BodyBudget(OTHER_BODIES, OTHER_BODIES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on with the whole body, or refuse."""
@@ -208,7 +208,7 @@ class KeptBody:
 class BodyLimits(Protocol):
     """Limits that the large bodies of one process share."""
 
-    body_room: BodyRoom
+    body_budget: BodyBudget
     large_threads: CapacityLimiter
     """Threads in which large bodies are read."""
 
@@ -234,7 +234,7 @@ async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncG
             nonlocal large
             large = True
             async with incoming.paused():
-                await stack.enter_async_context(limits.body_room.take(tenant, size))
+                await stack.enter_async_context(limits.body_budget.take(tenant, size))
 
         declared = _declared(request, MAX_BODY_BYTES)
         if declared > IN_MEMORY:

@@ -25,7 +25,7 @@ from marey.core.errors import (
     Unreachable,
 )
 from marey.items.item import InvalidItems
-from marey.tenants import Room
+from marey.tenants import QuotaHeadroom
 
 TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"
@@ -58,7 +58,7 @@ class QuotaBody(BaseModel):
     asked: int
 
     @classmethod
-    def of(cls, found: Room | QuotaUsedUp) -> QuotaBody:
+    def of(cls, found: QuotaHeadroom | QuotaUsedUp) -> QuotaBody:
         """From what was looked up, or from what was refused."""
         return cls(name=found.quota, limit=found.limit, used=found.used, left=found.left, asked=found.asked)
 

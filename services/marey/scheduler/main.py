@@ -18,17 +18,17 @@ from marey.core.settings import Settings
 from marey.core.tls import trusting_context
 from marey.db import check_listening, create_engine, outages, transaction
 from marey.evaluations import remove_unused_prompts
-from marey.jobs import Problem, beat_scheduler, make_due, retire, sweep
+from marey.jobs import Problem, make_due, record_scheduler_heartbeat, retire, sweep
 from marey.motion.clip import without_prompt
 from marey.runtime.app import create_app
 from marey.runtime.exposition import expose
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
-from marey.runtime.status import Teller
-from marey.scheduler import parts as scheduler_parts
+from marey.runtime.status import StatusReporter
+from marey.scheduler import components
+from marey.scheduler.components import EXIT_STALLED, SchedulerComponent, end_stalled, note_progress, watch
 from marey.scheduler.evaluations import Evaluations
-from marey.scheduler.parts import EXIT_STALLED, Part, end_stalled, note_progress, watch
 from marey.scheduler.periodic import Periodic
 from marey.scheduler.relay import Relay, publisher
 from marey.scheduler.sending import Sender
@@ -80,7 +80,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     lists = redis_client(queue_url)
     relay = Relay(engine, listen_url, lists, publisher(app), interval=chosen.relay_seconds, stopping=stopping)
     periodic = _periodic(engine, chosen, stopping)
-    parts: list[Part] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
+    parts: list[SchedulerComponent] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
     beats = create_engine(database_url, pool_size=1)
     name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
     presence = Periodic("presence", Presence(beats, name, parts).tell, seconds=BEAT_SECONDS, stopping=stopping)
@@ -90,9 +90,9 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     for part in parts:
         part.start()
     log.info("started", parts=[part.name for part in parts])
-    teller = Teller(chosen.home, name, lambda: max(part.silence() for part in parts), stopping)
+    reporter = StatusReporter(chosen.home, name, lambda: max(part.silence() for part in parts), stopping)
     if alone:
-        teller.start()
+        reporter.start()
     if watch(parts, stopping):
         if alone:
             end_stalled()
@@ -101,7 +101,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     for part in parts:
         part.join(STOP_SECONDS)
     if alone:
-        teller.join(STOP_SECONDS)
+        reporter.join(STOP_SECONDS)
     _retire(beats, name)
     app.close()
     lists.close()
@@ -113,7 +113,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
 class Presence:
     """Says in the database that this scheduler works, as long as it does: `marey doctor` and metrics read it."""
 
-    def __init__(self, engine: sa.Engine, name: str, parts: Sequence[Part]) -> None:
+    def __init__(self, engine: sa.Engine, name: str, parts: Sequence[SchedulerComponent]) -> None:
         self._engine = engine
         self._name = name
         self._parts = parts
@@ -124,10 +124,10 @@ class Presence:
         Raises:
             Unreachable: the database does not answer.
         """
-        if any(part.stalled(scheduler_parts.STALL_SECONDS / 2) for part in self._parts):
+        if any(part.stalled(components.STALL_SECONDS / 2) for part in self._parts):
             return
         with transaction(self._engine) as conn:
-            beat_scheduler(conn, self._name, host=socket.gethostname(), pid=os.getpid())
+            record_scheduler_heartbeat(conn, self._name, host=socket.gethostname(), pid=os.getpid())
 
 
 def _retire(engine: sa.Engine, name: str) -> None:

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from marey.core import metrics
 from marey.core.errors import Unreachable
 from marey.runtime.logs import logger
-from marey.scheduler.parts import Part
+from marey.scheduler.components import SchedulerComponent
 
 log = logger(__name__)
 
 
-class Periodic(Part):
+class Periodic(SchedulerComponent):
     """Calls `action` every `seconds` until `stopping`.
 
     After an outage, `probe` is called until it does not raise `Unreachable`, then `meanwhile` once; then `grace`

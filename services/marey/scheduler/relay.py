@@ -23,7 +23,7 @@ from marey.db import QUEUE_CHANNEL, Listener, transaction
 from marey.jobs import EVALUATOR_QUEUE, TEXT_QUEUE, live_workers, waiting_batches
 from marey.runtime.app import DRAIN, PUBLISH_RETRY
 from marey.runtime.logs import logger
-from marey.scheduler.parts import Part
+from marey.scheduler.components import SchedulerComponent
 
 log = logger(__name__)
 
@@ -36,7 +36,7 @@ LEAST_PAUSE = 0.05  # seconds between two rounds: a submit in many transactions 
 TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows that hints still reach it
 
 
-class Relay(Part):
+class Relay(SchedulerComponent):
     """One round each `interval` seconds and on each notification, until `stopping`."""
 
     def __init__(

@@ -17,7 +17,7 @@ from marey.core import metrics
 from marey.core.errors import InvalidInput, Unreachable
 from marey.db import transaction
 from marey.runtime.logs import logger
-from marey.scheduler.parts import Part
+from marey.scheduler.components import SchedulerComponent
 from marey.scheduler.sending import Sender
 from marey.webhooks import (
     Attempt,
@@ -52,7 +52,7 @@ OUTCOMES: dict[DeliveryState | None, str] = {
 Given = TypeVar("Given")
 
 
-class Deliverer(Part):
+class Deliverer(SchedulerComponent):
     """Looks every `interval` seconds, and whenever a try has ended, until `stopping`."""
 
     def __init__(

@@ -36,7 +36,7 @@ def check_listening(url: str) -> None:
 
 
 class Listener:
-    """A connection of its own that LISTENs; for the relay and for the API's tailer. Not shared between threads."""
+    """A connection of its own that LISTENs; for the relay and for the API's broadcaster. Not shared between threads."""
 
     def __init__(self, url: str, channels: tuple[str, ...]) -> None:
         """Connect and listen.

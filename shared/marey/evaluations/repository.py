@@ -33,7 +33,7 @@ from marey.jobs.idempotency import take_key
 from marey.jobs.operate import cancel
 from marey.jobs.states import ENDED, JobState
 from marey.jobs.workers import live_workers
-from marey.webhooks.outbox import tell
+from marey.webhooks.outbox import enqueue_event
 from marey.webhooks.types import EventKind
 
 
@@ -243,7 +243,7 @@ def move_evaluation(
     if state not in OPEN_EVALUATIONS:
         regressed = values.get("regressed")
         told = None if regressed is None else bool(regressed)
-        tell_of_evaluation(conn, row.tenant, row.id, state, schedule=row.schedule, regressed=told)
+        enqueue_evaluation_event(conn, row.tenant, row.id, state, schedule=row.schedule, regressed=told)
 
 
 def cancel_evaluation(
@@ -334,7 +334,7 @@ def _job(row: sa.RowMapping, what: str) -> EvaluationJob | None:
     )
 
 
-def tell_of_evaluation(
+def enqueue_evaluation_event(
     conn: sa.Connection,
     tenant: str,
     evaluation: UUID,
@@ -345,9 +345,9 @@ def tell_of_evaluation(
 ) -> None:
     """Tell of an evaluation that is over, and once more if it is worse than what it was compared with."""
     data = {"evaluation": evaluation, "state": state, "schedule": schedule, "regressed": regressed}
-    tell(conn, tenant, EventKind.EVALUATION_ENDED, data)
+    enqueue_event(conn, tenant, EventKind.EVALUATION_ENDED, data)
     if regressed:
-        tell(conn, tenant, EventKind.EVALUATION_REGRESSED, data)
+        enqueue_event(conn, tenant, EventKind.EVALUATION_REGRESSED, data)
 
 
 def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:

@@ -16,7 +16,7 @@ from marey.evaluations import TEST_SPLIT, EvaluationRequest, EvaluationRow
 from marey.items.evaluation_prompts import EvaluationPrompt
 from marey.items.item import MAX_ITEMS, MAX_PROBLEMS, MAX_SEED, InvalidItems, Item, Problem
 from marey.jobs import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, NewItem, NewJob
-from marey.jobs.offers import Offer, new_items, offer_of
+from marey.jobs.generators import GeneratorCapabilities, capabilities_of, new_items
 
 BACKGROUND = -PRIORITY_LIMIT
 """Priority of the jobs of evaluations: whatever a person waits for goes first."""
@@ -28,7 +28,7 @@ class Plan:
 
     request: EvaluationRequest
     """With exact bundles and the model."""
-    offer: Offer
+    offer: GeneratorCapabilities
     prompts: tuple[EvaluationPrompt, ...]
 
     def generation(self, row: EvaluationRow) -> NewJob:
@@ -70,7 +70,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
         InvalidInput: a setting that the model has not, too many motions, a seed that is too high.
     """
     with named_by("bundle"):
-        offer = offer_of(choose_bundle(request.bundle, config=config, verify=False), config)
+        offer = capabilities_of(choose_bundle(request.bundle, config=config, verify=False), config)
     with named_by("evaluator"):
         evaluator = choose_evaluator(request.evaluator, generator=offer.bundle, config=config)
         _check_layout(offer.bundle, evaluator)
@@ -127,7 +127,7 @@ def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
         )
 
 
-def _check_seconds(prompts: tuple[EvaluationPrompt, ...], offer: Offer) -> None:
+def _check_seconds(prompts: tuple[EvaluationPrompt, ...], offer: GeneratorCapabilities) -> None:
     problems: list[Problem] = []
     for line, prompt in enumerate(prompts, 1):
         try:

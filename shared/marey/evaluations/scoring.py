@@ -22,8 +22,8 @@ from marey.evaluations.types import (
     ScoreRows,
 )
 from marey.jobs import tables as job_tables
-from marey.jobs.held import Held, document, drop_empty_lease, end_items, hold
 from marey.jobs.journal import NewEvent, record
+from marey.jobs.leased import LeasedItems, document, drop_empty_lease, end_items, lock_lease
 from marey.jobs.leases import AssetDigest, Committed
 from marey.jobs.results import store_assets
 from marey.jobs.states import Cause, ItemState
@@ -74,15 +74,15 @@ def commit_score(conn: sa.Connection, lease_token: UUID, score: NewScore) -> Com
     _check(score)
     found = conn.execute(EVALUATION_OF_LEASE, {"token": lease_token}).scalar_one_or_none()
     evaluation = None if found is None else lock_evaluation(conn, found)  # before the job's lock: see `schema`
-    held = hold(conn, lease_token, [score.item])
-    if held is None or score.item not in held.items:
+    leased = lock_lease(conn, lease_token, [score.item])
+    if leased is None or score.item not in leased.items:
         return Committed((), (score.item,))
     if evaluation is None or evaluation.state is not EvaluationState.SCORING:
-        _refuse(conn, held, score.item)
+        _refuse(conn, leased, score.item)
     else:
-        _write(conn, held, evaluation, score)
+        _write(conn, leased, evaluation, score)
     drop_empty_lease(conn, lease_token)
-    return held.committed([score.item])
+    return leased.committed([score.item])
 
 
 def _check(score: NewScore) -> None:
@@ -94,19 +94,19 @@ def _check(score: NewScore) -> None:
         raise ValueError(f"not finite, and no measure: {', '.join(wrong)}")
 
 
-def _refuse(conn: sa.Connection, held: Held, item: UUID) -> None:
+def _refuse(conn: sa.Connection, leased: LeasedItems, item: UUID) -> None:
     problem = document(Problem("conflict", "the evaluation of this item was over before it was scored"))
     end_items(conn, [item], ItemState.FAILED, Cause.ERROR, problem=problem)
     event = NewEvent("item_failed", str(problem["message"]), item, {"problem": problem})
-    record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.FAILED): 1})
+    record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.FAILED): 1})
 
 
-def _write(conn: sa.Connection, held: Held, evaluation: EvaluationRow, score: NewScore) -> None:
+def _write(conn: sa.Connection, leased: LeasedItems, evaluation: EvaluationRow, score: NewScore) -> None:
     end_items(conn, [score.item], ItemState.SUCCEEDED, Cause.COMMITTED)
     event = NewEvent("progress", score.reason, data={"items": 1})
-    record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): 1})
+    record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): 1})
     digests = {file.sha256 for file in score.files.values()}
-    assets = store_assets(conn, held.job, digests)
+    assets = store_assets(conn, leased.job, digests)
     reports = [
         {"evaluation_id": evaluation.id, "format": name, "asset_id": assets[file.sha256]}
         for name, file in score.files.items()

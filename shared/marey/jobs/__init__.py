@@ -28,13 +28,13 @@ from marey.jobs.leases import (
     Claim,
     ClaimedItem,
     Committed,
-    Heartbeat,
+    HeartbeatReply,
     ItemFailure,
     NewMotion,
     NewText,
     SchedulerRow,
     SweepReport,
-    WorkerBeat,
+    WorkerHeartbeat,
     WorkerRow,
 )
 from marey.jobs.listings import events_after, get_job, list_items, list_jobs
@@ -62,7 +62,7 @@ from marey.jobs.types import (
     Problem,
     SubmittedJob,
 )
-from marey.jobs.workers import beat, beat_scheduler, list_schedulers, list_workers, live_workers, retire
+from marey.jobs.workers import beat, list_schedulers, list_workers, live_workers, record_scheduler_heartbeat, retire
 
 __all__ = [
     "EVALUATOR_QUEUE",
@@ -77,7 +77,7 @@ __all__ = [
     "Committed",
     "Estimate",
     "EventRow",
-    "Heartbeat",
+    "HeartbeatReply",
     "IdempotencyMismatch",
     "ItemFailure",
     "ItemRow",
@@ -102,11 +102,10 @@ __all__ = [
     "Stage",
     "SubmittedJob",
     "SweepReport",
-    "WorkerBeat",
+    "WorkerHeartbeat",
     "WorkerRow",
     "asset_key",
     "beat",
-    "beat_scheduler",
     "begin_assets",
     "cancel",
     "claim",
@@ -135,6 +134,7 @@ __all__ = [
     "place_of",
     "policy",
     "queue_depths",
+    "record_scheduler_heartbeat",
     "release",
     "resume",
     "retire",

@@ -12,10 +12,10 @@ import sqlalchemy as sa
 from marey.db.sql import CLOCK, interval
 from marey.jobs import tables
 from marey.jobs.journal import LockedJob, lock_job, record
-from marey.jobs.leases import Claim, ClaimedItem, Heartbeat
+from marey.jobs.leases import Claim, ClaimedItem, HeartbeatReply
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import ItemState, JobControl, Stage
-from marey.tenants.quotas import room_to_run
+from marey.tenants.quotas import runnable_items
 
 LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
 
@@ -145,7 +145,7 @@ def heartbeat(
     *,
     progressed: bool,
     rules: Policy | None = None,
-) -> Heartbeat:
+) -> HeartbeatReply:
     """Renew a lease and read back what was taken away.
 
     Args:
@@ -162,8 +162,8 @@ def heartbeat(
         renewal = {"expires_at": sa.case((moves, CLOCK + interval(rules.lease)), else_=table.expires_at)}
     renewed = conn.execute(sa.update(tables.lease).where(table.token == lease_token).values(renewal))
     if renewed.rowcount == 0:
-        return Heartbeat(lost=True, gone=frozenset(open_items))
-    return Heartbeat(lost=False, gone=frozenset(open_items) - leased_items(conn, lease_token))
+        return HeartbeatReply(lost=True, gone=frozenset(open_items))
+    return HeartbeatReply(lost=False, gone=frozenset(open_items) - leased_items(conn, lease_token))
 
 
 def leased_items(conn: sa.Connection, lease_token: UUID) -> frozenset[UUID]:
@@ -220,7 +220,7 @@ def _try_lane(
     savepoint = conn.begin_nested()
     job = lock_job(conn, lane.job, skip_locked=skip_locked)
     if job is not None and lane.limited:
-        limit = room_to_run(conn, job.tenant, limit)
+        limit = runnable_items(conn, job.tenant, limit)
     taken = None if job is None or limit == 0 else _take(conn, job, queue, lane, worker, limit, rules)
     if taken is None:
         savepoint.rollback()

@@ -15,7 +15,7 @@ from marey.core.errors import NotFound
 from marey.db.database import EVENT_CHANNEL, QUEUE_CHANNEL
 from marey.db.sql import CLOCK, notify
 from marey.jobs import tables
-from marey.jobs.notices import tell_of_job
+from marey.jobs.notifications import enqueue_job_event
 from marey.jobs.states import ENDED, ItemState, JobControl, JobState, job_state
 
 Lane = tuple[str, str]
@@ -155,7 +155,7 @@ def record(
         conn.execute(sa.delete(tables.lane).where(tables.lane.c.job_id == job.id))  # all empty; a retry makes them anew
     if events:
         _write_events(conn, after, events, first=last - len(events) + 1)
-    tell_of_job(conn, job.tenant, job.id, job.state, after.state, after.counters())
+    enqueue_job_event(conn, job.tenant, job.id, job.state, after.state, after.counters())
     return after
 
 

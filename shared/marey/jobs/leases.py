@@ -50,7 +50,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Heartbeat:
+class HeartbeatReply:
     """What the database says to a worker's heartbeat."""
 
     lost: bool
@@ -60,7 +60,7 @@ class Heartbeat:
 
 
 @dataclass(frozen=True)
-class WorkerBeat:
+class WorkerHeartbeat:
     """A worker says that it lives."""
 
     id: str

@@ -16,7 +16,7 @@ from marey.jobs.listings import get_job
 from marey.jobs.states import ENDED, OPEN, RETRYABLE, Cause, ItemState, JobControl
 from marey.jobs.submit import check_share
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, JobRow
-from marey.tenants.quotas import take_room
+from marey.tenants.quotas import reserve_quotas
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:
@@ -82,7 +82,7 @@ def retry(
             where=f"job {job}",
             hint=f"Items that are {', '.join(sorted(wanted))} can.",
         )
-    take_room(conn, tenant, sum(moved.values()))
+    reserve_quotas(conn, tenant, sum(moved.values()))
     table = tables.item
     ours = (table.c.job_id == job) & table.c.state.in_(sorted(wanted))
     _refuse_unread(conn, job, ours)

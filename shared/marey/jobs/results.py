@@ -14,8 +14,8 @@ from sqlalchemy.dialects.postgresql import insert
 from marey.db.ids import new_id
 from marey.db.sql import CLOCK, among, interval
 from marey.jobs import tables
-from marey.jobs.held import HeldItem, document, drop_empty_lease, end_dead, end_items, give_back, hold
 from marey.jobs.journal import LaneChange, LockedJob, NewEvent, change_lanes, record, returned
+from marey.jobs.leased import LeasedItem, document, drop_empty_lease, end_dead, end_items, give_back, lock_lease
 from marey.jobs.leases import AssetDigest, Committed, ItemFailure, NewMotion, NewText
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
@@ -95,16 +95,16 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 
     The files must lie in the asset store and have been announced by `begin_assets`.
     """
-    held = hold(conn, lease_token, [motion.item for motion in motions])
-    if held is None:
+    leased = lock_lease(conn, lease_token, [motion.item for motion in motions])
+    if leased is None:
         return Committed((), tuple(motion.item for motion in motions))
-    done = [motion for motion in motions if motion.item in held.items]
+    done = [motion for motion in motions if motion.item in leased.items]
     if done:
-        _finish(conn, held.job, done)
+        _finish(conn, leased.job, done)
         event = NewEvent("progress", f"{len(done)} motions stored", data={"items": len(done)})
-        record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): len(done)})
+        record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.SUCCEEDED): len(done)})
         drop_empty_lease(conn, lease_token)
-    return held.committed([motion.item for motion in motions])
+    return leased.committed([motion.item for motion in motions])
 
 
 def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText]) -> Committed:
@@ -112,20 +112,20 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
 
     Ready items of the same job with the same key go with them.
     """
-    held = hold(conn, lease_token, [text.item for text in texts])
-    if held is None:
+    leased = lock_lease(conn, lease_token, [text.item for text in texts])
+    if leased is None:
         return Committed((), tuple(text.item for text in texts))
-    done = [text for text in texts if text.item in held.items]
+    done = [text for text in texts if text.item in leased.items]
     for text in done:
-        if text.key != held.items[text.item].text_key:
+        if text.key != leased.items[text.item].text_key:
             raise ValueError(f"features {text.key} are not those of item {text.item}")
     if done:
         blobs = {text.key: text.blob for text in done}
         rows = [{"key": key, "blob": blobs[key]} for key in sorted(blobs)]  # in order: two commits may share keys
         conn.execute(insert(tables.text_features).values(rows).on_conflict_do_nothing())
-        _leave_text_stage(conn, held.job, [text.item for text in done], list(blobs))
+        _leave_text_stage(conn, leased.job, [text.item for text in done], list(blobs))
         drop_empty_lease(conn, lease_token)
-    return held.committed([text.item for text in texts])
+    return leased.committed([text.item for text in texts])
 
 
 def fail_items(
@@ -134,35 +134,35 @@ def fail_items(
     """Record errors: permanent ones end the item `failed`; retryable ones cost an attempt and come back after a delay,
     or end it `dead` when the attempts are used up."""
     rules = rules or policy()
-    held = hold(conn, lease_token, [failure.item for failure in failures])
-    if held is None:
+    leased = lock_lease(conn, lease_token, [failure.item for failure in failures])
+    if leased is None:
         return Committed((), tuple(failure.item for failure in failures))
     states: dict[UUID, ItemState] = {}
     events: list[NewEvent] = []
     for failure in failures:
-        row = held.items.get(failure.item)
+        row = leased.items.get(failure.item)
         if row is not None:
             states[failure.item], event = _fail(conn, row, failure, rules)
             events.append(event)
     if events:
         moved = {(ItemState.LEASED, state): count for state, count in Counter(states.values()).items()}
-        job = record(conn, held.job, events, moved=moved)
+        job = record(conn, leased.job, events, moved=moved)
         drop_empty_lease(conn, lease_token)
         cancel_if_failing(conn, job)
-    return replace(held.committed([failure.item for failure in failures]), states=states)
+    return replace(leased.committed([failure.item for failure in failures]), states=states)
 
 
 def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence[UUID] | None = None) -> Committed:
     """Give items back (all of the lease, by default), at no cost of an attempt: SIGTERM, a store or database outage."""
-    held = hold(conn, lease_token, items)
-    if held is None:
+    leased = lock_lease(conn, lease_token, items)
+    if leased is None:
         return Committed((), tuple(items or ()))
-    if held.items:
-        give_back(conn, held.job, list(held.items.values()), Cause.RELEASED, reason)
-        event = NewEvent("released", reason, data={"items": len(held.items)})
-        record(conn, held.job, [event], moved={(ItemState.LEASED, ItemState.READY): len(held.items)})
+    if leased.items:
+        give_back(conn, leased.job, list(leased.items.values()), Cause.RELEASED, reason)
+        event = NewEvent("released", reason, data={"items": len(leased.items)})
+        record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.READY): len(leased.items)})
         drop_empty_lease(conn, lease_token)
-    return held.committed(list(held.items) if items is None else items)
+    return leased.committed(list(leased.items) if items is None else items)
 
 
 # --- what the sweeper uses too ---
@@ -264,7 +264,7 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
     record(conn, job, [event], moved={(ItemState.LEASED, ItemState.READY): len(items)})
 
 
-def _fail(conn: sa.Connection, item: HeldItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:
+def _fail(conn: sa.Connection, item: LeasedItem, failure: ItemFailure, rules: Policy) -> tuple[ItemState, NewEvent]:
     told = document(failure.problem)
     message = failure.problem.message
     if not failure.retryable:

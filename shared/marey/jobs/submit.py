@@ -30,7 +30,7 @@ from marey.jobs.types import (
     NewJob,
     SubmittedJob,
 )
-from marey.tenants.quotas import check_queue, take_room
+from marey.tenants.quotas import check_queue, reserve_quotas
 
 CHUNK = 2000  # items held in memory at a time, and keys of one look-up
 
@@ -85,7 +85,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
     if job.metered:
-        take_room(conn, job.tenant, total)  # last: others of the tenant wait from here to the commit
+        reserve_quotas(conn, job.tenant, total)  # last: others of the tenant wait from here to the commit
     _begin(conn, identifier, total)
     change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
     return SubmittedJob(identifier, replayed=False, items=total)

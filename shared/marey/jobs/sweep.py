@@ -11,8 +11,8 @@ from marey.db.database import transaction
 from marey.db.deadlines import BULK
 from marey.db.sql import CLOCK, interval
 from marey.jobs import tables
-from marey.jobs.held import drop_empty_lease, end_dead, give_back, held_items
 from marey.jobs.journal import LockedJob, NewEvent, change_lanes, lock_job, record, returned
+from marey.jobs.leased import drop_empty_lease, end_dead, give_back, lock_leased_items
 from marey.jobs.leases import SweepReport
 from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
@@ -84,7 +84,7 @@ def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:
 def _lose(
     conn: sa.Connection, job: LockedJob, token: UUID, worker: str, rules: Policy, *, solo: bool
 ) -> tuple[LockedJob, SweepReport]:
-    items = held_items(conn, token)
+    items = lock_leased_items(conn, token)
     dead = [item for item in items if solo and item.attempts + 1 >= rules.max_attempts]
     back = [item for item in items if item not in dead]
     reason = f"worker {worker} was lost"

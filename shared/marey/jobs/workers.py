@@ -7,7 +7,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from marey.db.sql import CLOCK, interval
 from marey.jobs import tables
-from marey.jobs.leases import SchedulerRow, WorkerBeat, WorkerRow
+from marey.jobs.leases import SchedulerRow, WorkerHeartbeat, WorkerRow
 from marey.jobs.policy import Policy, policy
 
 SCHEDULER = "scheduler"
@@ -16,7 +16,7 @@ SCHEDULER_LIVE = 30.0
 """Seconds after its last word for which a scheduler counts as working; it says so every 5 s."""
 
 
-def beat(conn: sa.Connection, worker: WorkerBeat) -> None:
+def beat(conn: sa.Connection, worker: WorkerHeartbeat) -> None:
     """Note that a worker lives."""
     values = {
         "queue": worker.queue,
@@ -66,14 +66,14 @@ def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[Wo
     return [WorkerRow(**row) for row in rows.mappings()]
 
 
-def beat_scheduler(conn: sa.Connection, name: str, *, host: str, pid: int) -> None:
+def record_scheduler_heartbeat(conn: sa.Connection, name: str, *, host: str, pid: int) -> None:
     """Note that a scheduler works, and at its first word forget those that fell silent: this one is in their place."""
     table = tables.worker.c
     known = conn.execute(sa.select(table.id).where(table.id == name)).one_or_none()
     if known is None:
         silent = (table.queue == SCHEDULER) & (table.seen_at < CLOCK - interval(SCHEDULER_LIVE))
         conn.execute(sa.delete(tables.worker).where(silent))
-    beat(conn, WorkerBeat(name, SCHEDULER, host, pid, device=""))
+    beat(conn, WorkerHeartbeat(name, SCHEDULER, host, pid, device=""))
 
 
 def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:

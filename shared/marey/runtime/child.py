@@ -18,11 +18,10 @@ from marey.core.errors import InvalidInput, Unreachable
 from marey.core.settings import Settings, settings
 from marey.core.tracing import configure_tracing, end_tracing
 from marey.db import HEARTBEAT, create_engine, transaction
-from marey.jobs import Heartbeat as Answer
-from marey.jobs import WorkerBeat, beat, heartbeat, leased_items, retire
+from marey.jobs import HeartbeatReply, WorkerHeartbeat, beat, heartbeat, leased_items, retire
 from marey.runtime.committer import Committer
 from marey.runtime.exposition import expose, measure_gpu
-from marey.runtime.faults import patiently
+from marey.runtime.faults import retry_unreachable
 from marey.runtime.handler import Handler, HandlerFactory, Role
 from marey.runtime.lease import Heartbeat
 from marey.runtime.logs import configure_logging, logger
@@ -150,7 +149,7 @@ class Child:
     def _worker(self, queue: str) -> str:
         return f"{self._name}/{queue}"
 
-    def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
+    def _renew(self, token: UUID, items: Collection[UUID], progressed: bool) -> HeartbeatReply:
         with transaction(self._beats) as conn:
             return heartbeat(conn, token, items, progressed=progressed)
 
@@ -177,7 +176,7 @@ class Child:
                 loaded = self._drain.loaded.get(queue)
                 beat(
                     conn,
-                    WorkerBeat(
+                    WorkerHeartbeat(
                         id=self._worker(queue),
                         queue=queue,
                         host=socket.gethostname(),
@@ -203,6 +202,6 @@ def wait_for_database(chosen: Settings, seconds: float = 60.0) -> None:
             pass
 
     try:
-        patiently(ask, seconds=seconds)
+        retry_unreachable(ask, seconds=seconds)
     finally:
         engine.dispose()

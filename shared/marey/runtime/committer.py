@@ -30,11 +30,11 @@ from marey.jobs import (
     fail_items,
     release,
 )
-from marey.runtime.faults import as_problem, patiently
+from marey.runtime.faults import as_problem, retry_unreachable
 from marey.runtime.handler import Done, Export, ExportedFile, Failed, Outcome, Scored, TextDone
 from marey.runtime.lease import Heartbeat, HeldLease
 from marey.runtime.logs import logger
-from marey.runtime.watching import ids_of
+from marey.runtime.telemetry import ids_of
 from marey.storage import AssetStore, NewObject
 
 log = logger(__name__)
@@ -79,7 +79,7 @@ class Committer(threading.Thread):
 
     A worker told to stop waits for nobody: what it cannot write at the next try goes back.
 
-    At most two leases are under way, one running and one being stored; `admit` waits until that holds.
+    At most two leases are under way, one running and one being stored; `acquire_slot` waits until that holds.
     """
 
     def __init__(self, engine: sa.Engine, store: AssetStore, heartbeat: Heartbeat, stopping: threading.Event) -> None:
@@ -96,14 +96,14 @@ class Committer(threading.Thread):
 
     # --- the loop's side ---
 
-    def admit(self) -> None:
+    def acquire_slot(self) -> None:
         """Wait until another lease may be taken."""
         self._slots.acquire()
         with self._idle:
             self._pending += 1
 
-    def dismiss(self) -> None:
-        """Give back an `admit` for which there was nothing to claim."""
+    def release_slot(self) -> None:
+        """Give back an `acquire_slot` for which there was nothing to claim."""
         with self._idle:
             self._pending -= 1
             self._idle.notify_all()
@@ -133,12 +133,12 @@ class Committer(threading.Thread):
         while (message := self._next()) is not None:
             lease, first = message
             lease.take_up()
-            with lease.work.bound():
+            with lease.telemetry.bound():
                 self._take(lease, first)
             if isinstance(first, _Finish):
-                lease.work.end()
+                lease.telemetry.end()
                 self._heartbeat.let_go(lease)
-                self.dismiss()
+                self.release_slot()
 
     def _take(self, lease: HeldLease, first: Outcome | _Finish) -> None:
         try:
@@ -178,7 +178,7 @@ class Committer(threading.Thread):
         if not isinstance(outcome, Done):
             return outcome
         try:
-            with lease.work.stage("export", item=outcome.item):
+            with lease.telemetry.stage("export", item=outcome.item):
                 export = outcome.export()
         except MareyError as error:
             return Failed(outcome.item, error, retryable=isinstance(error, Unreachable))
@@ -251,9 +251,9 @@ class Committer(threading.Thread):
             with transaction(self._engine) as conn:
                 return begin_assets(conn, token, digests)
 
-        if not patiently(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
+        if not retry_unreachable(announce, seconds=DATABASE_PATIENCE, stopping=self._stopping):
             lease.settle(items)
-            lease.work.wrote((), lost=len(items))
+            lease.telemetry.wrote((), lost=len(items))
             log.info("results_thrown_away", items=len(items), item_ids=ids_of(items))
             return False
         left = {asset_key(lease.claim.tenant, digest.sha256): file for file, digest in files}
@@ -265,10 +265,10 @@ class Committer(threading.Thread):
                 lease.progress(0, 0)
 
         try:
-            with lease.work.stage("store", items=items):
-                patiently(put, seconds=STORE_PATIENCE, stopping=self._stopping)
+            with lease.telemetry.stage("store", items=items):
+                retry_unreachable(put, seconds=STORE_PATIENCE, stopping=self._stopping)
         except Unreachable as error:
-            lease.work.outage()
+            lease.telemetry.outage()
             log.error("store_away", items=len(items), error=error.message)
             self._give_back(lease, items, "the asset store does not answer")
             return False
@@ -280,11 +280,13 @@ class Committer(threading.Thread):
                 return write(conn, lease.claim.lease_token)
 
         # A commit whose answer got lost is repeated: its items then count as `lost`, their rows stand.
-        with lease.work.stage("commit") as span:
-            committed = patiently(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
+        with lease.telemetry.stage("commit") as span:
+            committed = retry_unreachable(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
             span.set(what=what, items=len(committed.items), item=",".join(ids_of(committed.items)))
         lease.settle([*committed.items, *committed.lost])
-        lease.work.wrote((committed.states.get(item, WENT[what]) for item in committed.items), lost=len(committed.lost))
+        lease.telemetry.wrote(
+            (committed.states.get(item, WENT[what]) for item in committed.items), lost=len(committed.lost)
+        )
         for item, state in committed.states.items():
             log.warning("item_not_made", item=str(item), state=state)
         log.info("committed", what=what, items=len(committed.items), thrown_away=len(committed.lost))

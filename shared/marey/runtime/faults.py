@@ -28,7 +28,7 @@ class OutOfMemory(HandlerError):
     problem_type = "out-of-memory"
 
 
-def patiently(action: Callable[[], T], *, seconds: float, stopping: threading.Event | None = None) -> T:
+def retry_unreachable(action: Callable[[], T], *, seconds: float, stopping: threading.Event | None = None) -> T:
     """Call `action` until it does not raise `Unreachable`, for at most `seconds`; then raise the last one.
 
     With `stopping`, a worker told to stop makes one more try and gives up.

@@ -9,10 +9,9 @@ from collections.abc import Callable, Collection, Iterable
 from uuid import UUID
 
 from marey.core.errors import Unreachable
-from marey.jobs import Claim
-from marey.jobs import Heartbeat as Answer
+from marey.jobs import Claim, HeartbeatReply
 from marey.runtime.logs import logger
-from marey.runtime.watching import Work
+from marey.runtime.telemetry import ClaimTelemetry
 
 log = logger(__name__)
 
@@ -20,7 +19,7 @@ LOOK_SECONDS = 1.0
 AGAIN_SECONDS = 1.0
 """After a failed renewal the next comes this soon: a lease must outlast a connection that fell silent."""
 
-Renew = Callable[[UUID, Collection[UUID], bool], Answer]
+Renew = Callable[[UUID, Collection[UUID], bool], HeartbeatReply]
 """Renews one lease in the database: its token, its open items, whether it progressed. Raises `Unreachable`."""
 
 
@@ -33,7 +32,7 @@ class HeldLease:
 
     def __init__(self, claim: Claim, stopping: threading.Event) -> None:
         self.claim = claim
-        self.work = Work(claim)
+        self.telemetry = ClaimTelemetry(claim)
         self._stopping = stopping
         self._everything = frozenset(item.id for item in claim.items)
         self._open = self._everything
@@ -95,7 +94,7 @@ class HeldLease:
     def _excused(self) -> bool:
         return self._exempt or (self._handed_over and not self._taken_up)
 
-    def learn(self, answer: Answer) -> None:
+    def learn(self, answer: HeartbeatReply) -> None:
         """Take in what the database said."""
         self._gone = self._everything if answer.lost else self._gone | answer.gone
 
@@ -168,7 +167,7 @@ class Heartbeat(threading.Thread):
     def _end_stuck(self) -> None:
         for lease in list(self._held.values()):
             if lease.stuck(self._stall_seconds):
-                with lease.work.bound():
+                with lease.telemetry.bound():
                     log.error("batch_hangs", items=len(lease.claim.items), seconds=self._stall_seconds)
                 self._stuck()
 
@@ -192,7 +191,7 @@ class Heartbeat(threading.Thread):
             except Exception:
                 log.exception("look_failed")
                 continue
-            lease.learn(Answer(lost=False, gone=items - held))
+            lease.learn(HeartbeatReply(lost=False, gone=items - held))
 
     def beat(self) -> bool:
         """Renew each lease once; return False if the database did not answer for one of them."""
@@ -213,6 +212,6 @@ class Heartbeat(threading.Thread):
             if answer.gone or answer.lost:
                 lease.learn(answer)
                 if lease.open != items:  # not merely committed in between
-                    with lease.work.bound():
+                    with lease.telemetry.bound():
                         log.info("items_taken_away", lost=answer.lost, items=len(answer.gone))
         return answered

@@ -1,6 +1,6 @@
 """Structured logs: JSON lines for machines, readable lines for people, never a prompt or a secret.
 
-Lines about work carry its `job`, `lease` and `trace` by themselves (`marey.runtime.watching`); those of a request its
+Lines about work carry its `job`, `lease` and `trace` by themselves (`marey.runtime.telemetry`); those of a request its
 `trace`. Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
 """
 

@@ -18,12 +18,12 @@ from marey.core.errors import MareyError, Unreachable
 from marey.db import transaction
 from marey.jobs import NO_TEXT, Claim, ClaimedItem, Stage, claim, load_texts
 from marey.runtime.committer import Committer
-from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, patiently
+from marey.runtime.faults import HandlerError, as_problem, is_device_lost, is_out_of_memory, retry_unreachable
 from marey.runtime.handler import Batch, Failed, Handler
 from marey.runtime.lease import Heartbeat, HeldLease
 from marey.runtime.logs import logger
 from marey.runtime.scoring import score_input
-from marey.runtime.watching import ids_of
+from marey.runtime.telemetry import ids_of
 from marey.storage import AssetStore
 
 log = logger(__name__)
@@ -119,20 +119,20 @@ class Drain:
         self.loaded[queue] = Loaded(bundle, batch_key)
 
     def _one_batch(self) -> int:
-        self._committer.admit()
+        self._committer.acquire_slot()
         taken: Claim | None = None
         try:
             self._ticked()
             began = time.perf_counter()
-            taken = patiently(self._claim, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+            taken = retry_unreachable(self._claim, seconds=CLAIM_PATIENCE, stopping=self._stopping)
         finally:
             if taken is None:
-                self._committer.dismiss()
+                self._committer.release_slot()
         if taken is None:
             return 0
         lease = self._heartbeat.hold(taken)
-        lease.work.claimed(time.perf_counter() - began)
-        with lease.work.bound():
+        lease.telemetry.claimed(time.perf_counter() - began)
+        with lease.telemetry.bound():
             self._work(lease)
         return len(taken.items)
 
@@ -170,7 +170,7 @@ class Drain:
             fresh = taken.queue not in self.loaded or self.loaded[taken.queue].bundle != taken.bundle
             if fresh:
                 lease.exempt()  # loading, and the compile of the first batch, are silent for minutes
-            with lease.work.stage("load"):
+            with lease.telemetry.stage("load"):
                 self.load(taken.queue, taken.bundle, taken.batch_key)
                 batch = self._batch(lease)
             buckets = handler.buckets(batch)
@@ -188,7 +188,7 @@ class Drain:
         return "the worker gave no result"
 
     def _pause(self, lease: HeldLease, error: Unreachable) -> str:
-        lease.work.outage()
+        lease.telemetry.outage()
         log.warning("outage", error=error.message)
         self._stopping.wait(OUTAGE_PAUSE)
         return error.message
@@ -200,14 +200,16 @@ class Drain:
             return Batch(taken, taken.items, {})
         if taken.items[0].text_key == NO_TEXT:
             score = partial(score_input, self._engine, self._store, taken.job)
-            return Batch(taken, taken.items, {}, patiently(score, seconds=CLAIM_PATIENCE, stopping=self._stopping))
+            return Batch(
+                taken, taken.items, {}, retry_unreachable(score, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+            )
         keys = sorted({item.text_key for item in taken.items})
 
         def read() -> dict[str, bytes]:
             with transaction(self._engine) as conn:
                 return load_texts(conn, keys)
 
-        features = patiently(read, seconds=CLAIM_PATIENCE, stopping=self._stopping)
+        features = retry_unreachable(read, seconds=CLAIM_PATIENCE, stopping=self._stopping)
         missing = [item for item in taken.items if item.text_key not in features]
         if missing:
             self._fail_all(lease, missing, HandlerError("the text features of this item are gone"), retryable=True)
@@ -221,7 +223,7 @@ class Drain:
             return
         answered: set[UUID] = set()
         try:
-            with lease.work.stage("run", items=(item.id for item in batch.items)):
+            with lease.telemetry.stage("run", items=(item.id for item in batch.items)):
                 for outcome in handler.run(batch, lease):
                     answered.add(outcome.item)
                     self._committer.put(lease, outcome)

@@ -1,5 +1,5 @@
 """What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds. Live
-workers and the scheduler say the same, each by a `Teller`.
+workers and the scheduler say the same, each by a `StatusReporter`.
 
 `marey probe` reads them: the liveness probe of a machine's workers, with `ready` the readiness probe.
 """
@@ -93,7 +93,7 @@ def forget_dead(home: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-class Teller(threading.Thread):
+class StatusReporter(threading.Thread):
     """Writes the status of this process until `stopping`, then removes it.
 
     Args:

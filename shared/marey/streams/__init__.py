@@ -8,10 +8,10 @@ from marey.streams.repository import (
     get_stream,
     list_streams,
     open_streams,
+    prompts_with_rewrites,
     stream_acts,
     stream_prompts,
     take_stream,
-    told_prompts,
 )
 from marey.streams.states import StreamState
 from marey.streams.types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
@@ -30,8 +30,8 @@ __all__ = [
     "get_stream",
     "list_streams",
     "open_streams",
+    "prompts_with_rewrites",
     "stream_acts",
     "stream_prompts",
     "take_stream",
-    "told_prompts",
 ]

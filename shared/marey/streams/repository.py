@@ -22,13 +22,13 @@ from marey.jobs import tables as job_tables
 from marey.jobs.submit import submit
 from marey.jobs.types import NewItem, NewJob, Problem
 from marey.streams import tables
-from marey.streams.acts import Begun
-from marey.streams.reads import ReadAs
+from marey.streams.actions import ActionStart
+from marey.streams.rewrites import PromptRewrite
 from marey.streams.states import OPEN_STREAMS, StreamState
 from marey.streams.types import NewStream, StreamChunk, StreamPast, StreamPrompt, StreamRow
 from marey.tenants import tables as tenant_tables
 from marey.tenants.repository import get_tenant
-from marey.webhooks.outbox import tell
+from marey.webhooks.outbox import enqueue_event
 from marey.webhooks.types import EventKind
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
@@ -114,22 +114,22 @@ def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
     return [(int(frame), str(text)) for prompts in conn.execute(query).scalars() for frame, text in prompts]
 
 
-def told_prompts(conn: sa.Connection, stream: UUID) -> list[StreamPrompt]:
+def prompts_with_rewrites(conn: sa.Connection, stream: UUID) -> list[StreamPrompt]:
     """`stream_prompts`, each with how it was read."""
     table = tables.stream_chunk.c
     query = sa.select(table.prompts, table.reads).where(table.stream_id == stream).order_by(table.first)
     return [
-        StreamPrompt(int(frame), str(text), None if reads is None else ReadAs(*reads[number]))
+        StreamPrompt(int(frame), str(text), None if reads is None else PromptRewrite(*reads[number]))
         for prompts, reads in conn.execute(query)
         for number, (frame, text) in enumerate(prompts)
     ]
 
 
-def stream_acts(conn: sa.Connection, stream: UUID) -> list[Begun]:
+def stream_acts(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
     """Every act of a stream that began and is on record; none of what workers wrote that did not record acts."""
     table = tables.stream_chunk.c
     query = sa.select(table.acts).where(table.stream_id == stream, table.acts.is_not(None)).order_by(table.first)
-    return [Begun(*act) for acts in conn.execute(query).scalars() for act in acts]
+    return [ActionStart(*act) for acts in conn.execute(query).scalars() for act in acts]
 
 
 # --- what a worker does ---
@@ -236,7 +236,7 @@ def end_stream(
         "seen_at": CLOCK,
     }
     conn.execute(sa.update(table).where(table.c.id == stream).values(values))
-    tell_of_stream(conn, row.tenant_id, stream, state, frames=row.frames, job=job)
+    enqueue_stream_event(conn, row.tenant_id, stream, state, frames=row.frames, job=job)
     return True
 
 
@@ -277,9 +277,9 @@ def _row(row: sa.RowMapping) -> StreamRow:
     return StreamRow(**values)
 
 
-def tell_of_stream(
+def enqueue_stream_event(
     conn: sa.Connection, tenant: str, stream: UUID, state: StreamState, *, frames: int, job: UUID | None
 ) -> None:
     """Tell of a stream that is over; `job` makes its clip."""
     data = {"stream": stream, "state": state, "counters": {"frames": frames}, "job": job}
-    tell(conn, tenant, EventKind.STREAM_ENDED, data)
+    enqueue_event(conn, tenant, EventKind.STREAM_ENDED, data)

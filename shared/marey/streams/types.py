@@ -9,8 +9,8 @@ from typing import NamedTuple
 from uuid import UUID
 
 from marey.jobs.types import Problem
-from marey.streams.acts import Begun
-from marey.streams.reads import ReadAs
+from marey.streams.actions import ActionStart
+from marey.streams.rewrites import PromptRewrite
 from marey.streams.states import StreamState
 
 
@@ -71,7 +71,7 @@ class StreamPrompt(NamedTuple):
     frame: int
     """From which it was in force."""
     prompt: str
-    read: ReadAs | None = None
+    read: PromptRewrite | None = None
     """None where that is not on record."""
 
 
@@ -88,7 +88,7 @@ class StreamPast:
     row: StreamRow
     tokens: bytes = field(repr=False)
     prompts: tuple[tuple[int, str], ...]
-    acts: tuple[Begun, ...]
+    acts: tuple[ActionStart, ...]
 
 
 @dataclass(frozen=True)
@@ -111,5 +111,5 @@ class StreamChunk:
     prompts: Sequence[tuple[int, str]]
     control: str
     state: StreamState | None = None
-    acts: Sequence[Begun] = ()
-    reads: Sequence[ReadAs] | None = None
+    acts: Sequence[ActionStart] = ()
+    reads: Sequence[PromptRewrite] | None = None

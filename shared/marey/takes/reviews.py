@@ -23,7 +23,7 @@ from marey.jobs.submit import write_items
 from marey.jobs.types import SEED_LIMIT, ItemRow, MotionRow, NewItem
 from marey.streams import tables as stream_tables
 from marey.takes.types import Reroll
-from marey.tenants.quotas import take_room
+from marey.tenants.quotas import reserve_quotas
 
 MAX_REVIEWED = 1000
 """Motions of one call."""
@@ -136,7 +136,7 @@ def _roll_again(
     if not sources:
         return set()
     _refuse_streams(conn, [item.id for item in sources])
-    take_room(conn, job.tenant, len(sources))
+    reserve_quotas(conn, job.tenant, len(sources))
     numbers = _Numbers(conn, job.id, {item.index for item in sources})
     takes = [
         replace(

@@ -12,7 +12,7 @@ from marey.tenants.keys import (
     revoke_key,
     rotate_key,
 )
-from marey.tenants.quotas import check_room, usage
+from marey.tenants.quotas import check_quotas, usage
 from marey.tenants.repository import (
     create_tenant,
     get_tenant,
@@ -21,7 +21,17 @@ from marey.tenants.repository import (
     set_quotas,
     suspend_tenant,
 )
-from marey.tenants.types import DEFAULT_TENANT, Actor, ApiKey, AuditRow, NewApiKey, Quotas, Room, TenantRow, Usage
+from marey.tenants.types import (
+    DEFAULT_TENANT,
+    Actor,
+    ApiKey,
+    AuditRow,
+    NewApiKey,
+    QuotaHeadroom,
+    Quotas,
+    TenantRow,
+    Usage,
+)
 
 __all__ = [
     "DEFAULT_TENANT",
@@ -30,14 +40,14 @@ __all__ = [
     "ApiKey",
     "AuditRow",
     "NewApiKey",
+    "QuotaHeadroom",
     "Quotas",
-    "Room",
     "TenantRow",
     "Usage",
     "audit",
     "authenticate",
     "check_key",
-    "check_room",
+    "check_quotas",
     "create_key",
     "create_tenant",
     "get_tenant",

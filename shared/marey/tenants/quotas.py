@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from marey.core.errors import QuotaUsedUp
 from marey.tenants import tables
 from marey.tenants.repository import get_tenant
-from marey.tenants.types import Room, Usage
+from marey.tenants.types import QuotaHeadroom, Usage
 
 EXPECTED_BYTES = 512 * 2**10
 """Of a motion's files where the tenant has none yet: five seconds as npz and BVH."""
@@ -65,7 +65,7 @@ def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
         _refuse_beyond(tenant, _in_queue(quotas.queued, _open_items(conn, tenant)[0], items))
 
 
-def check_room(conn: sa.Connection, tenant: str, items: int) -> tuple[Room, ...]:
+def check_quotas(conn: sa.Connection, tenant: str, items: int) -> tuple[QuotaHeadroom, ...]:
     """What so many more items would take of each quota that a tenant has; others may take of the same room.
 
     Raises:
@@ -76,19 +76,19 @@ def check_room(conn: sa.Connection, tenant: str, items: int) -> tuple[Room, ...]
     if quotas.queued is None and quotas.bytes is None:
         return ()
     queued, _ = _open_items(conn, tenant)
-    rooms: list[Room] = []
+    headrooms: list[QuotaHeadroom] = []
     if quotas.queued is not None:
-        rooms.append(_in_queue(quotas.queued, queued, items))
-        _refuse_beyond(tenant, rooms[-1])
+        headrooms.append(_in_queue(quotas.queued, queued, items))
+        _refuse_beyond(tenant, headrooms[-1])
     if quotas.bytes is not None:
         each = bytes_of_a_motion(conn, tenant)
-        rooms.append(Room("bytes", quotas.bytes, _stored(conn, tenant), queued * each, items * each))
-        _refuse_beyond(tenant, rooms[-1])
-    return tuple(rooms)
+        headrooms.append(QuotaHeadroom("bytes", quotas.bytes, _stored(conn, tenant), queued * each, items * each))
+        _refuse_beyond(tenant, headrooms[-1])
+    return tuple(headrooms)
 
 
-def take_room(conn: sa.Connection, tenant: str, items: int) -> None:
-    """`check_room`, and nobody else takes of the same room until the transaction ends.
+def reserve_quotas(conn: sa.Connection, tenant: str, items: int) -> None:
+    """`check_quotas`, and nobody else takes of the same room until the transaction ends.
 
     Raises:
         QuotaUsedUp, NotFound: as it.
@@ -97,10 +97,10 @@ def take_room(conn: sa.Connection, tenant: str, items: int) -> None:
     if quotas.queued is None and quotas.bytes is None:
         return
     _lock(conn, tenant)
-    check_room(conn, tenant, items)
+    check_quotas(conn, tenant, items)
 
 
-def room_to_run(conn: sa.Connection, tenant: str, wanted: int) -> int:
+def runnable_items(conn: sa.Connection, tenant: str, wanted: int) -> int:
     """How many of `wanted` items a tenant may run beside those it runs; its row stays locked."""
     _lock(conn, tenant)
     limit = get_tenant(conn, tenant).quotas.running
@@ -131,42 +131,43 @@ def _stored(conn: sa.Connection, tenant: str) -> int:
     return conn.execute(STORED, {"tenant": tenant}).scalar_one()
 
 
-def _in_queue(limit: int, queued: int, asked: int) -> Room:
-    return Room("queued", limit, queued, 0, asked)
+def _in_queue(limit: int, queued: int, asked: int) -> QuotaHeadroom:
+    return QuotaHeadroom("queued", limit, queued, 0, asked)
 
 
-def _refuse_beyond(tenant: str, room: Room) -> None:
-    if room.asked <= room.limit - room.used:
+def _refuse_beyond(tenant: str, headroom: QuotaHeadroom) -> None:
+    if headroom.asked <= headroom.limit - headroom.used:
         return
-    message, hint, seconds = (_queue_full if room.quota == "queued" else _store_full)(room)
+    message, hint, seconds = (_queue_full if headroom.quota == "queued" else _store_full)(headroom)
     raise QuotaUsedUp(
         message,
         where=f"tenant {tenant}",
         hint=hint,
         seconds=seconds,
-        quota=room.quota,
-        limit=room.limit,
-        used=room.used,
-        asked=room.asked,
+        quota=headroom.quota,
+        limit=headroom.limit,
+        used=headroom.used,
+        asked=headroom.asked,
     )
 
 
-def _queue_full(room: Room) -> tuple[str, str, int]:
+def _queue_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
     """What is said, what to do, and when to ask again."""
     return (
-        f"{room.asked} items are more than the quota of queued items has room for: "
-        f"{room.used} of {room.limit} are queued, {room.left} are left",
+        f"{headroom.asked} items are more than the quota of queued items has room for: "
+        f"{headroom.used} of {headroom.limit} are queued, {headroom.left} are left",
         "Ask again when some are done."
-        if room.asked <= room.limit
+        if headroom.asked <= headroom.limit
         else "Submit it as several jobs, one after the other.",
         QUEUE_SECONDS,
     )
 
 
-def _store_full(room: Room) -> tuple[str, str, int]:
+def _store_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
     return (
-        f"some {room.asked} bytes are more than the quota of stored bytes has room for: {room.stands} of {room.limit} "
-        f"are stored, {room.expected} expected of what is queued, {room.left} are left",
+        f"some {headroom.asked} bytes are more than the quota of stored bytes has room for: "
+        f"{headroom.stands} of {headroom.limit} are stored, "
+        f"{headroom.expected} expected of what is queued, {headroom.left} are left",
         "Delete jobs whose motions are fetched; the operator's next `marey admin gc` frees their bytes.",
         BYTES_SECONDS,
     )

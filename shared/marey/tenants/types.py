@@ -39,7 +39,7 @@ class Usage:
 
 
 @dataclass(frozen=True)
-class Room:
+class QuotaHeadroom:
     """What something would take of a quota: items, or bytes."""
 
     quota: str

@@ -27,7 +27,7 @@ WRITE = sa.text("""
 """)
 
 
-def tell(conn: sa.Connection, tenant: str, kind: EventKind, data: Mapping[str, object]) -> None:
+def enqueue_event(conn: sa.Connection, tenant: str, kind: EventKind, data: Mapping[str, object]) -> None:
     """Write an event for the webhooks of a tenant that want it; nothing, if none does."""
     values = {"tenant": tenant, "kind": str(kind), "event": new_id(), "data": json.dumps(data, default=str)}
     conn.execute(WRITE, values)

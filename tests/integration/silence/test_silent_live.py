@@ -14,7 +14,7 @@ import sqlalchemy as sa
 from marey.core.errors import Unreachable
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.runtime.live.main import REDIS_SECONDS
 from marey.runtime.queue import SOCKET_SCHEME, redis_client
 from marey.streams import StreamState
@@ -71,7 +71,7 @@ def test_frames_go_on_after_redis_fell_silent(
             f"redis://127.0.0.1:{proxy.port}/0", timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS
         ) as worker_client,
     ):
-        worker = LiveWorker(engine, worker_client, lambda: LiveRoom(generator, STREAMS))
+        worker = LiveWorker(engine, worker_client, lambda: LiveSessionPool(generator, STREAMS))
         try:
             streams = [studio.begin("a person walks", seed=seed) for seed in range(STREAMS)]
             studio.until(lambda: all(studio.row(one).state is StreamState.LIVE for one in streams), "the streams")

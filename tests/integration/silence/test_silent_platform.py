@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.api import tailer as tailer_module
+from marey.api import broadcaster as tailer_module
 from marey.cli.watching import watch_job
 from marey.db import create_engine, outages
 from marey.embedded import EmbeddedServer

@@ -13,8 +13,8 @@ from marey.core.settings import Settings
 from marey.motion.skeleton import HUMANML3D
 from marey.streams import StreamState
 from marey.streams.control import Control
-from marey.streams.reads import ReadAs
-from marey.streams.watch import Watch
+from marey.streams.presence import ViewerPresence
+from marey.streams.rewrites import PromptRewrite
 from tests.support.live_api import ApiThread, LiveApi
 from tests.support.live_streams import Hand, watching
 from tests.support.streams_api import LATE, WALK, begin, beside, until
@@ -135,12 +135,12 @@ def test_a_client_that_takes_nothing_any_more_is_let_go(
 def test_a_stream_is_watched_as_long_as_a_socket_is_open(
     api: LiveApi, stream: str, secret: str, client: redis.Redis
 ) -> None:
-    watch = Watch(client, stream)
-    assert not watch.seen()
+    presence = ViewerPresence(client, stream)
+    assert not presence.is_active()
     with watching(api.url, stream, secret) as viewer:
-        until(watch.seen)
-        client.delete(watch.key)
-        until(watch.seen)
+        until(presence.is_active)
+        client.delete(presence.key)
+        until(presence.is_active)
         viewer.until("stream")
 
 
@@ -157,7 +157,7 @@ def test_a_client_is_told_when_a_worker_takes_the_stream_and_of_each_new_prompt(
         hand.show(20)
         hand.note((0, WALK["prompt"]))
         hand.show(10, prompt=1)
-        hand.note((20, "a person jumps"), reads=[ReadAs("a person leaps")])
+        hand.note((20, "a person jumps"), reads=[PromptRewrite("a person leaps")])
         told = viewer.until("stream").of("stream")[-1]["stream"]
         while len(told["prompts"]) < 2:
             told = viewer.until("stream").of("stream")[-1]["stream"]

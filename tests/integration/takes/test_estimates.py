@@ -10,7 +10,7 @@ import sqlalchemy as sa
 from marey.db import transaction
 from marey.jobs import (
     NewMotion,
-    WorkerBeat,
+    WorkerHeartbeat,
     beat,
     begin_assets,
     cancel,
@@ -39,7 +39,7 @@ def measured(engine: sa.Engine) -> Iterator[sa.Engine]:
         begin_assets(conn, claimed.lease_token, [motion.files["npz"] for motion in motions])
         commit_motions(conn, claimed.lease_token, motions)
         for name in ("a", "b"):
-            beat(conn, WorkerBeat(name, "hgm3", "here", 1, "cpu"))
+            beat(conn, WorkerHeartbeat(name, "hgm3", "here", 1, "cpu"))
     return engine
 
 

@@ -39,10 +39,10 @@ from marey.streams import (
     create_stream,
     end_stream,
     get_stream,
+    prompts_with_rewrites,
     take_stream,
-    told_prompts,
 )
-from marey.streams.reads import ReadAs
+from marey.streams.rewrites import PromptRewrite
 from marey.takes import KEPT, GarbageReport, collect_garbage, delete_expired, erase, rewrite_files
 from marey.tenants import DEFAULT_TENANT, create_key
 from tests.servers.audit import audit
@@ -140,7 +140,7 @@ def test_what_was_said_to_a_stream_is_erased_with_its_clip(engine: sa.Engine) ->
         key = create_key(conn, "live", ["submit"]).key.id
         stream = create_stream(conn, NewStream(DEFAULT_TENANT, key, PROMPT, "mogo", "m@0", 1, 9), limit=1)
         take_stream(conn, stream, 1, "worker")
-        read = ReadAs(f"{PROMPT} now", f"it leaves out {SECRET}")
+        read = PromptRewrite(f"{PROMPT} now", f"it leaves out {SECRET}")
         add_chunk(conn, stream, 1, StreamChunk(0, 2, b"0" * 8, [(0, PROMPT)], "1-0", reads=[read]))
         clip = new_item(0, PROMPT, model="mogo", text_key="stream-1")
         end_stream(conn, stream, 1, "stopped", clip=(clip, PROMPT.encode()))
@@ -148,7 +148,7 @@ def test_what_was_said_to_a_stream_is_erased_with_its_clip(engine: sa.Engine) ->
         assert job is not None
         cancel(conn, DEFAULT_TENANT, job)
     with transaction(engine) as conn:
-        assert told_prompts(conn, stream)[0].read == read
+        assert prompts_with_rewrites(conn, stream)[0].read == read
         erase(conn, DEFAULT_TENANT, job, by="ann")
     assert SECRET not in dump(engine)
 

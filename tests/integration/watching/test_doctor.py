@@ -20,7 +20,7 @@ from marey.cli.checkup import models
 from marey.cli.findings import Check
 from marey.core.settings import Settings
 from marey.db import downgrade, transaction
-from marey.jobs import WorkerBeat, beat, beat_scheduler
+from marey.jobs import WorkerHeartbeat, beat, record_scheduler_heartbeat
 from marey.runtime.queue import redis_client
 from marey.storage import FolderStore
 from tests.servers.jobs import claim_some, parse_texts, submit_items
@@ -48,10 +48,10 @@ def test_items_that_nobody_serves_are_told_with_the_worker_to_start(engine: sa.E
     parse_texts(engine)
     bad(backing.workers(engine), "items wait in hgm3", "marey worker hgm3")
     with transaction(engine) as conn:
-        beat(conn, WorkerBeat("one", "hgm3", "here", 1, "cpu"))
+        beat(conn, WorkerHeartbeat("one", "hgm3", "here", 1, "cpu"))
     assert backing.workers(engine) == Check("workers", "ok", "1 live, for hgm3")
     with transaction(engine) as conn:
-        beat(conn, WorkerBeat("two", "hgm3", "there", 2, "cpu"))
+        beat(conn, WorkerHeartbeat("two", "hgm3", "there", 2, "cpu"))
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '1 hour' WHERE id = 'two'"))
     bad(backing.workers(engine), "two on there fell silent", state="warn")
 
@@ -61,7 +61,7 @@ def test_leases_that_nobody_takes_back_mean_that_no_scheduler_runs(engine: sa.En
     claim_some(engine, "text")
     bad(backing.scheduler(engine), "none was heard of", "marey scheduler", state="warn")
     with transaction(engine) as conn:
-        beat_scheduler(conn, "one", host="here", pid=1)
+        record_scheduler_heartbeat(conn, "one", host="here", pid=1)
     assert backing.scheduler(engine).state == "ok"
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE lease SET expires_at = now() - interval '1 minute'"))
@@ -70,7 +70,7 @@ def test_leases_that_nobody_takes_back_mean_that_no_scheduler_runs(engine: sa.En
 
 def test_a_scheduler_that_stalls_is_told_with_its_last_progress(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
-        beat_scheduler(conn, "one", host="here", pid=17)
+        record_scheduler_heartbeat(conn, "one", host="here", pid=17)
         conn.execute(sa.text("UPDATE worker SET seen_at = now() - interval '40 seconds'"))
     bad(backing.scheduler(engine), "on here (process 17)", "40 s ago", "marey scheduler")
     assert backing.workers(engine).message == "none was heard of lately"

@@ -8,7 +8,7 @@ from uuid import uuid4
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.api.tailer import last_progress_only
+from marey.api.broadcaster import last_progress_only
 from marey.http.ranges import parse_range
 from marey.jobs import EventRow
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.api.streams.door import first_frame, key_of
+from marey.api.streams.accept import first_frame, key_of
+from marey.api.streams.backpressure import BEHIND_FRAMES, LagTracker
 from marey.api.streams.messages import Rate
-from marey.api.streams.slow import BEHIND_FRAMES, Lag
-from marey.api.streams.wire import close_code
+from marey.api.streams.socket_writer import close_code
 from marey.core.errors import Busy, InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable
 
 
@@ -33,12 +33,12 @@ def test_what_is_no_number_of_a_frame_is_an_invalid_input(text: str) -> None:
 
 
 def test_a_client_that_catches_up_is_not_slow_and_one_that_falls_behind_is() -> None:
-    lag = Lag()
-    assert not any(lag.falls(behind) for behind in (1200, 1210, 900, 500, 530, 20, 20 + BEHIND_FRAMES))
-    assert lag.falls(20 + BEHIND_FRAMES + 1)
+    lag = LagTracker()
+    assert not any(lag.is_falling_behind(behind) for behind in (1200, 1210, 900, 500, 530, 20, 20 + BEHIND_FRAMES))
+    assert lag.is_falling_behind(20 + BEHIND_FRAMES + 1)
     lag.caught_up()
-    assert not lag.falls(BEHIND_FRAMES)
-    assert lag.falls(BEHIND_FRAMES + 1)
+    assert not lag.is_falling_behind(BEHIND_FRAMES)
+    assert lag.is_falling_behind(BEHIND_FRAMES + 1)
 
 
 def test_a_rate_lets_a_second_of_messages_through_at_once_and_then_as_many_a_second() -> None:

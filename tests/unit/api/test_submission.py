@@ -16,7 +16,7 @@ from marey.api.jobs.service import MAX_MODELS, Submission, read_document, read_n
 from marey.core.errors import NotFound, TooLarge
 from marey.core.settings import Settings
 from marey.items.item import MAX_UNKNOWN, InvalidItems
-from marey.jobs.offers import Offer
+from marey.jobs.generators import GeneratorCapabilities
 from tests.support.live_api import write_bundle
 
 
@@ -27,7 +27,7 @@ class Counting(Catalogue):
         super().__init__(config)
         self.missed = 0
 
-    def offer(self, name: str | None) -> Offer:
+    def offer(self, name: str | None) -> GeneratorCapabilities:
         try:
             return super().offer(name)
         except NotFound:

@@ -15,7 +15,7 @@ from marey.api.models.schemas import ModelsView
 from marey.bundles import Bundle, BundleWriter, TextSpec, choose_bundle, scan_bundles
 from marey.core.errors import InvalidBundle, MareyError
 from marey.core.settings import Settings
-from marey.jobs.offers import offers
+from marey.jobs.generators import offers
 
 GOOD, BAD = "a-good", "b-broken"
 

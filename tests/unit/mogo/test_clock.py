@@ -12,7 +12,7 @@ from marey.models.mogo.config import TINY
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.plan import STOPS
 from marey.models.mogo.streaming import Streams
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 
 from .networks import columns, prompts, transformer
 
@@ -59,7 +59,7 @@ def test_the_clock_of_an_act_that_goes_on_although_it_is_over_stops(frame: int, 
 
     def state() -> torch.Tensor:
         streams = Streams(packed, 1)
-        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=Begun(0, 0), lasts=[usual])
+        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=ActionStart(0, 0), lasts=[usual])
         return streams.states()
 
     before = state()
@@ -73,7 +73,7 @@ def test_guidance_is_told_no_time_where_it_is_told_no_prompt() -> None:
 
     def branches() -> tuple[torch.Tensor, torch.Tensor]:
         streams = Streams(packed, 1, replace(TINY.inference, guidance=2.0))
-        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=Begun(0, 0))
+        streams.start(prompts(1)[0], 1, past=columns(10)[0], began=ActionStart(0, 0))
         told, untold = streams.states().chunk(2, 1)
         return told, untold
 

@@ -11,10 +11,10 @@ from marey.core.errors import InvalidInput
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY
 from marey.models.mogo.generate import Generator, Settings
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.motion.live import LiveMotion
 from marey.runtime.live.port import LiveFrame
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 from marey.streams.frames import decode_frame, encode_frame
 from tests.support.prepared import text_features
 
@@ -24,7 +24,7 @@ def generator(tmp_path_factory: pytest.TempPathFactory) -> Generator:
     return Generator.load(random_bundle(tmp_path_factory.mktemp("mogo") / "random-tiny"), device="cpu", threads=1)
 
 
-def run(room: LiveRoom, session: int, frames: int) -> list[LiveFrame]:
+def run(room: LiveSessionPool, session: int, frames: int) -> list[LiveFrame]:
     return [room.step()[session] for _ in range(frames)]
 
 
@@ -33,7 +33,7 @@ def roots(frames: list[LiveFrame]) -> np.ndarray:
 
 
 def test_frames_are_those_of_the_whole_clip_decoded_at_once(generator: Generator) -> None:
-    room = LiveRoom(generator, 1)
+    room = LiveSessionPool(generator, 1)
     made = run(room, room.start(text_features(0), 3), 30)
     tokens = np.stack([frame.tokens for frame in made])
     features = generator.tokenizer.decode(generator.columns(tokens)[None])[0].numpy()
@@ -48,9 +48,9 @@ def test_frames_are_those_of_the_whole_clip_decoded_at_once(generator: Generator
 
 
 def test_sessions_come_and_go_and_disturb_nobody(generator: Generator) -> None:
-    alone = LiveRoom(generator, 1)
+    alone = LiveSessionPool(generator, 1)
     wanted = run(alone, alone.start(text_features(1), 5), 20)
-    room = LiveRoom(generator, 3)
+    room = LiveSessionPool(generator, 3)
     first = room.start(text_features(0), 1)
     found = [room.step() for _ in range(3)]
     mine = room.start(text_features(1), 5)
@@ -69,11 +69,11 @@ def test_sessions_come_and_go_and_disturb_nobody(generator: Generator) -> None:
 
 
 def test_a_session_goes_on_in_another_room_where_it_was(generator: Generator) -> None:
-    room = LiveRoom(generator, 1, Settings(temperature=0.0, upper_temperature=0.0))
+    room = LiveSessionPool(generator, 1, Settings(temperature=0.0, upper_temperature=0.0))
     session = room.start(text_features(0), 7)
     before = run(room, session, 60)
     after = run(room, session, 5)
-    other = LiveRoom(generator, 2, Settings(temperature=0.0, upper_temperature=0.0))
+    other = LiveSessionPool(generator, 2, Settings(temperature=0.0, upper_temperature=0.0))
     other.start(text_features(3), 1)
     tokens = np.stack([made.tokens for made in before])
     resumed = run(other, other.start(text_features(0), 7, past=tokens, prompt=2), 5)
@@ -87,7 +87,7 @@ def test_a_session_goes_on_in_another_room_where_it_was(generator: Generator) ->
 
 def test_a_steer_counts_the_prompt_and_changes_what_follows(generator: Generator) -> None:
     guided = Settings(guidance=10.0)  # random weights hear a prompt so softly that few draws would differ
-    rooms = [LiveRoom(generator, 1, guided) for _ in range(2)]
+    rooms = [LiveSessionPool(generator, 1, guided) for _ in range(2)]
     sessions = [room.start(text_features(0), 4) for room in rooms]
     same = [run(room, session, 6) for room, session in zip(rooms, sessions, strict=True)]
     rooms[1].steer(sessions[1], text_features(1))
@@ -98,9 +98,9 @@ def test_a_steer_counts_the_prompt_and_changes_what_follows(generator: Generator
 
 
 def test_a_paused_session_goes_on_with_the_frames_it_would_have_shown(generator: Generator) -> None:
-    alone = LiveRoom(generator, 1)
+    alone = LiveSessionPool(generator, 1)
     wanted = run(alone, alone.start(text_features(1), 5), 12)
-    room = LiveRoom(generator, 2)
+    room = LiveSessionPool(generator, 2)
     mine, other = room.start(text_features(1), 5), room.start(text_features(0), 2)
     found = [room.step()[mine] for _ in range(4)]
     room.pause(mine)
@@ -122,7 +122,7 @@ def test_a_paused_session_goes_on_with_the_frames_it_would_have_shown(generator:
 
 
 def test_a_session_catches_up_alone_and_all_go_on_as_if_it_had_not_been_behind(generator: Generator) -> None:
-    room, alike = LiveRoom(generator, 3), LiveRoom(generator, 3)
+    room, alike = LiveSessionPool(generator, 3), LiveSessionPool(generator, 3)
     others, mine = [room.start(text_features(0), 2), room.start(text_features(2), 3)], room.start(text_features(1), 5)
     found = {name: [frame] for name, frame in room.step().items()}
     found[mine] += room.catch_up(mine, 6)
@@ -139,7 +139,7 @@ def test_a_session_catches_up_alone_and_all_go_on_as_if_it_had_not_been_behind(g
 
 
 def test_frames_can_be_sent(generator: Generator) -> None:
-    room = LiveRoom(generator, 1)
+    room = LiveSessionPool(generator, 1)
     (made,) = run(room, room.start(text_features(0), 0), 1)
     sent = decode_frame(encode_frame(made.frame), joints=len(room.skeleton.joint_names))
     assert (sent.number, sent.prompt, sent.contacts) == (0, 0, made.frame.contacts)
@@ -147,7 +147,7 @@ def test_frames_can_be_sent(generator: Generator) -> None:
 
 
 def test_what_cannot_be_is_refused_and_leaves_the_room_as_it_was(generator: Generator) -> None:
-    room = LiveRoom(generator, 1)
+    room = LiveSessionPool(generator, 1)
     for start in (
         lambda: room.start(text_features(0, width=512), 0),
         lambda: room.start(text_features(0), -1),
@@ -165,7 +165,7 @@ def test_what_cannot_be_is_refused_and_leaves_the_room_as_it_was(generator: Gene
         room.start(text_features(0), 1)
     assert set(room.step()) == {session}
     with pytest.raises(InvalidInput):
-        LiveRoom(generator, 1, replace(Settings(), top_k=2.0))
+        LiveSessionPool(generator, 1, replace(Settings(), top_k=2.0))
 
 
 ACTS = replace(
@@ -175,7 +175,7 @@ ACTS = replace(
 )
 
 
-def in_second_act(generator: Generator, room: LiveRoom) -> tuple[int, list[LiveFrame], int]:
+def in_second_act(generator: Generator, room: LiveSessionPool) -> tuple[int, list[LiveFrame], int]:
     """A session five frames into its second act: its name, its frames, and the one at which that act began."""
     session = room.start(ACTS, 7)
     made = run(room, session, 1)
@@ -186,12 +186,12 @@ def in_second_act(generator: Generator, room: LiveRoom) -> tuple[int, list[LiveF
 
 
 def test_a_session_goes_on_with_the_act_that_plays(generator: Generator) -> None:
-    room = LiveRoom(generator, 1)
+    room = LiveSessionPool(generator, 1)
     session, made, began = in_second_act(generator, room)
     assert 0 < began <= generator.acts(ACTS)[1][0]
     tokens = np.stack([frame.tokens for frame in made])
-    other = LiveRoom(generator, 2)
-    resumed = other.start(ACTS, 7, past=tokens, prompt=0, began=Begun(began, 1))
+    other = LiveSessionPool(generator, 2)
+    resumed = other.start(ACTS, 7, past=tokens, prompt=0, began=ActionStart(began, 1))
     assert {frame.act for frame in run(other, resumed, 60)} == {1}
     room.pause(session)
     room.resume(session)
@@ -199,18 +199,18 @@ def test_a_session_goes_on_with_the_act_that_plays(generator: Generator) -> None
 
 
 def test_an_act_that_plays_ends_when_it_would_have_ended(generator: Generator) -> None:
-    room = LiveRoom(generator, 2, Settings(temperature=0.0, upper_temperature=0.0))
+    room = LiveSessionPool(generator, 2, Settings(temperature=0.0, upper_temperature=0.0))
     _, made, began = in_second_act(generator, room)
     tokens = np.stack([frame.tokens for frame in made[: began - 3]])
-    resumed = room.start(ACTS, 7, past=tokens, prompt=0, began=Begun(0, 0))
+    resumed = room.start(ACTS, 7, past=tokens, prompt=0, began=ActionStart(0, 0))
     acts = [room.step()[resumed].act for _ in range(generator.acts(ACTS)[1][0])]
     assert 0 in acts[:1]
     assert acts.index(1) + began - 3 <= generator.acts(ACTS)[1][0]  # not a whole first act from here on
 
 
 def test_a_place_that_the_prompt_does_not_have_is_refused(generator: Generator) -> None:
-    room = LiveRoom(generator, 1)
-    for began in (Begun(0, 2), Begun(1, 0), Begun(-1, 0), Begun(0, -1)):
+    room = LiveSessionPool(generator, 1)
+    for began in (ActionStart(0, 2), ActionStart(1, 0), ActionStart(-1, 0), ActionStart(0, -1)):
         with pytest.raises(InvalidInput, match="no place"):
             room.start(ACTS, 0, began=began)
         assert len(room) == 0

@@ -13,7 +13,7 @@ import torch
 from marey.models.mogo.bundle import random_bundle
 from marey.models.mogo.config import TINY
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.replay import Replayed
 from marey.models.mogo.streaming import Streams
@@ -128,7 +128,7 @@ def test_states_on_a_gpu_are_those_of_the_processor() -> None:
 @on_a_gpu
 def test_a_room_on_a_gpu_shows_frames(tmp_path: Path) -> None:
     generator = Generator.load(random_bundle(tmp_path / "random", "tiny"), device="cuda")
-    room = LiveRoom(generator, 3)
+    room = LiveSessionPool(generator, 3)
     names = [room.start(text_features(seed), seed) for seed in range(3)]
     frames = [room.step() for _ in range(30)]
     assert all(np.isfinite(shown[name].frame.root).all() for shown in frames for name in names)

@@ -12,7 +12,7 @@ from marey.models.mogo.config import TINY, InferenceConfig, MOGOConfig
 from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.streaming import Streams
 from marey.nn.sampling import guide
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 from tests.support.processors import PACKED_TYPES
 
 from .networks import columns, opened, prompts, transformer
@@ -198,7 +198,7 @@ def test_a_stream_goes_on_behind_frames_that_were_made_before() -> None:
     whole = model(prompts(1), tokens, skipped=torch.tensor([skipped]))[0]
     read = WINDOW - 4
     streams = opened(model, 1)
-    streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped, began=Begun(0, 0))
+    streams.start(said(0), 1, past=tokens[0, :read], skipped=skipped, began=ActionStart(0, 0))
     for frame in range(read, WINDOW):
         found = logits_of(model, streams.states(), tokens[0, frame])
         torch.testing.assert_close(found, whole[:, frame], atol=1e-5, rtol=0)

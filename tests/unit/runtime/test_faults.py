@@ -5,7 +5,14 @@ import pytest
 import torch
 
 from marey.core.errors import InvalidInput, Unreachable
-from marey.runtime.faults import HandlerError, OutOfMemory, as_problem, is_device_lost, is_out_of_memory, patiently
+from marey.runtime.faults import (
+    HandlerError,
+    OutOfMemory,
+    as_problem,
+    is_device_lost,
+    is_out_of_memory,
+    retry_unreachable,
+)
 
 
 class Door:
@@ -23,13 +30,13 @@ class Door:
 
 
 def test_an_outage_shorter_than_the_patience_is_ridden_out() -> None:
-    assert patiently(Door(3), seconds=30.0) == "open"
+    assert retry_unreachable(Door(3), seconds=30.0) == "open"
 
 
 def test_a_longer_outage_is_told() -> None:
     door = Door(10**6)
     with pytest.raises(Unreachable, match="closed"):
-        patiently(door, seconds=0.5)
+        retry_unreachable(door, seconds=0.5)
     assert door.knocks > 1
 
 
@@ -41,7 +48,7 @@ def test_other_errors_are_not_retried() -> None:
         raise InvalidInput("no")
 
     with pytest.raises(InvalidInput):
-        patiently(refuse, seconds=5.0)
+        retry_unreachable(refuse, seconds=5.0)
     assert len(calls) == 1
 
 
@@ -50,7 +57,7 @@ def test_a_stop_ends_the_patience_at_once() -> None:
     threading.Timer(0.3, stopping.set).start()
     started = time.monotonic()
     with pytest.raises(Unreachable):
-        patiently(Door(10**6), seconds=60.0, stopping=stopping)
+        retry_unreachable(Door(10**6), seconds=60.0, stopping=stopping)
     assert time.monotonic() - started < 30.0
 
 

@@ -6,8 +6,7 @@ from uuid import UUID, uuid4
 import pytest
 
 from marey.core.errors import Unreachable
-from marey.jobs import Claim, ClaimedItem, Stage
-from marey.jobs import Heartbeat as Answer
+from marey.jobs import Claim, ClaimedItem, HeartbeatReply, Stage
 from marey.runtime.lease import Heartbeat, HeldLease
 
 
@@ -27,11 +26,11 @@ class Database:
 
     def __init__(self) -> None:
         self.asked: list[tuple[set[UUID], bool]] = []
-        self.answer = Answer(lost=False, gone=frozenset())
+        self.answer = HeartbeatReply(lost=False, gone=frozenset())
         self.away = False
         self.asked_at: list[float] = []
 
-    def renew(self, _token: UUID, items: Collection[UUID], progressed: bool) -> Answer:
+    def renew(self, _token: UUID, items: Collection[UUID], progressed: bool) -> HeartbeatReply:
         self.asked.append((set(items), progressed))
         self.asked_at.append(time.monotonic())
         if self.away:
@@ -52,7 +51,7 @@ def heartbeat(database: Database) -> Heartbeat:
 def test_a_cancelled_item_is_dropped_and_its_neighbours_are_not(database: Database, heartbeat: Heartbeat) -> None:
     lease = heartbeat.hold(make_claim(3))
     cancelled = lease.claim.items[1].id
-    database.answer = Answer(lost=False, gone=frozenset({cancelled}))
+    database.answer = HeartbeatReply(lost=False, gone=frozenset({cancelled}))
     heartbeat.beat()
     assert lease.dropped() == {cancelled}
     assert lease.open == {lease.claim.items[0].id, lease.claim.items[2].id}
@@ -60,7 +59,7 @@ def test_a_cancelled_item_is_dropped_and_its_neighbours_are_not(database: Databa
 
 def test_a_lost_lease_drops_everything(database: Database, heartbeat: Heartbeat) -> None:
     lease = heartbeat.hold(make_claim(3))
-    database.answer = Answer(lost=True, gone=frozenset())
+    database.answer = HeartbeatReply(lost=True, gone=frozenset())
     heartbeat.beat()
     assert lease.dropped() == lease.lost == {item.id for item in lease.claim.items}
     assert not lease.open
@@ -178,7 +177,7 @@ def test_a_batch_that_hangs_on_after_its_lease_was_lost_ends_its_child(database:
         stuck=lambda: stuck.append(True) or heartbeat.close(),
     )
     heartbeat.hold(make_claim(2))
-    database.answer = Answer(lost=True, gone=frozenset())
+    database.answer = HeartbeatReply(lost=True, gone=frozenset())
     heartbeat.start()
     heartbeat.join(30.0)
     assert stuck == [True]
@@ -188,9 +187,9 @@ def test_only_a_silent_batch_of_which_nothing_is_ours_counts_as_stuck(database: 
     heartbeat = Heartbeat(database.renew, interval=60.0, stopping=threading.Event())
     lease = heartbeat.hold(make_claim(2))
     assert not lease.stuck(0.0)  # silent, but ours
-    lease.learn(Answer(lost=False, gone=frozenset({lease.claim.items[0].id})))
+    lease.learn(HeartbeatReply(lost=False, gone=frozenset({lease.claim.items[0].id})))
     assert not lease.stuck(0.0)  # half of it is
-    lease.learn(Answer(lost=True, gone=frozenset()))
+    lease.learn(HeartbeatReply(lost=True, gone=frozenset()))
     assert lease.stuck(0.0)
     assert not lease.stuck(3600.0)
     lease.exempt()
@@ -208,12 +207,12 @@ def test_a_batch_that_waits_behind_a_slow_store_is_neither_silent_nor_stuck(
     heartbeat.beat()
     heartbeat.beat()
     assert [progressed for _, progressed in database.asked] == [True, True, True, False]
-    lease.learn(Answer(lost=True, gone=frozenset()))
+    lease.learn(HeartbeatReply(lost=True, gone=frozenset()))
     assert lease.stuck(0.0)
 
 
 def test_what_was_taken_away_while_it_waited_ends_no_child(heartbeat: Heartbeat) -> None:
     lease = heartbeat.hold(make_claim(1))
     lease.hand_over()
-    lease.learn(Answer(lost=True, gone=frozenset()))
+    lease.learn(HeartbeatReply(lost=True, gone=frozenset()))
     assert not lease.stuck(0.0)

@@ -9,7 +9,7 @@ from marey.core.errors import Unreachable
 from marey.runtime.status import (
     FRESH,
     TICK_LIMIT,
-    Teller,
+    StatusReporter,
     WorkerStatus,
     check_health,
     forget_dead,
@@ -74,14 +74,14 @@ def test_a_process_without_children_tells_of_itself_until_it_stops(tmp_path: Pat
         asked.set()
         return silence[0]
 
-    teller = Teller(tmp_path, "scheduler", told, stopping)
-    teller.start()
+    reporter = StatusReporter(tmp_path, "scheduler", told, stopping)
+    reporter.start()
     assert asked.wait(60)
     while not (tmp_path / "run" / "worker-scheduler.json").exists():
         time.sleep(0.01)
     assert healthy(tmp_path, ready=True)
     stopping.set()
-    teller.join(60)
+    reporter.join(60)
     assert not healthy(tmp_path), "who has gone is not healthy"
 
 

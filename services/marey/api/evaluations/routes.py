@@ -14,7 +14,7 @@ from marey.api.context import Connection, Shared, deadline
 from marey.api.evaluations import service
 from marey.api.evaluations.comparison import ComparisonView, compare_runs
 from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
-from marey.api.files import FILE_RESPONSES, AskedPart, file_response
+from marey.api.files import FILE_RESPONSES, FileRequest, file_response
 from marey.core.errors import NotFound
 from marey.http.bodies import kept_body
 from marey.http.problems import RESPONSES
@@ -82,7 +82,7 @@ def get_report(
     shared: Shared,
     conn: Connection,
     key: Reader,
-    part: AskedPart,
+    part: FileRequest,
 ) -> Response:
     """The report of an evaluation that is done; its ETag is its sha256."""
     row = evaluations.get_evaluation(conn, key.tenant, evaluation)

@@ -10,11 +10,11 @@ from uuid import UUID
 from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 from starlette.types import Receive, Scope, Send
 
+from marey.api.broadcaster import EventBroadcaster
 from marey.api.jobs.schemas import EventView
-from marey.api.tailer import Tailer
 from marey.core.errors import Busy, InvalidInput
-from marey.http.places import Places
 from marey.http.problems import problem_response
+from marey.http.slots import SlotCounter
 from marey.jobs import EventRow
 from marey.tenants import ApiKey
 
@@ -43,25 +43,25 @@ class EventStream(EventSourceResponse):
     none, the answer is a problem.
     """
 
-    def __init__(self, places: Places, key: ApiKey, content: AsyncIterator[bytes]) -> None:
+    def __init__(self, places: SlotCounter, key: ApiKey, content: AsyncIterator[bytes]) -> None:
         super().__init__(content, headers={"Cache-Control": "no-cache", "X-Accel-Buffering": "no"})
-        self._places, self._key = places, key
+        self._slots, self._key = places, key
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer."""
         with ExitStack() as stack:
             try:
-                stack.enter_context(self._places.take(self._key))
+                stack.enter_context(self._slots.take(self._key))
             except Busy as error:
                 await problem_response(error)(scope, receive, send)
             else:
                 await super().__call__(scope, receive, send)
 
 
-async def stream_events(tailer: Tailer, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[bytes]:
+async def stream_events(broadcaster: EventBroadcaster, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[bytes]:
     """The events after `seq` as they happen, until the job has ended or is deleted, or the key is no longer valid."""
     yield format_sse_event(retry=RETRY_MILLISECONDS)
-    async with tailer.follow(key, job, seq) as subscription:
+    async with broadcaster.follow(key, job, seq) as subscription:
         while True:
             try:
                 async with asyncio.timeout(PING_SECONDS):

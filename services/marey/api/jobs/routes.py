@@ -113,7 +113,7 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
 def _check(shared: Context, key: tenants.ApiKey, submission: service.Submission) -> JSONResponse:
     by_bundle = submission.by_bundle
     with db.transaction(shared.engine, db.SEARCH) as conn:
-        rooms = tenants.check_room(conn, key.tenant, submission.count)
+        rooms = tenants.check_quotas(conn, key.tenant, submission.count)
         estimate = jobs.estimate(conn, by_bundle)
         waiting = jobs.waiting_items(conn)
     checked = CheckedView(
@@ -325,7 +325,7 @@ def list_events(
     seq = last_event_id(last, after)
     if row.state in ENDED and seq >= row.event_seq:
         return Response(status_code=204)
-    return EventStream(shared.event_streams, key, stream_events(shared.tailer, key, job, seq))
+    return EventStream(shared.event_streams, key, stream_events(shared.broadcaster, key, job, seq))
 
 
 SCHEMAS = (NewJobBody, NewItemBody)

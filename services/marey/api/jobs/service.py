@@ -16,7 +16,7 @@ from marey.api.jobs.schemas import JobFields
 from marey.core.errors import InvalidInput, MareyError, TooLarge
 from marey.items.item import InvalidItems, Problem, read_items, read_json
 from marey.jobs import NewItem
-from marey.jobs.offers import Offer, new_items
+from marey.jobs.generators import GeneratorCapabilities, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100
@@ -37,7 +37,7 @@ class Submission:
     by_bundle: Counter[tuple[str, str]]
     """Motions by model and exact bundle."""
     _raws: Raws
-    _offers: Mapping[str | None, Offer]
+    _offers: Mapping[str | None, GeneratorCapabilities]
     """The exact bundle by what the item says of its model."""
 
     @property
@@ -94,7 +94,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 
 def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
-    offers: dict[str | None, Offer] = {}
+    offers: dict[str | None, GeneratorCapabilities] = {}
     failed: dict[str | None, MareyError] = {}
     """Models of a body by name; a missing one is looked up once, however many lines name it."""
     default_model: set[Problem] = set()

@@ -11,7 +11,7 @@ from marey.api.context import Shared
 from marey.api.models.schemas import ModelsView, ModelView
 from marey.bundles import named_by
 from marey.http.problems import RESPONSES
-from marey.jobs.offers import offers
+from marey.jobs.generators import offers
 
 router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from marey.bundles import BrokenBundle
 from marey.http.schemas import View
-from marey.jobs.offers import Offer, Offers
+from marey.jobs.generators import GeneratorCapabilities, GeneratorList
 
 
 class DataView(View):
@@ -37,7 +37,7 @@ class ModelView(View):
     metrics: dict[str, float]
 
     @classmethod
-    def of(cls, offer: Offer) -> ModelView:
+    def of(cls, offer: GeneratorCapabilities) -> ModelView:
         """From an offer."""
         manifest = offer.bundle.manifest
         own = ("name", "model", "version", "config", "random", "licence", "commercial", "skeleton", "fps", "metrics")
@@ -72,7 +72,7 @@ class ModelsView(View):
     """Bundles that are left out, each with the reason."""
 
     @classmethod
-    def of(cls, offers: Offers) -> ModelsView:
+    def of(cls, offers: GeneratorList) -> ModelsView:
         """From what this machine offers."""
         return cls(
             items=[ModelView.of(offer) for offer in offers.found],

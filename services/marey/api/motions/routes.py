@@ -14,7 +14,7 @@ from marey import takes as takes_store
 from marey.api.audit import note
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
-from marey.api.files import FILE_RESPONSES, AskedPart, file_response
+from marey.api.files import FILE_RESPONSES, FileRequest, file_response
 from marey.api.motions.schemas import (
     MotionDetailView,
     MotionView,
@@ -119,7 +119,7 @@ def get_file(
     shared: Shared,
     conn: Connection,
     key: Reader,
-    part: AskedPart,
+    part: FileRequest,
 ) -> Response:
     """A file of a motion; its ETag is its sha256."""
     row = jobs.get_motion(conn, key.tenant, motion)

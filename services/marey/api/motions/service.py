@@ -8,7 +8,7 @@ from marey.api.catalogue import Catalogue
 from marey.core.errors import Conflict, MareyError
 from marey.items.item import Item
 from marey.jobs import ItemRow, MotionRow, NewItem
-from marey.jobs.offers import new_items
+from marey.jobs.generators import new_items
 
 WORDS = 48
 """Characters of the prompt in the name of a file."""

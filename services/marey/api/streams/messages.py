@@ -10,7 +10,7 @@ from marey.api.auth import check_scope
 from marey.api.context import Context
 from marey.api.stream_hub import Hub
 from marey.api.streams import service
-from marey.api.streams.wire import Wire
+from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import Busy, MareyError, TooLarge
 from marey.items.prompts import check_prompt
 from marey.streams.control import Control
@@ -43,19 +43,19 @@ class Rate:
 class Messages:
     """Reads what one client sends and passes it on, one message after the other."""
 
-    def __init__(self, wire: Wire, hub: Hub, shared: Context, key: ApiKey, stream: UUID) -> None:
-        self._wire, self._hub, self._shared, self._key, self._stream = wire, hub, shared, key, stream
+    def __init__(self, writer: SocketWriter, hub: Hub, shared: Context, key: ApiKey, stream: UUID) -> None:
+        self._writer, self._hub, self._shared, self._key, self._stream = writer, hub, shared, key, stream
         self._rate = Rate(A_SECOND)
 
     async def obey(self) -> None:
         """Until the client, or the server, goes away."""
-        while (message := await self._wire.receive()) is not None:
+        while (message := await self._writer.receive()) is not None:
             try:
                 control = self._control(message)
                 ask = partial(service.command, self._shared, self._key, self._stream, control)
                 await self._hub.call(ask)
             except MareyError as error:
-                await self._wire.complain(error)
+                await self._writer.send_error(error)
 
     def _control(self, message: bytes) -> Control:
         """What a message asks for.

@@ -11,7 +11,7 @@ from marey import db, streams
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared
 from marey.api.streams import service
-from marey.api.streams.door import let_in
+from marey.api.streams.accept import accept_connection
 from marey.api.streams.schemas import NewStreamBody, StreamDetailView, StreamView
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, Limit, PageView
@@ -64,4 +64,4 @@ def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailVie
 @router.websocket("/{stream}")
 async def watch_stream(websocket: WebSocket, stream: str, shared: Shared) -> None:
     """Frames from `from` on, and control."""
-    await let_in(websocket, stream, shared)
+    await accept_connection(websocket, stream, shared)

@@ -18,10 +18,10 @@ from marey.bundles import named_by
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
 from marey.db import transaction
 from marey.items.item import MAX_SEED, Item, read_item
-from marey.jobs.offers import Offer
-from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, told_prompts
-from marey.streams.bell import Bell
+from marey.jobs.generators import GeneratorCapabilities
+from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, prompts_with_rewrites
 from marey.streams.control import Control, ControlQueue
+from marey.streams.notifier import StreamNotifier
 from marey.streams.states import OPEN_STREAMS
 from marey.tenants import ApiKey
 
@@ -62,7 +62,7 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
         note(conn, key, "stream.begin", stream, bundle=new.bundle)
         view = detail(conn, shared, get_stream(conn, key.tenant, stream))
     try:
-        Bell(hub.redis).ring()
+        StreamNotifier(hub.redis).notify()
     except Unreachable as error:  # workers find the row without it
         log.warning("not_rung", stream=str(stream), error=error.message)
     return view
@@ -70,7 +70,7 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
 
 def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetailView:
     """A stream with its prompts and skeleton."""
-    return StreamDetailView.detail(row, made_by(shared, row), told_prompts(conn, row.id))
+    return StreamDetailView.detail(row, made_by(shared, row), prompts_with_rewrites(conn, row.id))
 
 
 def made_by(shared: Context, row: StreamRow) -> Made:
@@ -160,7 +160,7 @@ def _checked(body: NewStreamBody) -> Item:
     return item
 
 
-def _offer(item: Item, catalogue: Catalogue) -> Offer:
+def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
     """What the stream is made with."""
     try:
         with named_by("model"):

@@ -17,18 +17,18 @@ from starlette.websockets import WebSocketDisconnect
 
 from marey.api.context import Context
 from marey.api.stream_hub import Hub
+from marey.api.streams.backpressure import BLOCKED_SECONDS, BackpressurePause, LagTracker
 from marey.api.streams.messages import Messages
 from marey.api.streams.schemas import EndMessage, GapMessage, Made, StreamDetailView, StreamMessage
 from marey.api.streams.service import is_over
-from marey.api.streams.slow import BLOCKED_SECONDS, Brake, Lag
-from marey.api.streams.wire import Wire
+from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import MareyError, Unreachable
 from marey.db import transaction
-from marey.streams import StreamPrompt, StreamRow, StreamState, get_stream, told_prompts
+from marey.streams import StreamPrompt, StreamRow, StreamState, get_stream, prompts_with_rewrites
 from marey.streams.control import ControlQueue
 from marey.streams.frames import HEADER, LAST
+from marey.streams.presence import REFRESH_SECONDS, ViewerPresence
 from marey.streams.redis import FrameStream, Gap, StoredFrame
-from marey.streams.watch import TOUCH_SECONDS, Watch
 from marey.tenants import ApiKey, check_key
 
 BATCH = 20
@@ -46,7 +46,7 @@ AGAIN_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
-class Visit:
+class SessionRequest:
     """What a client came for.
 
     Attributes:
@@ -67,22 +67,22 @@ class Session:
     """Shows one stream to one client.
 
     Args:
-        wire: to the client; the handshake is done.
-        visit: what it came for.
+        writer: to the client; the handshake is done.
+        request: what it came for.
     """
 
-    def __init__(self, wire: Wire, hub: Hub, shared: Context, visit: Visit) -> None:
-        self._wire, self._hub, self._shared, self._visit = wire, hub, shared, visit
-        self._row, self._prompts = visit.row, visit.prompts
+    def __init__(self, writer: SocketWriter, hub: Hub, shared: Context, request: SessionRequest) -> None:
+        self._writer, self._hub, self._shared, self._request = writer, hub, shared, request
+        self._row, self._prompts = request.row, request.prompts
         self._told = self._standing()
         self._looked = time.monotonic()
-        name = str(visit.row.id)
+        name = str(request.row.id)
         self._frames = FrameStream(hub.redis, name)
-        self._watch = Watch(hub.redis, name)
-        self._messages = Messages(wire, hub, shared, visit.key, visit.row.id)
-        self._brake = Brake(hub, ControlQueue(hub.redis, name))
-        self._lag = Lag()
-        self._at = visit.first
+        self._presence = ViewerPresence(hub.redis, name)
+        self._messages = Messages(writer, hub, shared, request.key, request.row.id)
+        self._pause = BackpressurePause(hub, ControlQueue(hub.redis, name))
+        self._lag = LagTracker()
+        self._at = request.first
         self._prompt = 0  # the highest number that a frame carried
         self._last = False
         self._sending: float | None = None  # a frame, since when
@@ -92,7 +92,7 @@ class Session:
     async def run(self) -> None:
         """Until the stream is over, the client is gone or the server stops."""
         tasks = [self._show, self._messages.obey, self._renew]
-        if self._visit.pauses:
+        if self._request.pauses:
             tasks.append(self._hold)
         try:
             async with anyio.create_task_group() as group:
@@ -100,10 +100,10 @@ class Session:
                     group.start_soon(_and_then_none, task, group)
         finally:
             with anyio.CancelScope(shield=True), suppress(Unreachable):
-                await self._brake.release()  # nobody else would
+                await self._pause.release()  # nobody else would
 
     async def _show(self) -> None:
-        await self._wire.tell(StreamMessage(stream=self._detail()))
+        await self._writer.send_message(StreamMessage(stream=self._detail()))
         while True:
             try:
                 if await self._turn():
@@ -113,7 +113,7 @@ class Session:
                 if await self._give_up(error):
                     return
             except MareyError as error:
-                await self._wire.refuse(error)
+                await self._writer.refuse(error)
                 return
 
     async def _turn(self) -> bool:
@@ -124,7 +124,7 @@ class Session:
         found = await self._hub.wait(lambda: self._read(LAST_SECONDS if self._last else IDLE_SECONDS))
         if await self._pass_on(found) and len(found) < BATCH:
             self._lag.caught_up()
-            await self._brake.release()
+            await self._pause.release()
         if time.monotonic() - self._looked >= self._patience(bool(found)):
             await self._look()
         return False
@@ -142,7 +142,7 @@ class Session:
             self._at = each.number + 1
             _, _, flags, _, _, prompt, *_ = HEADER.unpack_from(each.data)
             self._prompt, self._last = max(self._prompt, prompt), bool(flags & LAST)
-            if blocked and not self._visit.pauses and await self._skip():
+            if blocked and not self._request.pauses and await self._skip():
                 return False
         return True
 
@@ -150,7 +150,7 @@ class Session:
         """Send a frame; whether that had to wait."""
         self._sending = time.monotonic()
         try:
-            await self._wire.send(frame.data)
+            await self._writer.send(frame.data)
             return time.monotonic() - self._sending > BLOCKED_SECONDS
         finally:
             self._sending = None
@@ -160,7 +160,7 @@ class Session:
         if time.monotonic() - self._measured < MEASURE_SECONDS:
             return False
         self._measured = time.monotonic()
-        if not self._lag.falls(await self._behind()):
+        if not self._lag.is_falling_behind(await self._behind()):
             return False
         reader = self._frames.reader(self._at)
         missed = await self._hub.call(reader.skip)
@@ -170,7 +170,7 @@ class Session:
         return missed is not None
 
     async def _tell_gap(self, gap: Gap) -> None:
-        await self._wire.tell(GapMessage(first=gap.first, count=gap.count))
+        await self._writer.send_message(GapMessage(first=gap.first, count=gap.count))
         self._at = gap.first + gap.count
 
     async def _behind(self) -> int:
@@ -189,16 +189,16 @@ class Session:
         self._row, self._prompts = await self._hub.call(self._stand)
         self._looked = time.monotonic()
         if self._standing() != self._told and not is_over(self._row):
-            await self._wire.tell(StreamMessage(stream=self._detail()))
+            await self._writer.send_message(StreamMessage(stream=self._detail()))
             self._told = self._standing()
 
     def _stand(self) -> tuple[StreamRow, Sequence[StreamPrompt]]:
         """The row, and the prompts where there may be new ones: frames carry a number that is not on record here."""
         with transaction(self._shared.engine) as conn:
-            check_key(conn, self._visit.key.id)  # revoked, expired or suspended since
+            check_key(conn, self._request.key.id)  # revoked, expired or suspended since
             row = get_stream(conn, self._row.tenant, self._row.id)
             known = self._prompt < len(self._prompts) and not is_over(row)
-            return row, self._prompts if known else told_prompts(conn, row.id)
+            return row, self._prompts if known else prompts_with_rewrites(conn, row.id)
 
     async def _finish(self) -> None:
         """What is left of a stream that is over."""
@@ -206,17 +206,17 @@ class Session:
             await self._pass_on(found)
         if self._at < self._row.frames:  # an hour after its end it has none
             await self._tell_gap(Gap(self._at, self._row.frames - self._at))
-        await self._wire.tell(EndMessage(stream=self._detail()))
-        await self._wire.close(1000)
+        await self._writer.send_message(EndMessage(stream=self._detail()))
+        await self._writer.close(1000)
 
     async def _give_up(self, error: Unreachable) -> bool:
         """Tell of an outage once, and wait a little; True, and the socket closed, when it lasts too long."""
         now = time.monotonic()
         if self._away is None:
             self._away = now
-            await self._wire.complain(error)
+            await self._writer.send_error(error)
         if now - self._away > OUTAGE_SECONDS:
-            await self._wire.refuse(error)
+            await self._writer.refuse(error)
             return True
         await anyio.sleep(AGAIN_SECONDS)
         return False
@@ -225,8 +225,8 @@ class Session:
         """Say that somebody watches, as long as this runs."""
         while True:
             with suppress(Unreachable):  # told by `_show`
-                await self._hub.call(self._watch.touch)
-            await anyio.sleep(TOUCH_SECONDS)
+                await self._hub.call(self._presence.refresh)
+            await anyio.sleep(REFRESH_SECONDS)
 
     async def _hold(self) -> None:
         """Pause the stream while the client blocks our sends and falls behind; `_turn` lets it go on."""
@@ -236,15 +236,15 @@ class Session:
             if since is None or time.monotonic() - since < BLOCKED_SECONDS or self._row.state is not StreamState.LIVE:
                 continue
             with suppress(Unreachable):  # told by `_show`
-                if self._lag.falls(await self._behind()):
-                    await self._brake.pull()
+                if self._lag.is_falling_behind(await self._behind()):
+                    await self._pause.engage()
 
     def _standing(self) -> tuple[object, ...]:
         """What the client is told of when it changes."""
         return self._row.state, self._row.position, tuple(self._prompts)
 
     def _detail(self) -> StreamDetailView:
-        return StreamDetailView.detail(self._row, self._visit.made, self._prompts)
+        return StreamDetailView.detail(self._row, self._request.made, self._prompts)
 
 
 async def _and_then_none(task: Callable[[], Awaitable[None]], group: TaskGroup) -> None:

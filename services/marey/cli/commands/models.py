@@ -94,7 +94,7 @@ def _local_models() -> dict[str, Any]:
     try:
         from marey.api.models.schemas import ModelsView
         from marey.core.settings import settings
-        from marey.jobs.offers import offers
+        from marey.jobs.generators import offers
     except ImportError as error:
         raise needs_extra("server", error) from error
     return ModelsView.of(offers(settings())).model_dump(mode="json")

@@ -23,7 +23,7 @@ HANDLERS = {
 """Factories by queue, as strings: only a worker's child imports them, and with them torch."""
 TEXT = "text"
 """The queue of prompts, which computes on no device."""
-SHOWS = {"mogo": "marey.models.mogo.live:create_show"}
+SHOWS = {"mogo": "marey.models.mogo.live:create_live_model"}
 """What the live loop of each model that streams serves."""
 GENERATORS = {"hgm3": "marey.models.hgm3.generate", "mogo": "marey.models.mogo.generate"}
 """Where each model's `Generator` is."""

@@ -12,16 +12,16 @@ from typing import cast
 from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.db import create_engine
-from marey.jobs import WorkerBeat
+from marey.jobs import WorkerHeartbeat
 from marey.runtime.child import wait_for_database
 from marey.runtime.exposition import expose
-from marey.runtime.live.keeper import QUEUE, Keeper
 from marey.runtime.live.loop import LiveLoop
-from marey.runtime.live.port import ShowFactory
+from marey.runtime.live.port import LiveModelFactory
+from marey.runtime.live.supervisor import QUEUE, StreamSupervisor
 from marey.runtime.logs import configure_logging, logger
 from marey.runtime.queue import redis_client
 from marey.runtime.signals import stop_on_signals
-from marey.runtime.status import Teller
+from marey.runtime.status import StatusReporter
 
 log = logger(__name__)
 
@@ -34,11 +34,11 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
     """Serve live streams until SIGTERM or SIGINT, or until `stopping` is set (then no signal handler is installed).
 
     Args:
-        factory: `module:attribute` of a `ShowFactory`.
+        factory: `module:attribute` of a `LiveModelFactory`.
 
     Raises:
         InvalidInput: a setting is missing.
-        NotFound, InvalidBundle: there is no model to show.
+        NotFound, InvalidBundle: there is no model to model.
         Unreachable: the database does not answer within a minute.
     """
     queue_url = chosen.streams_url or chosen.queue_url
@@ -56,29 +56,29 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
         stop_on_signals(stopping)
     wait_for_database(chosen)
     module, _, attribute = factory.partition(":")
-    show = cast("ShowFactory", getattr(importlib.import_module(module), attribute))()
+    model = cast("LiveModelFactory", getattr(importlib.import_module(module), attribute))()
     engine = create_engine(chosen.database_url.get_secret_value())
     client = redis_client(queue_url.get_secret_value(), timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS)
     name = f"live-{socket.gethostname()}-{os.getpid()}"
-    keeper: Keeper
-    loop = LiveLoop(lambda: show.open_room(chosen.live_slots), lambda over: keeper.over(over))
-    worker = WorkerBeat(name, QUEUE, socket.gethostname(), os.getpid(), show.device, loop.room.bundle)
-    keeper = Keeper(
-        engine, client, worker, show.parse, stopping=stopping,
+    supervisor: StreamSupervisor
+    loop = LiveLoop(lambda: model.open_pool(chosen.live_slots), lambda over: supervisor.over(over))
+    worker = WorkerHeartbeat(name, QUEUE, socket.gethostname(), os.getpid(), model.device, loop.pool.bundle)
+    supervisor = StreamSupervisor(
+        engine, client, worker, model.parse, stopping=stopping,
         idle_seconds=chosen.stream_idle_seconds, paused_seconds=chosen.stream_paused_seconds,
     )  # fmt: skip
-    keeper.serve(loop)
-    teller = Teller(chosen.home, name, lambda: time.monotonic() - loop.ticked, stopping)
+    supervisor.serve(loop)
+    reporter = StatusReporter(chosen.home, name, lambda: time.monotonic() - loop.ticked, stopping)
     if alone:
-        teller.start()
-    log.info("ready", worker=name, bundle=loop.room.bundle, slots=chosen.live_slots)
+        reporter.start()
+    log.info("ready", worker=name, bundle=loop.pool.bundle, slots=chosen.live_slots)
     try:
         loop.run(stopping)
     finally:
         stopping.set()
-        keeper.join(STOP_SECONDS)
+        supervisor.join(STOP_SECONDS)
         if alone:
-            teller.join(STOP_SECONDS)
+            reporter.join(STOP_SECONDS)
         client.close()
         engine.dispose()
     return 0

@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
 
@@ -27,7 +27,7 @@ class LiveFrame:
     """Number of the act of its prompt, from 0."""
 
 
-class Room(Protocol):
+class SessionPool(Protocol):
     """Sessions of one loaded bundle; all that are not paused move on together, one frame a step. One thread at a time.
 
     Every method raises `InvalidInput` for a session that is not there or not in the right state.
@@ -64,7 +64,13 @@ class Room(Protocol):
         ...
 
     def start(
-        self, text: TextFeatures, seed: int, *, past: Tokens | None = None, prompt: int = 0, began: Begun | None = None
+        self,
+        text: TextFeatures,
+        seed: int,
+        *,
+        past: Tokens | None = None,
+        prompt: int = 0,
+        began: ActionStart | None = None,
     ) -> int:
         """A new session, or one to go on behind `past` (n, V) with prompt number `prompt` in force, of which the act
         `began` plays (None: the first begins); its name."""
@@ -100,18 +106,18 @@ Parse: TypeAlias = Callable[[str], TextFeatures]
 
 
 @dataclass(frozen=True)
-class Show:
+class LiveModel:
     """What a live worker serves.
 
     Attributes:
-        open_room: an empty room; called again when one broke.
+        open_pool: an empty pool; called again when one broke.
         parse: reads prompts, each on a thread of its own.
         device: for the worker's row.
     """
 
-    open_room: Callable[[int], Room]
+    open_pool: Callable[[int], SessionPool]
     parse: Parse
     device: str
 
 
-ShowFactory: TypeAlias = Callable[[], Show]
+LiveModelFactory: TypeAlias = Callable[[], LiveModel]

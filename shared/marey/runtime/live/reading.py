@@ -1,4 +1,4 @@
-"""Prompts, read aside: a rewriter may take its time, and the keeper has other streams to look after."""
+"""Prompts, read aside: a rewriter may take its time, and the supervisor has other streams to look after."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from marey.bundles import find_bundle
 from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
 from marey.core.errors import MareyError
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
 from marey.text.features import TextFeatures
 from marey.training.obedience import pipeline_of
@@ -76,7 +76,7 @@ def measure(
     obeyed: dict[str, list[bool]] = defaultdict(list)
     for start in range(0, len(sessions), SESSIONS):
         some = sessions[start : start + SESSIONS]
-        room = LiveRoom(generator, len(some))
+        room = LiveSessionPool(generator, len(some))
         names = [room.start(texts[first.text], start + k) for k, (first, _) in enumerate(some)]
         before = played(room, names, round((BEFORE + 1) * fps))
         for name, (_, second) in zip(names, some, strict=True):

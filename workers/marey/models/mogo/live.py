@@ -25,8 +25,8 @@ from marey.models.mogo.tokenizer import DecoderState
 from marey.motion.features import HeadingLayout
 from marey.motion.live import LiveMotion, LiveState
 from marey.nn.packed import is_small
-from marey.runtime.live.port import LiveFrame, Show
-from marey.streams.acts import Begun
+from marey.runtime.live.port import LiveFrame, LiveModel
+from marey.streams.actions import ActionStart
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph
@@ -55,11 +55,11 @@ class _Paused:
     body: LiveState
 
 
-class LiveRoom:
+class LiveSessionPool:
     """Sessions of one loaded bundle; they join, are steered and leave between frames. Not thread-safe."""
 
     def __init__(self, generator: Generator, capacity: int, settings: Settings | None = None) -> None:
-        """Make room for `capacity` sessions, all drawn with the same settings.
+        """Make pool for `capacity` sessions, all drawn with the same settings.
 
         Raises:
             InvalidBundle: a layout whose root cannot be followed frame by frame.
@@ -117,7 +117,7 @@ class LiveRoom:
         *,
         past: NDArray[np.int16] | None = None,
         prompt: int = 0,
-        began: Begun | None = None,
+        began: ActionStart | None = None,
     ) -> int:
         """A new session, or one that another worker began.
 
@@ -132,11 +132,11 @@ class LiveRoom:
             the session's name in all other methods.
 
         Raises:
-            InvalidInput: no room, features of another encoder, a seed out of range, tokens that are none, or an act
+            InvalidInput: no pool, features of another encoder, a seed out of range, tokens that are none, or an act
                 that the prompt does not have.
         """
         self.generator.limits.check(Request(text, seed))
-        if len(self) == self.capacity:  # paused ones keep their room
+        if len(self) == self.capacity:  # paused ones keep their pool
             raise InvalidInput(f"all {self.capacity} sessions are taken", hint="Stop one first.")
         decoder = self.generator.tokenizer.decoder.start(1)
         body = self._motion.start(1)
@@ -176,7 +176,7 @@ class LiveRoom:
         del self._sessions[session]
 
     def pause(self, session: int) -> None:
-        """Leave a session out of the steps until `resume`; its room stays its own.
+        """Leave a session out of the steps until `resume`; its pool stays its own.
 
         Raises:
             InvalidInput: no such session, or it is paused.
@@ -260,7 +260,7 @@ class LiveRoom:
         self._body = self._body.take(kept)
 
 
-def create_show() -> Show:
+def create_live_model() -> LiveModel:
     """What the live loop of `marey worker mogo` serves: the bundle that this machine has.
 
     Raises:
@@ -274,20 +274,20 @@ def create_show() -> Show:
     if is_small(generator.transformer):
         torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(as_served(bundle.manifest.text))
-    return Show(
-        open_room=lambda slots: _warm(LiveRoom(generator, slots), pipeline),
+    return LiveModel(
+        open_pool=lambda slots: _warm(LiveSessionPool(generator, slots), pipeline),
         parse=lambda prompt: pipeline.features([prompt])[0],
         device=str(generator.device),
     )
 
 
-def _warm(room: LiveRoom, pipeline: TextPipeline) -> LiveRoom:
-    """The room, whose first frames will not wait for what torch does once. No rewriter is asked: it may cost money."""
+def _warm(pool: LiveSessionPool, pipeline: TextPipeline) -> LiveSessionPool:
+    """The pool, whose first frames will not wait for what torch does once. No rewriter is asked: it may cost money."""
     words = ("a", "person", "stands")
     graph = SemanticGraph(" ".join(words), words, (Node(0, "motion", " ".join(words), (0, 1, 2)),), ())
-    session = room.start(TextFeatures(graph.text, graph.text, graph, pipeline.encode(graph)), 0)
+    session = pool.start(TextFeatures(graph.text, graph.text, graph, pipeline.encode(graph)), 0)
     for _ in range(WARM_CALLS):
         pipeline.labeller.label([words])
-        room.step()
-    room.stop(session)
-    return room
+        pool.step()
+    pool.stop(session)
+    return pool

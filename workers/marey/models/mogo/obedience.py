@@ -24,7 +24,7 @@ from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
 from marey.checks.rates import Rate
 from marey.core.errors import MareyError
 from marey.models.mogo.generate import Generator
-from marey.models.mogo.live import LiveRoom
+from marey.models.mogo.live import LiveSessionPool
 from marey.motion.kinematics import Array, forward_kinematics
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
@@ -81,7 +81,7 @@ def steers(
     found: list[Streamed] = []
     for start in range(0, count, SESSIONS):
         some = pairs[start : start + SESSIONS]
-        room = LiveRoom(generator, len(some))
+        room = LiveSessionPool(generator, len(some))
         names = [room.start(texts[first.text], start + k) for k, (first, _) in enumerate(some)]
         played(room, names, round(BEFORE * fps))
         for name, (_, second) in zip(names, some, strict=True):
@@ -99,20 +99,20 @@ def walks(
     """Walk for 2,000 frames, so many times."""
     walking = [p for p in prompts if p.group == "walk"]
     chosen = [walking[k % len(walking)] for k in range(count)]
-    room = LiveRoom(generator, count)
+    room = LiveSessionPool(generator, count)
     names = [room.start(texts[p.text], seed) for seed, p in enumerate(chosen)]
     joints = played(room, names, LONG)[:, -SEEN:]
     verdicts = [judge(joints[k], generator.limits.fps, p.expected) for k, p in enumerate(chosen)]
     return [Streamed((p.text,), k, v.passed, v.reason) for k, (p, v) in enumerate(zip(chosen, verdicts, strict=True))]
 
 
-def played(room: LiveRoom, names: Sequence[int], frames: int) -> Array:
+def played(room: LiveSessionPool, names: Sequence[int], frames: int) -> Array:
     """Joints (sessions, frames, J, 3) of the next frames of all sessions."""
     steps = [room.step() for _ in range(frames)]
     return np.stack([_joints(room, [step[name].frame for step in steps]) for name in names])
 
 
-def _joints(room: LiveRoom, shown: Sequence[Frame]) -> Array:
+def _joints(room: LiveSessionPool, shown: Sequence[Frame]) -> Array:
     rotations, root = (np.stack([getattr(f, part) for f in shown]) for part in ("rotations", "root"))
     return forward_kinematics(room.skeleton, rotations, root)
 

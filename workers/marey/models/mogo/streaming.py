@@ -22,7 +22,7 @@ from marey.models.mogo.packed_model import PackedModel
 from marey.models.mogo.plan import PLAN, Plan
 from marey.models.mogo.replay import Replayed
 from marey.models.mogo.state import NEVER, StreamState
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 
 
 class Streams:
@@ -77,7 +77,7 @@ class Streams:
         lasts: Sequence[int] | None = None,
         past: Tensor | None = None,
         skipped: int = 0,
-        began: Begun | None = None,
+        began: ActionStart | None = None,
     ) -> int:
         """A new session; its first frame comes with the next step.
 
@@ -205,9 +205,9 @@ class Streams:
         ended = (columns[:, 0] < 0).tolist() if unfinished else []
         return [(row, plan) for row, plan in unfinished if ended[row]]
 
-    def _begin(self, row: int, plan: Plan, past: Tensor | None = None, began: Begun | None = None) -> None:
+    def _begin(self, row: int, plan: Plan, past: Tensor | None = None, began: ActionStart | None = None) -> None:
         """Tell a row the next act of its plan, or the one that plays already."""
-        began = began or Begun(self._made[self.sessions[row]], 0)
+        began = began or ActionStart(self._made[self.sessions[row]], 0)
         act = plan.take(began.frame, began.act)
         mine = self.state.row(row)
         mine["began"].fill_(began.frame)

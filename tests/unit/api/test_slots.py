@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from marey.api.jobs.events import EventStream
 from marey.core.errors import Busy
-from marey.http.places import Places, Shares
+from marey.http.slots import SlotCounter, SlotLimits
 from marey.tenants import ApiKey
 
-SHARES = Shares(total=12, tenant=7, key=4)
+SHARES = SlotLimits(total=12, tenant=7, key=4)
 TENANTS = ("ann", "bob", "cat")
 KEYS = [
     ApiKey(uuid4(), tenant, "key", "prefix", ("read",), datetime.now(UTC), None, None, None, None, {})
@@ -29,7 +29,7 @@ STEPS = st.lists(st.tuples(st.sampled_from(KEYS), st.booleans(), st.integers(0, 
 
 @given(STEPS)
 def test_shares_hold_and_a_tenant_that_has_nothing_always_finds_a_place(steps: list[tuple]) -> None:
-    places, opened = Places("streams", SHARES), list[tuple]()
+    places, opened = SlotCounter("streams", SHARES), list[tuple]()
     for key, opens, which in steps:
         if opens:
             stack = ExitStack()
@@ -57,7 +57,7 @@ def test_shares_hold_and_a_tenant_that_has_nothing_always_finds_a_place(steps: l
 
 def test_one_tenant_alone_leaves_half_of_the_places_and_three_leave_a_quarter() -> None:
     for count, free in ((1, 6), (2, 4), (3, 3)):
-        places = Places("streams", Shares(total=12, tenant=12, key=12))
+        places = SlotCounter("streams", SlotLimits(total=12, tenant=12, key=12))
         with ExitStack() as stack:
             for _ in range(12):
                 for key in KEYS[: 3 * count : 3]:
@@ -71,7 +71,7 @@ def test_one_tenant_alone_leaves_half_of_the_places_and_three_leave_a_quarter() 
 @pytest.mark.parametrize("end", ["is sent", "client is gone", "fails", "is cancelled"])
 def test_a_stream_gives_its_place_back_however_it_ends(end: str) -> None:
     async def scenario() -> None:
-        places, begun = Places("streams", SHARES), asyncio.Event()
+        places, begun = SlotCounter("streams", SHARES), asyncio.Event()
 
         async def content():
             yield b"data: 1\n\n"
@@ -108,7 +108,7 @@ def test_a_stream_gives_its_place_back_however_it_ends(end: str) -> None:
 
 def test_a_stream_without_a_place_is_a_problem_that_says_when_to_come_back() -> None:
     async def scenario() -> None:
-        places, sent = Places("streams", Shares(1, 1, 1)), []
+        places, sent = SlotCounter("streams", SlotLimits(1, 1, 1)), []
 
         async def content():
             yield b"never"

@@ -11,15 +11,15 @@ from fastapi import WebSocket
 from starlette.datastructures import QueryParams
 from starlette.websockets import WebSocketDisconnect
 
-from marey.api.auth import admit, authenticated, check_scope
+from marey.api.auth import authenticated, authorize, check_scope
 from marey.api.context import Context
 from marey.api.streams import service
-from marey.api.streams.session import Session, Visit
-from marey.api.streams.wire import Wire
+from marey.api.streams.session import Session, SessionRequest
+from marey.api.streams.socket_writer import SocketWriter
 from marey.core.errors import InvalidInput, MareyError, NotFound
 from marey.db import transaction
 from marey.http.problems import public_error
-from marey.streams import get_stream, told_prompts
+from marey.streams import get_stream, prompts_with_rewrites
 
 PROTOCOL = "marey.stream.v1"
 KEY_PREFIX = "marey.key."
@@ -32,26 +32,26 @@ QUERY = ("from", "slow")
 log = structlog.get_logger(__name__)
 
 
-async def let_in(websocket: WebSocket, stream: str, shared: Context) -> None:
+async def accept_connection(websocket: WebSocket, stream: str, shared: Context) -> None:
     """Show a stream to a client until it is over or the client goes; who may not see it is told why by a close code.
 
     The handshake is always answered: a browser does not show what stands in one that is refused.
     """
     offered: list[str] = websocket.scope["subprotocols"]
-    wire = Wire(websocket)
+    writer = SocketWriter(websocket)
     with suppress(WebSocketDisconnect):
         await websocket.accept(PROTOCOL if PROTOCOL in offered else None)
         try:
             hub = service.hub_of(shared)
             secret = key_of(websocket.headers.get("authorization"), offered)
-            visit = await hub.call(lambda: _admit(shared, secret, stream, websocket.query_params))
-            with hub.places.take(visit.key):
-                await Session(wire, hub, shared, visit).run()
+            request = await hub.call(lambda: _authorize(shared, secret, stream, websocket.query_params))
+            with hub.slots.take(request.key):
+                await Session(writer, hub, shared, request).run()
         except MareyError as error:
-            await wire.refuse(error)
+            await writer.refuse(error)
         except Exception:
             log.exception("stream_socket_failed", stream=stream[:64])
-            await wire.close(1011, public_error(MareyError("internal")).message)
+            await writer.close(1011, public_error(MareyError("internal")).message)
 
 
 def key_of(header: str | None, offered: list[str]) -> str | None:
@@ -62,14 +62,14 @@ def key_of(header: str | None, offered: list[str]) -> str | None:
     return next((name.removeprefix(KEY_PREFIX) for name in offered if name.startswith(KEY_PREFIX)), None)
 
 
-def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams) -> Visit:
+def _authorize(shared: Context, secret: str | None, stream: str, query: QueryParams) -> SessionRequest:
     """What the client may see.
 
     Raises:
         Unauthenticated, Refused, InvalidInput, NotFound: by what is wrong.
     """
     key = authenticated(shared, secret)
-    admit(shared, key, "read")
+    authorize(shared, key, "read")
     _check_names(query)
     first, slow = first_frame(query.get("from")), _slow(query.get("slow"))
     if slow == "pause":
@@ -80,7 +80,9 @@ def _admit(shared: Context, secret: str | None, stream: str, query: QueryParams)
         raise NotFound("there is no such stream", where=f"stream {stream[:64]}") from None
     with transaction(shared.engine) as conn:
         row = get_stream(conn, key.tenant, identifier)
-        return Visit(key, row, told_prompts(conn, identifier), service.made_by(shared, row), first, slow == "pause")
+        return SessionRequest(
+            key, row, prompts_with_rewrites(conn, identifier), service.made_by(shared, row), first, slow == "pause"
+        )
 
 
 def _check_names(query: QueryParams) -> None:

@@ -13,13 +13,13 @@ BLOCKED_SECONDS = 0.05
 """One frame's time: a send that takes longer waits for the client, not for us."""
 
 
-class Lag:
+class LagTracker:
     """How far a client is behind. One that comes late, or comes back, is far behind and not slow: it catches up."""
 
     def __init__(self) -> None:
         self._best: float = math.inf
 
-    def falls(self, behind: int) -> bool:
+    def is_falling_behind(self, behind: int) -> bool:
         """Whether it is two seconds further behind than it was at best.
 
         Args:
@@ -33,14 +33,14 @@ class Lag:
         self._best = 0
 
 
-class Brake:
+class BackpressurePause:
     """Pauses a stream, and lets it go on if it was this that paused it."""
 
     def __init__(self, hub: Hub, control: ControlQueue) -> None:
         self._hub, self._control = hub, control
         self._pulled = False
 
-    async def pull(self) -> None:
+    async def engage(self) -> None:
         """Pause, once.
 
         Raises:

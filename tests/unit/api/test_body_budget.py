@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from marey.core.errors import Overloaded
-from marey.http import body_room
-from marey.http.body_room import BodyRoom
+from marey.http import body_budget
+from marey.http.body_budget import BodyBudget
 
 TOTAL, TENANT = 100, 60
 REQUESTS = st.lists(
@@ -30,7 +30,7 @@ def test_bytes_stay_within_the_limits_and_come_back_whatever_ends_a_request(
     requests: list[tuple[str, int, str, int]],
 ) -> None:
     async def all_of_them() -> None:
-        room = BodyRoom(TOTAL, TENANT, seconds=30)
+        room = BodyBudget(TOTAL, TENANT, seconds=30)
         held: Counter[str] = Counter()
 
         async def request(tenant: str, size: int, end: str, turns: int) -> None:
@@ -65,7 +65,7 @@ def test_bytes_stay_within_the_limits_and_come_back_whatever_ends_a_request(
 
 def test_one_tenant_leaves_room_for_another_and_waits_for_its_own() -> None:
     async def scenario() -> None:
-        room = BodyRoom(TOTAL, TENANT, seconds=0.05)
+        room = BodyBudget(TOTAL, TENANT, seconds=0.05)
         async with room.take("ann", 50):
             with pytest.raises(Overloaded) as refused:
                 async with room.take("ann", 20):
@@ -73,7 +73,7 @@ def test_one_tenant_leaves_room_for_another_and_waits_for_its_own() -> None:
             assert refused.value.seconds >= 1
             async with room.take("bob", 50):
                 assert room.used == TOTAL
-        patient = BodyRoom(TOTAL, TENANT, seconds=30)
+        patient = BodyBudget(TOTAL, TENANT, seconds=30)
         order: list[str] = []
 
         async def request(name: str, tenant: str, size: int) -> None:
@@ -92,10 +92,10 @@ def test_one_tenant_leaves_room_for_another_and_waits_for_its_own() -> None:
 
 
 def test_too_many_who_wait_are_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(body_room, "WAITING", 1)
+    monkeypatch.setattr(body_budget, "WAITING", 1)
 
     async def scenario() -> None:
-        room = BodyRoom(TOTAL, TOTAL, seconds=30)
+        room = BodyBudget(TOTAL, TOTAL, seconds=30)
 
         async def request() -> None:
             async with room.take("ann", TOTAL):
@@ -113,10 +113,10 @@ def test_too_many_who_wait_are_refused_at_once(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_those_who_wait_leave_room_for_another_tenant(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(body_room, "WAITING", 8)
+    monkeypatch.setattr(body_budget, "WAITING", 8)
 
     async def scenario() -> None:
-        room = BodyRoom(TOTAL, TENANT, seconds=30)
+        room = BodyBudget(TOTAL, TENANT, seconds=30)
 
         async def request(tenant: str, size: int) -> str:
             try:

@@ -16,7 +16,7 @@ from marey.streams.redis import reached
 KEY = "marey:streams:begun"
 
 
-class Bell:
+class StreamNotifier:
     """One end of it.
 
     Args:
@@ -27,7 +27,7 @@ class Bell:
         self._redis: Any = client
         self._heard: bytes | None = None
 
-    def ring(self) -> None:
+    def notify(self) -> None:
         """A stream waits for a worker; its row is committed.
 
         Raises:
@@ -36,7 +36,7 @@ class Bell:
         with reached("any"):
             self._redis.incr(KEY)
 
-    def rang(self) -> bool:
+    def poll(self) -> bool:
         """Whether it did since this end last asked.
 
         Raises:

@@ -1,4 +1,4 @@
-"""A stream under this worker's lease: what the loop adds to and the keeper writes down."""
+"""A stream under this worker's lease: what the loop adds to and the supervisor writes down."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ import numpy as np
 from marey.runtime.live.port import LiveFrame, Tokens
 from marey.runtime.live.reading import Reading
 from marey.streams import StreamChunk, StreamRow, StreamState
-from marey.streams.acts import Begun
+from marey.streams.actions import ActionStart
 from marey.streams.control import Control, ControlQueue
 from marey.streams.frames import Frame
-from marey.streams.reads import ReadAs
+from marey.streams.presence import ViewerPresence
 from marey.streams.redis import FrameStream, Lease
-from marey.streams.watch import Watch
+from marey.streams.rewrites import PromptRewrite
 from marey.text.features import TextFeatures
 
 
 @dataclass(eq=False)
-class Held:
+class LeasedStream:
     """One stream.
 
     Attributes:
         text: of the prompt in force.
         opening: of the first prompt.
-        session: its name in the room; None before it joined and after it left.
+        session: its name in the pool; None before it joined and after it left.
         read: id of the last message that was read; `obeyed` of the last that is in force.
         heard: messages to obey, each with its id, in order; `reading` is of the first, where that is a steer.
         acts: those that began, of all prompts; `recorded_acts` of them are written down.
@@ -45,7 +45,7 @@ class Held:
     row: StreamRow
     frames: FrameStream
     controls: ControlQueue
-    watch: Watch
+    presence: ViewerPresence
     lease: Lease
     text: TextFeatures
     opening: TextFeatures
@@ -58,8 +58,8 @@ class Held:
     shown: int
     recorded: int
     recorded_prompts: int
-    acts: list[Begun]
-    reads: list[ReadAs]
+    acts: list[ActionStart]
+    reads: list[PromptRewrite]
     session: int | None = None
     heard: deque[tuple[str, Control]] = field(default_factory=deque[tuple[str, Control]])
     reading: Reading | None = None
@@ -89,7 +89,7 @@ class Held:
         return self.state is StreamState.LIVE and len(self.tokens) < self.lease.next_frame
 
     @property
-    def playing(self) -> Begun | None:
+    def playing(self) -> ActionStart | None:
         """The act of the prompt in force that plays; None before the first frame of that prompt."""
         return self.acts[-1] if self.acts and self.acts[-1].frame >= self.prompts[-1][0] else None
 
@@ -97,14 +97,14 @@ class Held:
         """A frame was made."""
         with self.lock:
             if self.playing is None or self.playing.act != made.act:
-                self.acts.append(Begun(len(self.tokens), made.act))
+                self.acts.append(ActionStart(len(self.tokens), made.act))
             self.tokens.append(made.tokens)
 
     def steered(self, prompt: str, text: TextFeatures, control: str) -> None:
         """A prompt is in force from the next frame on."""
         with self.lock:
             self.prompts.append((len(self.tokens), prompt))
-            self.reads.append(ReadAs(text.rewritten, text.not_rewritten))
+            self.reads.append(PromptRewrite(text.rewritten, text.not_rewritten))
             self.text, self.obeyed = text, control
 
     def chunk(self) -> StreamChunk | None:

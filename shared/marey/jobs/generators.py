@@ -19,7 +19,7 @@ from marey.text.keys import as_served, feature_key, resolve
 
 
 @dataclass(frozen=True)
-class Offer:
+class GeneratorCapabilities:
     """A bundle that items can be made with."""
 
     bundle: Bundle
@@ -38,29 +38,29 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Offers:
+class GeneratorList:
     """List the bundles that this machine can make motions with."""
 
-    found: tuple[Offer, ...]
+    found: tuple[GeneratorCapabilities, ...]
     broken: tuple[BrokenBundle, ...]
     """Bundles that are here and cannot be used; of any kind, since a broken manifest does not tell its kind."""
 
 
-def offers(config: Settings) -> Offers:
+def offers(config: Settings) -> GeneratorList:
     """Every generator's bundle of this machine, by folder; a broken one is logged and hides no other."""
     bundles = scan_bundles(config=config, kind="generator")
-    found: list[Offer] = []
+    found: list[GeneratorCapabilities] = []
     broken = list(bundles.broken)
     for bundle in bundles.found:
         try:
-            found.append(offer_of(bundle, config))
+            found.append(capabilities_of(bundle, config))
         except MareyError as error:
             broken.append(BrokenBundle.of(bundle.path.name, error))
             log_broken(broken[-1])
-    return Offers(tuple(found), tuple(broken))
+    return GeneratorList(tuple(found), tuple(broken))
 
 
-def offer_of(bundle: Bundle, config: Settings) -> Offer:
+def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
     """What a generator's bundle allows.
 
     Raises:
@@ -74,10 +74,10 @@ def offer_of(bundle: Bundle, config: Settings) -> Offer:
         )
     low, high = seconds_of(bundle)
     settings_of(bundle)
-    return Offer(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
+    return GeneratorCapabilities(bundle, resolve(as_served(manifest.text, config=config), config=config), low, high)
 
 
-def new_items(items: Iterable[tuple[Item, Offer]]) -> Iterator[NewItem]:
+def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[NewItem]:
     """One row a motion: prompt times variant, with the seed drawn where none was given."""
     batch_keys: dict[tuple[str, str], str] = {}
     for index, (item, offer) in enumerate(items):

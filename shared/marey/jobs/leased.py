@@ -30,7 +30,7 @@ DROP_EMPTY_LEASE = sa.text("""
 
 
 @dataclass(frozen=True)
-class HeldItem:
+class LeasedItem:
     """An item under a lease, its row locked."""
 
     id: UUID
@@ -42,16 +42,18 @@ class HeldItem:
     position: int
 
 
-def held_items(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None = None) -> list[HeldItem]:
+def lock_leased_items(
+    conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None = None
+) -> list[LeasedItem]:
     """The items that a lease holds (of these, if given), in input order, locked. The job's lock must be held."""
     wanted = None if items is None else list(items)
-    return [HeldItem(*row) for row in conn.execute(HELD_ITEMS, {"token": lease_token, "items": wanted})]
+    return [LeasedItem(*row) for row in conn.execute(HELD_ITEMS, {"token": lease_token, "items": wanted})]
 
 
 def give_back(
     conn: sa.Connection,
     job: LockedJob,
-    items: Sequence[HeldItem],
+    items: Sequence[LeasedItem],
     cause: Cause,
     reason: str,
     *,
@@ -72,7 +74,7 @@ def give_back(
     change_lanes(conn, job.id, returned((item.queue, item.batch_key, item.solo or solo) for item in items))
 
 
-def end_dead(conn: sa.Connection, item: HeldItem, problem: Problem) -> NewEvent:
+def end_dead(conn: sa.Connection, item: LeasedItem, problem: Problem) -> NewEvent:
     """A leased item has used up its attempts."""
     attempts = item.attempts + 1
     end_items(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=document(problem), attempts=attempts)
@@ -85,11 +87,11 @@ def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
 
 
 @dataclass(frozen=True)
-class Held:
+class LeasedItems:
     """What a lease still holds: its job and these items, all locked."""
 
     job: LockedJob
-    items: Mapping[UUID, HeldItem]
+    items: Mapping[UUID, LeasedItem]
 
     def committed(self, asked: Iterable[UUID]) -> Committed:
         """Which of these were written, and which were not ours any more."""
@@ -98,13 +100,13 @@ class Held:
         return Committed(ours, tuple(item for item in asked if item not in self.items))
 
 
-def hold(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> Held | None:
+def lock_lease(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> LeasedItems | None:
     """Lock the job, then those of the items that this lease still holds. The fence of every write."""
     job_id = conn.execute(LEASED_JOB, {"token": lease_token}).scalar_one_or_none()
     job = None if job_id is None else lock_job(conn, job_id)
     if job is None:
         return None
-    return Held(job, {item.id: item for item in held_items(conn, lease_token, items)})
+    return LeasedItems(job, {item.id: item for item in lock_leased_items(conn, lease_token, items)})
 
 
 def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:

@@ -10,10 +10,10 @@ import redis
 from marey.streams.redis import reached, stream_key
 
 KEEP_MS = 10_000
-TOUCH_SECONDS = 3.0  # two may fail before the key is gone
+REFRESH_SECONDS = 3.0  # two may fail before the key is gone
 
 
-class Watch:
+class ViewerPresence:
     """The watchers of one stream.
 
     Args:
@@ -26,7 +26,7 @@ class Watch:
         self.key = stream_key(stream, "watch")
         self._redis: Any = client
 
-    def touch(self) -> None:
+    def refresh(self) -> None:
         """Somebody watches; to be called every 3 s.
 
         Raises:
@@ -35,7 +35,7 @@ class Watch:
         with reached(self.stream):
             self._redis.set(self.key, b"1", px=KEEP_MS)
 
-    def seen(self) -> bool:
+    def is_active(self) -> bool:
         """Whether somebody did within the last 10 s.
 
         Raises:

@@ -29,7 +29,7 @@ class _Waiter:
     turn: asyncio.Future[None] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
 
 
-class BodyRoom:
+class BodyBudget:
     """Gives out bytes, first come, first served; on the event loop alone.
 
     A request whose tenant has all it may have is passed by the requests of others.

@@ -15,21 +15,21 @@ import sqlalchemy as sa
 from marey.core import metrics
 from marey.core.errors import InvalidInput, MareyError, Unreachable
 from marey.db import transaction
-from marey.jobs import NewItem, Problem, WorkerBeat, beat, retire
+from marey.jobs import NewItem, Problem, WorkerHeartbeat, beat, retire
 from marey.runtime.exposition import measure_gpu
-from marey.runtime.faults import as_problem, patiently
-from marey.runtime.live.held import Held
-from marey.runtime.live.loop import LiveLoop, Over
-from marey.runtime.live.port import Parse, Room
+from marey.runtime.faults import as_problem, retry_unreachable
+from marey.runtime.live.leased_stream import LeasedStream
+from marey.runtime.live.loop import LiveLoop, StreamFinished
+from marey.runtime.live.port import Parse, SessionPool
 from marey.runtime.live.reading import Opening, Reading
 from marey.runtime.logs import logger
 from marey.streams import StreamPast, StreamRow, StreamState, add_chunk, end_stream, open_streams, take_stream
-from marey.streams.bell import Bell
 from marey.streams.control import Control, ControlQueue
-from marey.streams.reads import ReadAs
+from marey.streams.notifier import StreamNotifier
+from marey.streams.presence import ViewerPresence
 from marey.streams.recording import Recording
 from marey.streams.redis import RENEW_SECONDS, FrameStream, Lease, LeaseLost
-from marey.streams.watch import Watch
+from marey.streams.rewrites import PromptRewrite
 
 log = logger(__name__)
 
@@ -44,7 +44,7 @@ QUEUE = "live"
 """What live workers are called among the workers."""
 
 
-class Keeper(threading.Thread):
+class StreamSupervisor(threading.Thread):
     """Holds the streams of one live loop.
 
     Args:
@@ -58,22 +58,22 @@ class Keeper(threading.Thread):
         self,
         engine: sa.Engine,
         client: redis.Redis,
-        worker: WorkerBeat,
+        worker: WorkerHeartbeat,
         parse: Parse,
         *,
         idle_seconds: float,
         paused_seconds: float,
         stopping: threading.Event,
     ) -> None:
-        super().__init__(name="keeper", daemon=True)
+        super().__init__(name="supervisor", daemon=True)
         self._engine, self._redis = engine, client
         self._worker, self._parse = worker, parse
         self._idle_seconds, self._paused_seconds = idle_seconds, paused_seconds
         self._stopping = stopping
-        self._over: queue.SimpleQueue[Over] = queue.SimpleQueue()
-        self._bell = Bell(client)
+        self._over: queue.SimpleQueue[StreamFinished] = queue.SimpleQueue()
+        self._notifier = StreamNotifier(client)
         self._openings: dict[str, Opening] = {}
-        self._held: dict[str, Held] = {}
+        self._leased: dict[str, LeasedStream] = {}
         self._rounds = (
             _Round(self._open, LISTEN_SECONDS),
             _Round(self._listen, LISTEN_SECONDS),
@@ -86,11 +86,11 @@ class Keeper(threading.Thread):
     def serve(self, loop: LiveLoop) -> None:
         """Start, for this loop."""
         self._loop = loop
-        self._room: Room = loop.room
+        self._pool: SessionPool = loop.pool
         self.renewer.start()
         self.start()
 
-    def over(self, what: Over) -> None:
+    def over(self, what: StreamFinished) -> None:
         """The loop is through with a stream."""
         self._over.put(what)
 
@@ -118,43 +118,43 @@ class Keeper(threading.Thread):
         while not self._stopping.wait(RENEW_SECONDS):
             if time.monotonic() - self._loop.ticked > STALL_SECONDS:
                 continue  # the loop hangs: let another worker have its streams
-            for held in (*list(self._openings.values()), *list(self._held.values())):
+            for leased in (*list(self._openings.values()), *list(self._leased.values())):
                 try:
-                    held.frames.renew(held.lease)
+                    leased.frames.renew(leased.lease)
                 except LeaseLost:
-                    self._lose(held)
+                    self._lose(leased)
                 except Unreachable as error:
-                    log.warning("not_renewed", stream=str(held.row.id), error=error.message)
+                    log.warning("not_renewed", stream=str(leased.row.id), error=error.message)
 
-    def _lose(self, held: Opening | Held) -> None:
-        held.lost = True
-        if isinstance(held, Held):
-            self._held.pop(str(held.row.id), None)
-            self._loop.leave(held)
+    def _lose(self, leased: Opening | LeasedStream) -> None:
+        leased.lost = True
+        if isinstance(leased, LeasedStream):
+            self._leased.pop(str(leased.row.id), None)
+            self._loop.leave(leased)
         else:
-            self._openings.pop(str(held.row.id), None)
+            self._openings.pop(str(leased.row.id), None)
         metrics.LIVE_LOST.inc()
-        log.info("stream_lost", stream=str(held.row.id), fence=held.lease.fence)
+        log.info("stream_lost", stream=str(leased.row.id), fence=leased.lease.fence)
 
     # --- taking ---
 
     def _answer(self) -> None:
-        if self._bell.rang():
+        if self._notifier.poll():
             self._take()
 
     def _is_full(self) -> bool:
-        return len(self._openings) + len(self._held) >= self._room.capacity
+        return len(self._openings) + len(self._leased) >= self._pool.capacity
 
     def _take(self) -> None:
         if self._is_full():
             return
         with transaction(self._engine) as conn:
-            waiting = open_streams(conn, self._room.bundle)
+            waiting = open_streams(conn, self._pool.bundle)
         # Those that were live somewhere come first: somebody watches them.
         for row in sorted(waiting, key=lambda row: row.state is StreamState.WAITING):
             if self._is_full():
                 return
-            if str(row.id) not in self._held and str(row.id) not in self._openings:
+            if str(row.id) not in self._leased and str(row.id) not in self._openings:
                 self._try(row)
 
     def _try(self, row: StreamRow) -> None:
@@ -197,12 +197,12 @@ class Keeper(threading.Thread):
             self._end(row, lease, "its prompt cannot be read", error)
             frames.release(lease)
             return
-        tokens = np.frombuffer(past.tokens, "<i2").reshape(-1, self._room.levels)
-        held = Held(
+        tokens = np.frombuffer(past.tokens, "<i2").reshape(-1, self._pool.levels)
+        leased = LeasedStream(
             row=row,
             frames=frames,
             controls=ControlQueue(self._redis, str(row.id)),
-            watch=Watch(self._redis, str(row.id)),
+            presence=ViewerPresence(self._redis, str(row.id)),
             lease=lease,
             text=features[-1],
             opening=features[0],
@@ -216,45 +216,45 @@ class Keeper(threading.Thread):
             recorded=len(tokens),
             recorded_prompts=len(past.prompts),
             acts=list(past.acts),
-            reads=[] if past.prompts else [ReadAs(features[0].rewritten, features[0].not_rewritten)],
+            reads=[] if past.prompts else [PromptRewrite(features[0].rewritten, features[0].not_rewritten)],
         )
-        self._held[str(row.id)] = held
-        self._loop.join(held)
+        self._leased[str(row.id)] = leased
+        self._loop.join(leased)
         log.info("stream_taken", stream=str(row.id), fence=lease.fence, frames=len(tokens), shown=lease.next_frame)
 
     # --- messages ---
 
     def _listen(self) -> None:
-        for held in list(self._held.values()):
-            for identity, message in held.controls.read(held.read):
-                held.read = identity
+        for leased in list(self._leased.values()):
+            for identity, message in leased.controls.read(leased.read):
+                leased.read = identity
                 if isinstance(message, InvalidInput):
-                    log.warning("message_refused", stream=str(held.row.id), error=message.message)
+                    log.warning("message_refused", stream=str(leased.row.id), error=message.message)
                 elif message.kind == "stop":
-                    self._loop.end(held, "stopped")
+                    self._loop.end(leased, "stopped")
                 else:
-                    held.heard.append((identity, message))
-            while held.heard and self._obey(held, *held.heard[0]):
-                held.heard.popleft()
+                    leased.heard.append((identity, message))
+            while leased.heard and self._obey(leased, *leased.heard[0]):
+                leased.heard.popleft()
 
-    def _obey(self, held: Held, identity: str, message: Control) -> bool:
+    def _obey(self, leased: LeasedStream, identity: str, message: Control) -> bool:
         """Pass a message on to the loop; False while its prompt is being read, and all behind it wait."""
         if message.prompt is None:
             state = StreamState.PAUSED if message.kind == "pause" else StreamState.LIVE
-            self._loop.switch(held, state, identity)
+            self._loop.switch(leased, state, identity)
             return True
-        if held.reading is None:
-            held.reading = Reading(self._parse, [message.prompt])
-            held.reading.is_done(READ_SECONDS)
-        if not held.reading.is_done():
+        if leased.reading is None:
+            leased.reading = Reading(self._parse, [message.prompt])
+            leased.reading.is_done(READ_SECONDS)
+        if not leased.reading.is_done():
             return False
-        reading, held.reading = held.reading, None
+        reading, leased.reading = leased.reading, None
         try:
             (text,) = reading.features()
         except MareyError as error:
-            log.warning("prompt_refused", stream=str(held.row.id), error=error.message)
+            log.warning("prompt_refused", stream=str(leased.row.id), error=error.message)
         else:
-            self._loop.steer(held, message.prompt, text, identity)
+            self._loop.steer(leased, message.prompt, text, identity)
         return True
 
     # --- writing down ---
@@ -264,55 +264,55 @@ class Keeper(threading.Thread):
         with transaction(self._engine) as conn:
             beat(conn, self._worker)
         now = time.monotonic()
-        for held in list(self._held.values()):
-            reason = self._idles(held, now)
-            if reason and held.ending is None:
-                self._loop.end(held, reason)
-            self._write(held)
+        for leased in list(self._leased.values()):
+            reason = self._idles(leased, now)
+            if reason and leased.ending is None:
+                self._loop.end(leased, reason)
+            self._write(leased)
 
-    def _idles(self, held: Held, now: float) -> str:
+    def _idles(self, leased: LeasedStream, now: float) -> str:
         """Why a stream should give its slot to another; empty where it should not."""
-        if held.watch.seen():
-            held.seen = now
-        if held.state is not StreamState.PAUSED:
-            held.moved = now
-        if now - held.seen > self._idle_seconds:
+        if leased.presence.is_active():
+            leased.seen = now
+        if leased.state is not StreamState.PAUSED:
+            leased.moved = now
+        if now - leased.seen > self._idle_seconds:
             return f"nobody watched for {self._idle_seconds:g} seconds"
-        if now - held.moved > self._paused_seconds:
+        if now - leased.moved > self._paused_seconds:
             return f"paused for {self._paused_seconds:g} seconds"
         return ""
 
-    def _write(self, held: Held) -> None:
-        chunk = held.chunk()
+    def _write(self, leased: LeasedStream) -> None:
+        chunk = leased.chunk()
         if chunk is None:
             return
         with transaction(self._engine) as conn:
-            ours = add_chunk(conn, held.row.id, held.lease.fence, chunk)
+            ours = add_chunk(conn, leased.row.id, leased.lease.fence, chunk)
         if ours:
-            held.wrote(chunk)
+            leased.wrote(chunk)
         else:
-            self._lose(held)
+            self._lose(leased)
 
     # --- the end ---
 
-    def _close(self, over: Over) -> None:
-        held = over.held
-        self._held.pop(str(held.row.id), None)
-        if held.lost:
+    def _close(self, over: StreamFinished) -> None:
+        leased = over.leased
+        self._leased.pop(str(leased.row.id), None)
+        if leased.lost:
             return
-        patiently(lambda: self._write_last(over), seconds=CLOSE_PATIENCE, stopping=self._stopping)
-        held.frames.release(held.lease)
+        retry_unreachable(lambda: self._write_last(over), seconds=CLOSE_PATIENCE, stopping=self._stopping)
+        leased.frames.release(leased.lease)
 
-    def _write_last(self, over: Over) -> None:
-        held = over.held
-        chunk = held.chunk()
+    def _write_last(self, over: StreamFinished) -> None:
+        leased = over.leased
+        chunk = leased.chunk()
         if chunk is not None:
             with transaction(self._engine) as conn:
-                if not add_chunk(conn, held.row.id, held.lease.fence, chunk):
+                if not add_chunk(conn, leased.row.id, leased.lease.fence, chunk):
                     return
-            held.wrote(chunk)
-        clip = clip_of(held, self._room)
-        self._end(held.row, held.lease, over.reason, over.problem, clip)
+            leased.wrote(chunk)
+        clip = clip_of(leased, self._pool)
+        self._end(leased.row, leased.lease, over.reason, over.problem, clip)
 
     def _end(
         self,
@@ -332,9 +332,9 @@ class Keeper(threading.Thread):
         self._loop.finished.wait(STALL_SECONDS)
         for opening in list(self._openings.values()):
             self._guarded(lambda opening=opening: _released(opening))
-        for held in list(self._held.values()):
-            self._guarded(lambda held=held: self._write(held))
-            self._guarded(lambda held=held: _released(held))
+        for leased in list(self._leased.values()):
+            self._guarded(lambda leased=leased: self._write(leased))
+            self._guarded(lambda leased=leased: _released(leased))
         self._guarded(self._retire)
 
     def _retire(self) -> None:
@@ -359,14 +359,14 @@ class _Round:
         return True
 
 
-def clip_of(held: Held, room: Room) -> tuple[NewItem, bytes] | None:
+def clip_of(leased: LeasedStream, pool: SessionPool) -> tuple[NewItem, bytes] | None:
     """The item that makes the clip of a stream, and its recording; None for one that is too short."""
-    row = held.row
-    if held.recorded < max(1, room.min_frames):
+    row = leased.row
+    if leased.recorded < max(1, pool.min_frames):
         return None
-    tokens = np.stack(held.tokens[: held.recorded])
-    prompts = [(frame, text) for frame, text in held.prompts if frame < held.recorded]
-    blob = Recording(str(row.id), tokens, prompts, held.opening).to_blob()
+    tokens = np.stack(leased.tokens[: leased.recorded])
+    prompts = [(frame, text) for frame, text in leased.prompts if frame < leased.recorded]
+    blob = Recording(str(row.id), tokens, prompts, leased.opening).to_blob()
     key = f"stream-{row.id}"
     item = NewItem(
         index=0,
@@ -382,5 +382,5 @@ def clip_of(held: Held, room: Room) -> tuple[NewItem, bytes] | None:
     return item, blob
 
 
-def _released(held: Opening | Held) -> None:
-    held.frames.release(held.lease)
+def _released(leased: Opening | LeasedStream) -> None:
+    leased.frames.release(leased.lease)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class ReadAs(NamedTuple):
+class PromptRewrite(NamedTuple):
     """What the model was told for a prompt."""
 
     rewritten: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Begun(NamedTuple):
+class ActionStart(NamedTuple):
     """An act of the prompt that was in force began to play."""
 
     frame: int

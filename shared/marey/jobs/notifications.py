@@ -8,11 +8,11 @@ from uuid import UUID
 import sqlalchemy as sa
 
 from marey.jobs.states import ENDED, JobState
-from marey.webhooks.outbox import tell
+from marey.webhooks.outbox import enqueue_event
 from marey.webhooks.types import EventKind
 
 
-def tell_of_job(
+def enqueue_job_event(
     conn: sa.Connection, tenant: str, job: UUID, before: JobState, after: JobState, counters: Mapping[str, int]
 ) -> None:
     """Tell of a job that ended or was paused; of no other change."""
@@ -20,6 +20,6 @@ def tell_of_job(
         return
     data = {"job": job, "state": after, "counters": dict(counters)}
     if after in ENDED:
-        tell(conn, tenant, EventKind.JOB_ENDED, data)
+        enqueue_event(conn, tenant, EventKind.JOB_ENDED, data)
     elif after is JobState.PAUSED:
-        tell(conn, tenant, EventKind.JOB_PAUSED, data)
+        enqueue_event(conn, tenant, EventKind.JOB_PAUSED, data)

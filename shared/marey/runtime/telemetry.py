@@ -17,7 +17,7 @@ MOST_IDS = 64
 """Items named in one attribute or line; a claim holds no more."""
 
 
-class Work:
+class ClaimTelemetry:
     """What is done for one claim, from `claimed` to the last write; on the loop's thread and the committer's."""
 
     def __init__(self, claim: Claim) -> None:

@@ -28,7 +28,7 @@ LOOKS = 3
 EXIT_STALLED = 70  # EX_SOFTWARE
 
 
-class Part(threading.Thread):
+class SchedulerComponent(threading.Thread):
     """A thread of the scheduler.
 
     Args:
@@ -64,12 +64,12 @@ def note_progress(engine: sa.Engine) -> None:
     @event.listens_for(engine, "after_cursor_execute")
     def _answered(*_: Any) -> None:
         part = threading.current_thread()
-        if isinstance(part, Part):
+        if isinstance(part, SchedulerComponent):
             part.progressed(in_round=True)
 
 
 def watch(
-    parts: Sequence[Part],
+    parts: Sequence[SchedulerComponent],
     stopping: threading.Event,
     *,
     seconds: float | None = None,

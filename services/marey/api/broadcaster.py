@@ -38,7 +38,7 @@ CLOSED = None
 
 
 @dataclass(frozen=True)
-class Batch:
+class EventBatch:
     """New events of one job for all who stand where they begin: put into words once, not once a client."""
 
     wire: bytes
@@ -55,9 +55,9 @@ class Subscription:
     job: UUID
     seq: int
     loop: asyncio.AbstractEventLoop
-    queue: asyncio.Queue[Batch | None] = field(default_factory=lambda: asyncio.Queue(QUEUE_LIMIT))
+    queue: asyncio.Queue[EventBatch | None] = field(default_factory=lambda: asyncio.Queue(QUEUE_LIMIT))
 
-    def put(self, batch: Batch | None) -> None:
+    def put(self, batch: EventBatch | None) -> None:
         """On its own loop."""
         if self.queue.full():
             self.queue.get_nowait()
@@ -65,7 +65,7 @@ class Subscription:
         self.queue.put_nowait(batch)
 
 
-class Tailer:
+class EventBroadcaster:
     """Reads the new events of the jobs that somebody follows, once for all who do."""
 
     def __init__(self, engine: sa.Engine, url: str, words: Callable[[EventRow], bytes]) -> None:
@@ -79,7 +79,7 @@ class Tailer:
         self._read: dict[UUID, float] = {}
         self._keys_due = 0.0
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="tailer", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="broadcaster", daemon=True)
 
     def start(self) -> None:
         """Begin to listen."""
@@ -194,20 +194,20 @@ class Tailer:
             return
         if not events:
             return
-        batches: dict[int, Batch] = {}
+        batches: dict[int, EventBatch] = {}
         behind = [follower for follower in followers if follower.seq < events[-1].seq]
         for seq in {follower.seq for follower in behind}:
             new = last_progress_only([event for event in events if event.seq > seq])
             wire = b"".join(map(self._words, new))
-            batches[seq] = Batch(wire, last=new[-1].data.get("state") in ENDED)
+            batches[seq] = EventBatch(wire, last=new[-1].data.get("state") in ENDED)
         _tell([(follower, batches[follower.seq]) for follower in behind])
         for follower in behind:
             follower.seq = events[-1].seq
 
 
-def _tell(told: Iterable[tuple[Subscription, Batch | None]]) -> None:
+def _tell(told: Iterable[tuple[Subscription, EventBatch | None]]) -> None:
     """Hand over to the loops of the streams, each woken once however many of its streams are told."""
-    by_loop: dict[asyncio.AbstractEventLoop, list[tuple[Subscription, Batch | None]]] = defaultdict(list)
+    by_loop: dict[asyncio.AbstractEventLoop, list[tuple[Subscription, EventBatch | None]]] = defaultdict(list)
     for subscription, batch in told:
         by_loop[subscription.loop].append((subscription, batch))
     for loop, pairs in by_loop.items():
@@ -215,7 +215,7 @@ def _tell(told: Iterable[tuple[Subscription, Batch | None]]) -> None:
             loop.call_soon_threadsafe(_put_all, pairs)
 
 
-def _put_all(pairs: list[tuple[Subscription, Batch | None]]) -> None:
+def _put_all(pairs: list[tuple[Subscription, EventBatch | None]]) -> None:
     for subscription, batch in pairs:
         subscription.put(batch)
 

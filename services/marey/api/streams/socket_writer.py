@@ -19,7 +19,7 @@ TOLD = (401, 403, 404, 422)
 REASON_BYTES = 123  # RFC 6455
 
 
-class Wire:
+class SocketWriter:
     """Sends whole messages, one after the other, until it is closed. Each send waits until the one before is on its
     way: what a slow client does not take is never kept here."""
 
@@ -46,7 +46,7 @@ class Wire:
             if not self._closed:
                 await self._websocket.send_bytes(data)
 
-    async def tell(self, message: SocketMessage) -> None:
+    async def send_message(self, message: SocketMessage) -> None:
         """A text message; raises as `send`."""
         # As over HTTP: a problem leaves out what it has not, everything else says null.
         text = message.model_dump_json(exclude_none=isinstance(message, ErrorMessage))
@@ -54,9 +54,9 @@ class Wire:
             if not self._closed:
                 await self._websocket.send_text(text)
 
-    async def complain(self, error: MareyError) -> None:
+    async def send_error(self, error: MareyError) -> None:
         """Tell what is wrong, and stay; raises as `send`."""
-        await self.tell(ErrorMessage(problem=problem_body(error)))
+        await self.send_message(ErrorMessage(problem=problem_body(error)))
 
     async def refuse(self, error: MareyError) -> None:
         """Close for an error, and tell what clients may know of it; raises as `send`."""

@@ -20,7 +20,7 @@ RETRY_SECONDS = 5
 
 
 @dataclass(frozen=True)
-class Shares:
+class SlotLimits:
     """Places of one process, and how many of them one tenant and one key may hold."""
 
     total: int
@@ -28,14 +28,14 @@ class Shares:
     key: int
 
 
-class Places:
+class SlotCounter:
     """Counts what is open; on the event loop alone.
 
     Besides its share a tenant may hold no more places than are free. So a tenant that has none always finds one: with
     `n` tenants that take all they can, one in `n + 1` places stays free.
     """
 
-    def __init__(self, what: str, shares: Shares, gauge: Gauge | None = None) -> None:
+    def __init__(self, what: str, shares: SlotLimits, gauge: Gauge | None = None) -> None:
         """`what` is counted, in the plural, for messages."""
         self._what, self._shares, self._gauge = what, shares, gauge
         self._tenants: Counter[str] = Counter()
