@@ -40,8 +40,10 @@ def older_id() -> UUID:
 @pytest.fixture
 def clock_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every module makes such ids."""
-    for name in ("submit", "streams", "webhooks", "schedules", "deliveries", "audit", "keys", "results", "outbox"):
-        module = importlib.import_module(f"marey.jobs.{name}")
+    of_jobs = ("jobs.submit", "jobs.results", "streams.repository", "evaluations.schedules")
+    of_tenants = ("tenants.audit", "tenants.keys")
+    for name in (*of_jobs, *of_tenants, "webhooks.repository", "webhooks.deliveries", "webhooks.outbox"):
+        module = importlib.import_module(f"marey.{name}")
         assert module.new_id is ids_module.new_id
         monkeypatch.setattr(module, "new_id", older_id)
 

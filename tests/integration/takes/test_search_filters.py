@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from marey.db import create_engine, transaction, upgrade
-from marey.jobs import Review, listings
-from marey.takes import MotionFilter, delete, erase, list_motions, reroll, review, searching
+from marey.jobs import Review
+from marey.takes import MotionFilter, delete, erase, list_motions, listings, reroll, review, searching
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, commit_all, new_item, new_tenant, parse_texts, submit_items
 

@@ -20,7 +20,7 @@ from standardwebhooks.webhooks import Webhook
 from marey.core.addresses import Allowed
 from marey.core.settings import REPOSITORY
 from marey.db import transaction
-from marey.jobs import cancel
+from marey.jobs import cancel, list_schedulers
 from marey.scheduler.sending import Sender
 from marey.scheduler.webhooks import EACH, Deliverer
 from marey.tenants import DEFAULT_TENANT
@@ -273,11 +273,18 @@ def test_a_scheduler_that_is_killed_loses_nothing_and_sweeps_while_receivers_han
         assert hidden not in logs
 
 
+def at_work(engine: sa.Engine) -> int:
+    """Schedulers that have made progress."""
+    with transaction(engine) as conn:
+        return sum(scheduler.live for scheduler in list_schedulers(conn))
+
+
 def test_two_scheduler_processes_tell_each_event_once_and_take_a_lease_back_once(
     engine: sa.Engine, receiver: Receiver, start: Callable[[], subprocess.Popen[bytes]], tmp_path: Path
 ) -> None:
     webhook = new_webhook(engine, receiver.url())
     processes = [start(), start()]
+    wait(lambda: at_work(engine) == 2)
     happen(engine, 20)
     job = submit_items(engine, 1)
     parse_texts(engine)
