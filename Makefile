@@ -6,13 +6,13 @@ STAMP  := $(VENV)/.installed
 # A CPU build where pip finds one locally, else the index's own: outside the lock, never hashed.
 TORCH  := torch==2.13.0
 
-# Two processes, a file of tests at a time: the servers of a file start once.
-PARALLEL := -n 2 --dist loadfile
+# A file of tests at a time: its servers start once. Three processes on two cores, because many tests wait.
+PARALLEL := -n 3 --dist loadfile
 
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all chaos soak lint check-deploy format bench lock clean
+.PHONY: help setup demo test test-all pytest chaos soak lint check-deploy format bench lock clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -30,11 +30,17 @@ $(STAMP): requirements/dev.lock pyproject.toml
 demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
 	$(BIN)/python -m marey.cli.demo
 
-test: $(STAMP) lint ## Everything but slow and gpu tests: under ten minutes on two cores
-	$(BIN)/pytest -q $(PARALLEL)
+# Many tests wait for servers and timeouts: lint runs beside them.
+TOGETHER := $(MAKE) --no-print-directory --jobs 2 --output-sync=line
 
-test-all: $(STAMP) lint ## Every test
-	$(BIN)/pytest -q $(PARALLEL) -m ''
+test: $(STAMP) ## Lint, and everything but slow and gpu tests: under ten minutes on two cores
+	$(TOGETHER) lint pytest
+
+test-all: $(STAMP) ## Lint, and every test
+	$(TOGETHER) lint pytest SELECT="-m ''"
+
+pytest: $(STAMP)
+	$(BIN)/pytest -q $(PARALLEL) $(SELECT)
 
 chaos: $(STAMP) ## 10,000 items three times, whatever is killed or falls silent; prints how long recovery took
 	rm -rf out/chaos

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-CHECKS = ("devices", "mogo", "hgm3", "training")
+CHECKS = ("devices", *(pytest.param(name, marks=pytest.mark.slow) for name in ("mogo", "hgm3", "training")))
 
 
 @pytest.mark.parametrize("check", CHECKS)

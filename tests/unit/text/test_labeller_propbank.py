@@ -141,6 +141,7 @@ def test_smoothing_brings_int8_closer_to_minilm() -> None:
     assert near(smoothed, exact).mean() > near(plain, exact).mean()
 
 
+@pytest.mark.slow
 def test_the_first_training_is_kept_and_shipped_whole(tmp_path: Path) -> None:
     minilm = find_weights("minilm")
     network = LightConfig(tag_set(roles_of([EXAMPLE])), layers=(3, 6), width=48, heads=4, trunk=1, body=1)

@@ -191,6 +191,7 @@ def test_a_small_head_learns_two_sentences_and_survives_its_bundle(recipe: Recip
     assert bundle.manifest.licence == "Apache-2.0"
 
 
+@pytest.mark.slow
 def test_training_is_repeatable(recipe: Recipe) -> None:
     gold = [WALK, WAVE]
     roles = tag_set(roles_of([*gold, *(sentence(random.Random(i)) for i in range(300))]))
@@ -205,6 +206,7 @@ def test_training_is_repeatable(recipe: Recipe) -> None:
         assert all((mine[name] == theirs[name]).all() for name in mine)
 
 
+@pytest.mark.slow
 def test_cross_validation_never_scores_a_caption_it_trained_on(recipe: Recipe, monkeypatch: pytest.MonkeyPatch) -> None:
     gold = distinct([Example((*WAVE.words[:4], f"hand{i}"), WAVE.frames) for i in range(6)])
     trained: list[set[tuple[str, ...]]] = []
