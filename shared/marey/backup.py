@@ -1,4 +1,4 @@
-"""Jobs that have ended as records of a backup, and back. Where the records stand is the caller's."""
+"""Conversion of ended jobs to records of a backup, and back. The caller chooses where the records are kept."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class FileRecord(_Record):
 
 
 class MotionRecord(_Record):
-    """A motion with its files and what was said of it."""
+    """A motion with its files and review."""
 
     id: UUID
     licence: str
@@ -109,7 +109,7 @@ class JobRecord(_Record):
 
 
 class JobBackup(_Record):
-    """A job with everything of it but its files' content."""
+    """A job with all its data except the content of files."""
 
     job: JobRecord
     items: list[ItemRecord]
@@ -135,13 +135,13 @@ class JobBackup(_Record):
         return self
 
     def assets(self) -> dict[str, AssetDigest]:
-        """The files' content by its hash."""
+        """Digests of the files' content."""
         files = (file for item in self.items if item.motion for file in item.motion.files)
         return {file.sha256: AssetDigest(file.sha256, file.size, file.media_type) for file in files}
 
 
 def ended_jobs(conn: sa.Connection, tenant: str) -> tuple[list[UUID], int]:
-    """Jobs of a tenant that can be backed up, the oldest first, and how many have not ended yet."""
+    """Return the jobs of a tenant that can be backed up, oldest first, and the number of open ones."""
     table = tables.job.c
     rows = conn.execute(
         sa.select(table.id, table.state).where(table.tenant_id == tenant).order_by(table.created_at, table.id)
@@ -151,7 +151,7 @@ def ended_jobs(conn: sa.Connection, tenant: str) -> tuple[list[UUID], int]:
 
 
 def back_up(conn: sa.Connection, tenant: str, job: UUID) -> JobBackup:
-    """A job that has ended, as of one moment where the transaction is repeatable read.
+    """Return a job that has ended; a consistent snapshot if the transaction is repeatable read.
 
     Raises:
         Conflict: it has gone on meanwhile, was deleted, or files of it are being written anew.
@@ -185,7 +185,7 @@ def back_up(conn: sa.Connection, tenant: str, job: UUID) -> JobBackup:
 
 
 def announce(conn: sa.Connection, tenant: str, assets: Sequence[AssetDigest]) -> None:
-    """Say what is about to be PUT, in a transaction of its own before."""
+    """Announce assets before their upload, in a transaction of its own."""
     rows = [
         {"id": new_id(), "tenant_id": tenant, "sha256": a.sha256, "size": a.size, "media_type": a.media_type}
         for a in sorted(assets, key=lambda each: each.sha256)
@@ -196,7 +196,7 @@ def announce(conn: sa.Connection, tenant: str, assets: Sequence[AssetDigest]) ->
 
 
 def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
-    """Write a job as it was; False when it is there already. Its files lie in the store, and were announced.
+    """Restore a job; return False if it exists already. Its files are in the store, and were announced.
 
     Items go through their states like any other's, so the database refuses what could never have been. Days after which
     it was to be deleted are forgotten: they are over, mostly, when a backup is needed.
@@ -247,7 +247,7 @@ def _write_job(conn: sa.Connection, tenant: str, backup: JobBackup) -> None:
 
 
 def _item_row(job: UUID, item: ItemRecord) -> dict[str, object]:
-    """An item that begins ready. What was read of its prompt is not in a backup, so it names no features."""
+    """Return an item in the state ready. A backup holds no text features, so the item names none."""
     left = {"motion", "state", "reason", "attempts", "problem", "finished_at", "replaces", "stage"}
     at_text = item.stage is Stage.TEXT
     return {

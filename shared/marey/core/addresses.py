@@ -1,4 +1,4 @@
-"""Network addresses that outgoing requests may reach: those of the internet, unless the settings name others."""
+"""Network addresses that outgoing requests may reach: public ones, unless the settings allow others."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PUBLIC = "public"
 
 @dataclass(frozen=True)
 class Allowed:
-    """The rule of this installation.
+    """Address policy of this installation.
 
     Attributes:
         public: addresses of the internet, over https.
@@ -28,7 +28,7 @@ class Allowed:
 
     @classmethod
     def of(cls, values: Sequence[str]) -> Allowed:
-        """From `MAREY_WEBHOOK_ALLOW`: networks, and the word `public`.
+        """Parse `MAREY_WEBHOOK_ALLOW`: networks, and the word `public`.
 
         Raises:
             InvalidInput: something else.
@@ -42,20 +42,20 @@ class Allowed:
         return cls(PUBLIC in values, networks)
 
     def named(self, address: Address) -> bool:
-        """Whether the address is in one of the networks."""
+        """Return True if the address is in one of the allowed networks."""
         return any(address in network for network in self.networks)
 
     def permits(self, address: Address) -> bool:
-        """Whether the address may be told."""
+        """Return True if requests may be sent to the address."""
         return self.named(address) or (self.public and is_public(address))
 
 
 def parse_address(text: str) -> Address:
-    """An address; an IPv4 address that is written as an IPv6 one is that IPv4 address."""
+    """Parse an address; unwrap an IPv4-mapped IPv6 address."""
     address = ip_address(text)
     return getattr(address, "ipv4_mapped", None) or address
 
 
 def is_public(address: Address) -> bool:
-    """Whether an address belongs to one machine of the internet."""
+    """Return True if an address belongs to one machine of the public internet."""
     return purpose_of(address) is None

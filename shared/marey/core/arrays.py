@@ -1,5 +1,5 @@
-"""Reading arrays that this process did not write: npy, npz and safetensors. Pickles are never loaded; kinds, shapes,
-sizes and finite numbers are checked, and whatever is wrong is an error of `marey.core.errors`."""
+"""Read arrays of foreign files (npy, npz, safetensors). Pickles are never loaded; kinds, shapes, sizes and finite
+numbers are checked, and every fault is an error of `marey.core.errors`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Shape = tuple[int | None, ...]
 def check_array(
     array: Array, name: str, where: str, *, kinds: str, shape: Shape, finite: bool = True, hint: str | None = None
 ) -> Array:
-    """Check what an array holds, and return it.
+    """Check kind, shape and values of an array, and return it.
 
     Args:
         array: as it was read.
@@ -76,7 +76,7 @@ def map_npy(path: Path, *, hint: str | None = None) -> Array:
 
 
 def read_npy(path: Path, *, limit: int = MAX_UNPACKED, hint: str | None = None) -> Array:
-    """Read an npy file whole.
+    """Read a whole npy file.
 
     Raises:
         NotFound, InvalidFile: as `map_npy`, or over `limit` bytes.
@@ -151,7 +151,7 @@ def parse_safetensors(
 
 
 def text_of(array: Array, name: str, where: str) -> str:
-    """The text that an array of one string holds.
+    """Return the text of an array that holds one string.
 
     Raises:
         InvalidFile: it holds something else.

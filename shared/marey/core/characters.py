@@ -1,4 +1,4 @@
-"""Characters that free text may not hold, and how text that holds them is shown.
+"""Characters that free text may not hold, and how text that holds them is displayed.
 
 A terminal obeys control characters, and direction overrides show text in another order than it is stored in. Text that
 comes in is checked once, at the edge, by `check_text`; text that goes out to a terminal or a log passes `escape`,
@@ -57,7 +57,7 @@ def check_text(text: str, *, allowed: str = "", subject: str = "it", where: str 
 
 
 def find_forbidden(text: str, allowed: str = "") -> str | None:
-    """The first character that may not be in free text; None if there is none."""
+    """Return the first character that free text may not hold; None if there is none."""
     if text.isascii() and text.isprintable():  # nearly all text: 100,000 prompts at once are checked
         return None
     return next((match.group() for match in FORBIDDEN.finditer(text) if match.group() not in allowed), None)
@@ -69,12 +69,12 @@ def is_printable(text: str) -> bool:
 
 
 def normalize_newlines(text: str) -> str:
-    """The text with `\\r\\n`, which web forms and Windows send, as `\\n`."""
+    """Replace `\\r\\n`, which web forms and Windows send, by `\\n`."""
     return text.replace("\r\n", "\n")
 
 
 def escape(text: str, *, lines: bool = True) -> str:
-    r"""The text as a terminal may show it: each forbidden character as `\x1b`, `\u202e`, `\ud800`.
+    r"""Escape each forbidden character for a terminal, as `\x1b`, `\u202e`, `\ud800`.
 
     Args:
         lines: keep newlines and tabs; else they are escaped too.
@@ -83,7 +83,7 @@ def escape(text: str, *, lines: bool = True) -> str:
 
 
 def escape_json(text: str) -> str:
-    r"""JSON whose strings show no forbidden character: each is `\u001b`, `\u202e`, `\ud800`, and reads as before."""
+    r"""Escape forbidden characters in JSON strings, as `\u001b`, `\u202e`, `\ud800`; the values stay equal."""
     return _SHOWN_RAW.sub(lambda match: f"\\u{ord(match.group()):04x}", text)
 
 
@@ -94,7 +94,7 @@ def _escaped(match: re.Match[str]) -> str:
 
 
 class EscapingStream:
-    """A text stream that shows no forbidden character, whoever writes to it.
+    """Text stream that escapes forbidden characters in everything written to it.
 
     Attributes:
         unescaped: the stream behind it, for what draws on the terminal.
@@ -118,12 +118,12 @@ class EscapingStream:
 
 
 def unescaped(stream: TextIO) -> TextIO:
-    """The stream that draws: the one behind an `EscapingStream`, else the stream itself."""
+    """Return the stream behind an `EscapingStream`, else the stream itself."""
     return stream.unescaped if isinstance(stream, EscapingStream) else stream
 
 
 def escaping(stream: TextIO | None) -> TextIO | None:
-    """The stream as an `EscapingStream`; None stays None (a process without a console has no streams)."""
+    """Wrap a stream in an `EscapingStream`; None stays None (a process without a console has no streams)."""
     if stream is None or isinstance(stream, EscapingStream):
         return stream
     return cast("TextIO", EscapingStream(stream))

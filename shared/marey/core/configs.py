@@ -1,4 +1,4 @@
-"""Configurations of models as plain JSON values and back: what stands in manifests and checkpoints."""
+"""Conversion of model configurations to and from plain JSON values, for manifests and checkpoints."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """Base of what decides a model's shapes and training."""
+    """Base class of configurations that decide a model's shapes and training."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values, for manifests and checkpoints."""
+        """Return plain JSON values, for manifests and checkpoints."""
         return asdict(self)
 
     @classmethod
@@ -30,7 +30,7 @@ class ModelConfig:
 
 
 def named(configs: Mapping[str, T], name: str) -> T:
-    """One of several configurations.
+    """Return one of several configurations by name.
 
     Raises:
         InvalidInput: there is none of that name.
@@ -41,7 +41,7 @@ def named(configs: Mapping[str, T], name: str) -> T:
 
 
 def build_config(kind: type[T], values: Mapping[str, Any], where: str = "config") -> T:
-    """A frozen dataclass, others in its fields, from what `dataclasses.asdict` gave (lists become tuples).
+    """Build a frozen dataclass, with nested ones, from the output of `dataclasses.asdict` (lists become tuples).
 
     Raises:
         InvalidInput: an unknown field.

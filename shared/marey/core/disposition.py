@@ -14,13 +14,14 @@ _PLAIN = re.compile(r"[^A-Za-z0-9!#$&+.^_`~ -]")
 
 
 def download_name(stem: str, ending: str) -> str:
-    """A file name that every system takes: no separators, no control characters, at most 255 bytes."""
+    """Return a file name that every system accepts: no separators, no control characters, at most 255 bytes."""
     clean = _UNSAFE.sub("-", unicodedata.normalize("NFC", stem)).strip(" .") or "file"
     return f"{clean.encode()[:MOST_BYTES].decode(errors='ignore').rstrip(' .')}.{ending}"
 
 
 def attachment(filename: str) -> str:
-    """The header's value: the name in ASCII for old clients and, if it holds more, percent-encoded (RFC 8187)."""
+    """Return the header's value: the name in ASCII for old clients and, if it holds more, percent-encoded (RFC
+    8187)."""
     folded = unicodedata.normalize("NFKD", filename).encode("ascii", "ignore").decode()
     plain = _PLAIN.sub("_", folded)
     if plain == filename:

@@ -1,5 +1,5 @@
-"""Reading files and JSON that this process did not write: sizes, nesting and kinds are checked, and whatever is wrong
-is an error of `marey.core.errors`. Standard library only: the small client imports it."""
+"""Read foreign files and JSON: sizes, nesting and kinds are checked, and every fault is an error of
+`marey.core.errors`. Standard library only: the small client imports it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one tree of errors.
+"""The error hierarchy.
 
 A message says what was wrong, where (file, line, field) and what to do about it. The command line prints an
 expected error verbatim and exits with `exit_code`; the API answers an RFC 9457 problem with `status` and
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 
 class MareyError(Exception):
-    """An expected failure, told to a person.
+    """Base class of expected failures, with a message for users.
 
     Args:
         message: what was wrong, one sentence.
@@ -33,7 +33,7 @@ class MareyError(Exception):
 
 
 class InvalidInput(MareyError):
-    """What came in cannot be used: a prompt, a file, an option, a bundle."""
+    """Input that cannot be used: a prompt, a file, an option, a bundle."""
 
     exit_code = 2
     status = 422
@@ -41,40 +41,40 @@ class InvalidInput(MareyError):
 
 
 class TooLarge(InvalidInput):
-    """The input is over a limit that is written down."""
+    """Input over a documented limit."""
 
     status = 413
     problem_type = "too-large"
 
 
 class UpgradeMissing(InvalidInput):
-    """A WebSocket arrived as an ordinary request: a proxy did not pass on its Upgrade."""
+    """A WebSocket handshake that arrived as an ordinary request: a proxy did not forward `Upgrade`."""
 
     status = 426
     problem_type = "upgrade-missing"
 
 
 class InvalidFile(InvalidInput):
-    """A file is broken, foreign or truncated."""
+    """A file that is broken, foreign or truncated."""
 
     problem_type = "invalid-file"
 
 
 class InvalidBundle(InvalidFile):
-    """A model bundle is corrupt, foreign, of another version, or its licence is not allowed here."""
+    """A model bundle that is corrupt, foreign, of another version, or whose licence is not allowed here."""
 
     problem_type = "invalid-bundle"
 
 
 class Conflict(InvalidInput):
-    """The request contradicts what already stands: an illegal transition, an existing different file."""
+    """A request that contradicts the current state: an illegal transition, an existing different file."""
 
     status = 409
     problem_type = "conflict"
 
 
 class NotFound(MareyError):
-    """There is no such job, motion, bundle or file (or it belongs to somebody else)."""
+    """A job, motion, bundle or file that does not exist, or belongs to another tenant."""
 
     exit_code = 3
     status = 404
@@ -82,7 +82,7 @@ class NotFound(MareyError):
 
 
 class Unreachable(MareyError):
-    """A server, database, queue or store did not answer; trying again later may work."""
+    """A server, database, queue or store that did not answer; a later retry may work."""
 
     exit_code = 4
     status = 503
@@ -91,7 +91,7 @@ class Unreachable(MareyError):
     def __init__(
         self, message: str, *, where: str | None = None, hint: str | None = None, public: str | None = None
     ) -> None:
-        """Set the message for operators, and the one for clients of the API.
+        """Set the message for operators, and the one for API clients.
 
         Args:
             public: what the API tells its clients, whoever they are: what is down, never where or how. None = only
@@ -102,7 +102,7 @@ class Unreachable(MareyError):
 
 
 class Overloaded(Unreachable):
-    """The server has no room for a request now; the same request works later.
+    """No capacity for the request now; the same request works later.
 
     Args:
         seconds: when to ask again.
@@ -116,7 +116,7 @@ class Overloaded(Unreachable):
 
 
 class TooSlow(MareyError):
-    """A request came slower than the server waits for one; sending it again may work."""
+    """A request that arrived slower than the server's limit; a retry may work."""
 
     exit_code = 4
     status = 408
@@ -124,7 +124,7 @@ class TooSlow(MareyError):
 
 
 class Refused(MareyError):
-    """Not allowed: the key lacks the scope, or a quota or rate is used up."""
+    """A forbidden request: the key lacks the scope, or a quota or rate limit is exhausted."""
 
     exit_code = 5
     status = 403
@@ -132,14 +132,14 @@ class Refused(MareyError):
 
 
 class Unauthenticated(Refused):
-    """No key, or not a valid one."""
+    """A missing or invalid key."""
 
     status = 401
     problem_type = "unauthenticated"
 
 
 class Busy(Refused):
-    """A quota or rate is used up for now.
+    """A quota or rate limit that is exhausted for now.
 
     Args:
         seconds: when to ask again.
@@ -154,7 +154,7 @@ class Busy(Refused):
 
 
 class QuotaUsedUp(Busy):
-    """A tenant's quota has no room for what was asked; nothing was written.
+    """A tenant's quota does not allow the request; nothing was written.
 
     Args:
         quota: its name: `queued`, `bytes`.
@@ -183,19 +183,19 @@ class QuotaUsedUp(Busy):
 
     @property
     def left(self) -> int:
-        """What there is still room for."""
+        """Remaining items or bytes."""
         return max(self.limit - self.used, 0)
 
 
 class ItemsFailed(MareyError):
-    """The work ended, but some items failed, died or were cancelled."""
+    """Work that ended with items failed, dead or cancelled."""
 
     exit_code = 6
     problem_type = "items-failed"
 
 
 class TimedOut(MareyError):
-    """The time the caller allowed (`--timeout`) has passed."""
+    """The caller's time limit (`--timeout`) has passed."""
 
     exit_code = 7
     status = 504
@@ -203,7 +203,7 @@ class TimedOut(MareyError):
 
 
 class Regressed(MareyError):
-    """An evaluation is done, and worse than what it was compared with."""
+    """An evaluation that is done, and worse than its baseline."""
 
     exit_code = 8
     problem_type = "regressed"

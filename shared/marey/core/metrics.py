@@ -1,4 +1,4 @@
-"""Every metric of the product; a process shows those of its part. `docs/how-to/operations.md` says what each is for.
+"""All metrics of the product; a process exposes those of its part. The operations guide explains each.
 
 Labels are names from short lists: queues, states, stages, parts, routes. Tenants are the one label that grows with use;
 `MAX_TENANTS` of them have series of their own. Nothing here is an identifier of a job, an item or a key.
@@ -10,7 +10,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, Proc
 
 
 def _part() -> CollectorRegistry:
-    """What one kind of process shows, and what all show. A gauge that nobody sets is nowhere as a nought."""
+    """Return the registry of one kind of process and the common one. Unset gauges are not exported as 0."""
     registry = CollectorRegistry()
     registry.register(COMMON)
     return registry

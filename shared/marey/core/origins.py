@@ -11,7 +11,7 @@ PORTS = {"http": 80, "https": 443}
 
 
 def origin_of(text: str) -> str | None:
-    """An origin in the one form that compares; None for what is none, as `null` and `*`."""
+    """Return an origin in its canonical form; None for text that is not an origin, such as `null` and `*`."""
     match = ORIGIN.fullmatch(text.lower())
     if match is None or (match[3] and not 1 <= int(match[3]) <= 65535):
         return None
@@ -20,7 +20,7 @@ def origin_of(text: str) -> str | None:
 
 
 def check_origins(values: list[str]) -> list[str]:
-    """Origins of a setting, each once.
+    """Return the origins of a setting, without duplicates.
 
     Raises:
         InvalidInput: one of them is not an exact origin.

@@ -23,7 +23,7 @@ CLOSED_FROM_ABOVE = frozenset({"assets", "models", "postgres", "valkey"})
 
 
 def make_private(home: Path) -> list[str]:
-    """Make the home, or close one that is there to other users, with what is in it.
+    """Make the home private: create it, or remove the access of other users to an existing one and its content.
 
     Returns:
         What was open until now, for a warning.
@@ -59,7 +59,7 @@ def make_private(home: Path) -> list[str]:
 
 
 def open_private(path: Path, mode: str, **options: Any) -> IO[Any]:
-    """`open`; a file that is made is readable by its owner alone, whatever the umask."""
+    """Open a file; a new file is readable by its owner alone, independent of the umask."""
     return open(path, mode, opener=_opener, **options)  # Path.open has no opener
 
 
@@ -73,7 +73,7 @@ def _opener(path: str, flags: int) -> int:
 
 
 def _close_all(home: Path) -> Iterator[tuple[Path, int]]:
-    """Close the home first, so that nothing can be put into it meanwhile; each path with the mode that it had."""
+    """Close the home first, so that no file can be added meanwhile; yield each path with its previous mode."""
     yield from _close(home)
     for folder, folders, files in os.walk(home):
         for name in (*folders, *files):

@@ -1,4 +1,4 @@
-"""Rate limits as they are written: "600/minute", by class of request.
+"""Rate limits in text form ("600/minute"), by class of request.
 
 Plain text here, so that keys and settings can be checked without the library that counts.
 """
@@ -19,7 +19,7 @@ FORM = re.compile(r"([1-9][0-9]{0,8})/(second|minute|hour|day)")
 
 @dataclass(frozen=True)
 class Rate:
-    """So many requests in so many seconds."""
+    """A number of requests in a number of seconds."""
 
     amount: int
     seconds: int
@@ -30,7 +30,7 @@ class Rate:
 
 
 def read_rate(text: str, *, where: str) -> Rate:
-    """A rate limit.
+    """Parse a rate limit.
 
     Raises:
         InvalidInput: it is none.
@@ -42,7 +42,7 @@ def read_rate(text: str, *, where: str) -> Rate:
 
 
 def check_rates(rates: Mapping[str, str], *, where: str) -> dict[str, str]:
-    """Rate limits by class of request, checked.
+    """Check rate limits by class of request.
 
     Raises:
         InvalidInput: an unknown class, or what is no rate.

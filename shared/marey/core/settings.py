@@ -52,7 +52,7 @@ TEXT = re.compile(r"https?://[^/?#\s]+/?|unix:///.+")
 
 
 def _of_json(value: object) -> object:
-    """What a variable's text says, for settings that are lists or objects; what is no JSON is refused as the text."""
+    """Parse a variable's JSON, for settings that are lists or objects; text that is not JSON is returned as it is."""
     try:
         return json.loads(value) if isinstance(value, str) else value
     except ValueError:
@@ -260,7 +260,7 @@ class Settings(BaseSettings):
 
     @property
     def notifications_url(self) -> str | None:
-        """Address for connections that LISTEN; None where no database is named."""
+        """Address for connections that LISTEN; None if no database is configured."""
         url = self.listen_url or self.database_url
         return None if url is None else url.get_secret_value()
 
@@ -323,7 +323,7 @@ class Settings(BaseSettings):
 
 @lru_cache(maxsize=1)
 def settings() -> Settings:
-    """The settings of this process.
+    """Return the settings of this process.
 
     Raises:
         InvalidInput: a variable holds what cannot be used.
@@ -344,7 +344,7 @@ def _secret_of(path: Path, variable: str) -> str:
 
 
 def _told(error: ValidationError) -> InvalidInput:
-    """The first thing that is wrong: the variable, its value and what is allowed. A secret's value is not told."""
+    """Describe the first error: the variable, its value and the allowed values. A secret's value is left out."""
     first = error.errors(include_url=False)[0]
     name = str(first["loc"][0])
     variable = PREFIX + name.upper()
@@ -362,7 +362,7 @@ def _is_secret(name: str) -> bool:
 
 
 def _allowed(name: str) -> str:
-    """What a setting may be, from its type and bounds."""
+    """Describe the allowed values of a setting, from its type and bounds."""
     field = Settings.model_fields[name]
     kind: Any = field.annotation
     if type(None) in get_args(kind):

@@ -1,5 +1,4 @@
-"""Addresses that are not of the public internet: IANA's special-purpose registries, and what clouds keep for
-themselves.
+"""Addresses outside the public internet: IANA's special-purpose registries, and those that clouds reserve.
 
 The tables stand here, since `ipaddress.is_global` differs between patch versions of Python (192.0.0.0/24 is global for
 3.11.7, where a cloud's metadata service answers). Blocks that IANA calls globally reachable but that serve a protocol

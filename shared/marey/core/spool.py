@@ -1,4 +1,4 @@
-"""Bytes on their way in or out of a process, kept in a file once they are many: memory does not grow with them."""
+"""Bytes on their way in or out of a process, kept in a file above a size so that memory does not grow."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ IN_MEMORY = 2**20
 
 
 class Spool:
-    """Written once, then read from its beginning as often as it takes.
+    """Buffer that is written once, then read from its beginning any number of times.
 
     A disk takes some bytes when they are written, some when what is buffered goes out and some when the file is closed;
     whenever it takes no more, the same is said.
     """
 
     def __init__(self, where: str, hint: str) -> None:
-        """`where` and `hint` of what is said when there is no room."""
+        """Set `where` and `hint` of the error that a full disk raises."""
         self._file = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 (closed by __exit__)
         self._size = 0
         self._where = where
         self._hint = hint
 
     def write(self, part: bytes) -> None:
-        """Add some bytes.
+        """Append bytes.
 
         Raises:
             Unreachable: there is no room for them.
@@ -40,7 +40,7 @@ class Spool:
         self._size += len(part)
 
     def rewound(self) -> BinaryIO:
-        """All of it, at its beginning; to be read while the block lasts.
+        """Yield the buffer at its beginning, for reading inside the block.
 
         Raises:
             Unreachable: there is no room for what was written last.
@@ -50,7 +50,7 @@ class Spool:
         return cast("BinaryIO", self._file)
 
     def __len__(self) -> int:
-        """Bytes written."""
+        """Number of bytes written."""
         return self._size
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""TLS contexts of outgoing connections: the authorities that the machine trusts, and those of `MAREY_CA_FILE`."""
+"""TLS contexts of outgoing connections: the machine's certificate authorities, and those of `MAREY_CA_FILE`."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def trusting_context(ca_file: Path | None = None) -> ssl.SSLContext:
 
 
 def verification_error(error: BaseException) -> str | None:
-    """Return why a certificate was refused, if that is what an error was caused by."""
+    """Return the reason why a certificate was rejected, if that caused the error."""
     seen: set[int] = set()
     waiting: list[BaseException | None] = [error]
     while waiting:

@@ -1,4 +1,4 @@
-"""Traces: from a command through API, queue and worker to the motion row. Off unless there is somewhere to send them.
+"""Traces from a command through API, queue and worker to the motion row. Off unless an exporter is configured.
 
 `OTEL_EXPORTER_OTLP_ENDPOINT` (or `…_TRACES_ENDPOINT`) switches them on, and the other `OTEL_*` variables mean what they
 do everywhere; until then nothing of OpenTelemetry is imported, and a span is an empty object. A context travels as a
@@ -32,7 +32,7 @@ _provider: Any = None
 
 
 class Span:
-    """A piece of work. Without an exporter it is nothing but the context it was begun in.
+    """A unit of work. Without an exporter it only carries the context it was started in.
 
     Attributes:
         traceparent: its context, for whoever goes on from here; None where there is none.
@@ -50,12 +50,12 @@ class Span:
             self._inner.set_attributes(_named(attributes))
 
     def rename(self, name: str) -> None:
-        """Call it by what is known now."""
+        """Change the name of the span."""
         if self._inner is not None:
             self._inner.update_name(name)
 
     def fail(self, error: BaseException) -> None:
-        """It ended so. Of an unexpected error only the kind is told: its text may quote a prompt."""
+        """Mark the span as failed. Only the type of an unexpected error is recorded: its text may quote a prompt."""
         if self._inner is not None:
             from opentelemetry.trace import Status, StatusCode
 
@@ -63,24 +63,24 @@ class Span:
             self._inner.set_status(Status(StatusCode.ERROR, told))
 
     def end(self) -> None:
-        """It is over."""
+        """End the span."""
         if self._inner is not None:
             self._inner.end()
 
 
 def wanted() -> bool:
-    """Whether the environment names somewhere to send traces."""
+    """Return True if the environment names a trace exporter."""
     off = os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true" or os.environ.get("OTEL_TRACES_EXPORTER") == "none"
     return not off and any(os.environ.get(name) for name in ENDPOINTS)
 
 
 def is_on() -> bool:
-    """Whether this process sends spans."""
+    """Return True if this process exports spans."""
     return _tracer is not None
 
 
 def configure_tracing(service: str, *, patience: float | None = None) -> None:
-    """Send spans of this process as those of the service `marey-…`, if `wanted`; to be called once, at its start.
+    """Export spans of this process as the service `marey-…`, if `wanted`. Call it once, at start-up.
 
     Args:
         patience: seconds for a collector that does not answer, where `OTEL_EXPORTER_OTLP_TIMEOUT` says nothing.
@@ -116,8 +116,7 @@ def configure_tracing(service: str, *, patience: float | None = None) -> None:
 
 
 def end_tracing() -> None:
-    """Send what is left, and switch off. A process that ends in good order does so by itself; a worker's child does
-    not."""
+    """Flush remaining spans and switch tracing off. Needed in a worker's child only; other processes flush at exit."""
     global _tracer, _provider
     if _provider is not None:
         _provider.shutdown()
@@ -127,7 +126,7 @@ def end_tracing() -> None:
 def begin(
     name: str, *, parent: str | None = None, kind: Kind = "internal", ago: float = 0.0, **attributes: Value
 ) -> Span:
-    """A span that somebody ends later, perhaps on another thread.
+    """Start a span that is ended later, perhaps on another thread.
 
     Args:
         parent: `traceparent` of what it belongs to; None = what is under way here.
@@ -153,7 +152,7 @@ def begin(
 
 @contextmanager
 def span(name: str, *, parent: str | None = None, kind: Kind = "internal", **attributes: Value) -> Generator[Span]:
-    """A span of what happens inside; spans begun there belong to it."""
+    """Open a span around a block; spans started inside become its children."""
     made = begin(name, parent=parent, kind=kind)
     made.set(**attributes)
     with under(made.traceparent):
@@ -168,7 +167,7 @@ def span(name: str, *, parent: str | None = None, kind: Kind = "internal", **att
 
 @contextmanager
 def under(traceparent: str | None) -> Generator[None]:
-    """What happens inside belongs to that context."""
+    """Run a block under a given trace context."""
     token = _current.set(traceparent)
     try:
         yield
@@ -177,23 +176,23 @@ def under(traceparent: str | None) -> Generator[None]:
 
 
 def current() -> str | None:
-    """The `traceparent` of what is under way here."""
+    """Return the `traceparent` of the current context."""
     return _current.get()
 
 
 def trace_id(traceparent: str | None) -> str | None:
-    """The trace that a context belongs to, 32 hex digits."""
+    """Return the trace id of a context, 32 hex digits."""
     return None if traceparent is None else traceparent.split("-")[1]
 
 
 def accepted(header: str | None) -> str | None:
-    """A `traceparent` as it came in, if it is one: it goes into rows and logs, so nothing else may."""
+    """Return an incoming `traceparent` if it is valid, else None: it is written to rows and logs."""
     found = None if header is None else FORM.match(header)
     return None if found is None else f"00-{found[1]}-{found[2]}-{found[3]}"
 
 
 def made_up() -> str:
-    """A context for a request that came without one, so that log lines can be told apart where traces are off."""
+    """Return a new context for a request without one, so that its log lines can be told apart without tracing."""
     return f"00-{os.urandom(16).hex()}-{os.urandom(8).hex()}-00"
 
 
@@ -202,7 +201,7 @@ def _named(attributes: dict[str, Value]) -> dict[str, Value]:
 
 
 def _context(traceparent: str | None) -> Any:
-    """OpenTelemetry's context of a `traceparent`: an empty one begins a trace."""
+    """Return OpenTelemetry's context of a `traceparent`; an empty one starts a new trace."""
     from opentelemetry.context import Context
     from opentelemetry.trace import NonRecordingSpan, SpanContext, TraceFlags, set_span_in_context
 

@@ -1,4 +1,4 @@
-"""The oldest Postgres and Redis that Marey runs on, and the check of each. docs/how-to/deployment.md names them too."""
+"""Oldest supported versions of Postgres and Redis, and the check of each. The deployment guide lists them too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Connections to Postgres that notice when the server has fallen silent.
+"""Connections to Postgres that detect a silent server.
 
 A firewall that drops a flow, a hung load balancer or a stopped server leave a connection open: the client's kernel may
 even see every byte acknowledged, so neither keepalives nor `tcp_user_timeout` find the fault. Only a deadline on the
@@ -55,14 +55,14 @@ END_SESSIONS = """
 
 @dataclass(frozen=True)
 class Session:
-    """A process of the server: its number may be used again, by one that starts later than `seen`."""
+    """A backend process of the server; its number may be reused by one that starts later than `seen`."""
 
     pid: int
     seen: datetime
 
 
 def milliseconds(deadline: Deadline) -> tuple[str, str]:
-    """The server's two limits, `statement_timeout` and `idle_in_transaction_session_timeout`, as it reads them."""
+    """Return the server's two limits, `statement_timeout` and `idle_in_transaction_session_timeout`, as text."""
     return str(round(deadline.statement * 1000)), str(round(deadline.idle * 1000))
 
 
@@ -84,12 +84,12 @@ class ConnectionGroup:
         """How often the server was found silent: whoever compares it with an earlier value learns of an outage."""
 
     def add(self, connection: DeadlineConnection) -> None:
-        """Take in a new connection."""
+        """Add a new connection."""
         with self._lock:
             self._connections.add(connection)
 
     def missed(self, seconds: float) -> None:
-        """The server did not answer: close every connection that has not heard from it lately.
+        """Handle a missed deadline: close every connection that has not heard from the server lately.
 
         Threads that wait for an answer on one of them are woken by that. Connections that are in use and hear from the
         server stay, so an alarm on a busy, living server costs idle connections and the longest statements only.
@@ -133,12 +133,12 @@ class ConnectionGroup:
                 log.info("lost_sessions_ended", sessions=ended)
 
     def answered(self) -> None:
-        """The server answered."""
+        """Record that the server answered."""
         self.silent = False
 
     @contextlib.contextmanager
     def turn(self) -> Generator[None]:
-        """Around taking a connection: while the server is silent one caller at a time tries it.
+        """Guard the checkout of a connection: while the server is silent, one caller at a time tries it.
 
         The others fail at once, and keep neither threads nor pool slots waiting for a server that does not answer.
 
@@ -161,7 +161,7 @@ class ConnectionGroup:
 
 
 class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
-    """A psycopg connection on which no round trip waits for longer than `limit` seconds of silence.
+    """A psycopg connection on which every round trip is limited to `limit` seconds of silence.
 
     Every round trip of psycopg (statement, COPY, commit, rollback) goes through `wait`; connecting has a timeout of its
     own. A missed deadline closes the connection and tells its group.
@@ -181,7 +181,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
     _line_lock: threading.Lock
 
     def join(self, group: ConnectionGroup) -> None:
-        """Become one of the connections of `group`, right after connecting."""
+        """Join `group`, right after connecting."""
         self.group = group
         self._heard = time.monotonic()
         self._line_lock = threading.Lock()
@@ -255,7 +255,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
             raise
 
     def _watched(self, gen: _Waiting[RV]) -> Generator[Any, Any, RV]:
-        """`gen`, but given up when nothing came for `limit` seconds, or when it is not done after `in_all` of them."""
+        """Run `gen`, but give up after `limit` seconds of silence, or after `in_all` of them in total."""
         limit_in_all = in_all(self.limit)
         spent = 0.0
         try:
@@ -280,7 +280,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
             return end.value
 
     def _has_data(self) -> bool:
-        """Return True if the answer is here after all: this process, not the server, may have been stopped."""
+        """Return True if the answer is here after all: this process, not the server, may have been suspended."""
         poll = select.poll()
         poll.register(self.pgconn.socket, select.POLLIN)
         return bool(poll.poll(0))
@@ -304,7 +304,7 @@ _groups_lock = threading.Lock()
 
 
 def group_of(url: sa.URL) -> ConnectionGroup:
-    """The group of this process' connections to a database."""
+    """Return the group of this process' connections to a database."""
     key = url.set(drivername="postgresql").render_as_string(hide_password=False)
     with _groups_lock:
         group = _groups.get(key)

@@ -29,7 +29,7 @@ SET_LOCAL = "SET LOCAL statement_timeout = {}; SET LOCAL idle_in_transaction_ses
 
 
 def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadline: Deadline = ORDINARY) -> sa.Engine:
-    """An engine for `postgresql+psycopg://…` (plain `postgresql://` is taken as the same).
+    """Create an engine for `postgresql+psycopg://…` (plain `postgresql://` is taken as the same).
 
     Connections are checked before use, so a restarted server costs no failed transaction. Every round trip has a
     deadline (`marey.db.deadlines`); `deadline` is that of transactions that name no other.
@@ -68,7 +68,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
 def transaction(
     engine: sa.Engine, deadline: Deadline | None = None, *, snapshot: bool = False
 ) -> Generator[sa.Connection]:
-    """One transaction: commits at the end, rolls back on an exception.
+    """Run a block in one transaction: commit at the end, roll back on an exception.
 
     Args:
         deadline: the kind of its calls (`marey.db.deadlines`); None = the engine's.
@@ -110,12 +110,12 @@ def _limit(connection: sa.Connection, deadline: Deadline) -> None:
 
 
 def outages(engine: sa.Engine) -> int:
-    """How often this process has found the database of `engine` silent: an outage that retries may have hidden."""
+    """Return how often this process found the database of `engine` silent: an outage that retries may have hidden."""
     return engine.get_execution_options()[GROUP].misses
 
 
 def unreachable(error: BaseException) -> Unreachable:
-    """The expected error for a database that does not answer, or has no room."""
+    """Return the expected error for a database that does not answer, or has no free connection."""
     cause = getattr(error, "orig", None) or error
     if isinstance(cause, psycopg.errors.DiskFull):  # its text names a file of the server
         hint = "Make room on the disk of Postgres; what waits goes on by itself."

@@ -1,4 +1,4 @@
-"""The deadlines of calls to Postgres, by kind of call.
+"""Deadlines of calls to Postgres, by kind of call.
 
 Each kind has two limits. The server ends a statement that runs for longer than `statement`; such a statement fails with
 a clean error and its connection stays usable. The client waits a little longer, `answer` seconds without a byte from
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Deadline:
-    """Limits of the calls of one transaction, seconds."""
+    """Limits of the calls of one transaction, in seconds."""
 
     name: str
     statement: float
@@ -63,7 +63,7 @@ MIGRATION = Deadline("migration", statement=3600.0, idle=600.0)
 
 
 def in_all(limit: float) -> float:
-    """Seconds that one round trip may take in all, of a connection that may be silent for `limit` seconds."""
+    """Return the limit of one round trip in total, for a connection that may be silent for `limit` seconds."""
     return limit if limit <= SHORT_SECONDS else limit * SLOWNESS
 
 

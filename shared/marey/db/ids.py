@@ -8,7 +8,8 @@ from uuid import UUID
 
 
 def new_id() -> UUID:
-    """A new UUIDv7: Unix milliseconds (48 bits), their fraction (12 bits, RFC 9562 6.2 method 3), 62 random bits."""
+    """Return a new UUIDv7: Unix milliseconds (48 bits), their fraction (12 bits, RFC 9562 6.2 method 3), 62 random
+    bits."""
     milliseconds, nanoseconds = divmod(time.time_ns(), 1_000_000)
     fraction = (nanoseconds << 12) // 1_000_000
     random = int.from_bytes(os.urandom(8)) >> 2

@@ -26,7 +26,7 @@ class Notification:
 
 
 def check_listening(url: str) -> None:
-    """Connect once as a `Listener` does, for a server that starts. A database that is away is no error here.
+    """Connect once as a `Listener` does, for a server that starts. An unreachable database is not an error here.
 
     Raises:
         InvalidInput: notifications do not arrive.
@@ -36,7 +36,7 @@ def check_listening(url: str) -> None:
 
 
 class Listener:
-    """A connection of its own that LISTENs; for the relay and for the API's broadcaster. Not shared between threads."""
+    """A dedicated LISTEN connection, for the relay and for the API's broadcaster. Not thread-safe."""
 
     def __init__(self, url: str, channels: tuple[str, ...]) -> None:
         """Connect and listen.
@@ -61,7 +61,7 @@ class Listener:
         self._heard = time.monotonic()
 
     def wait(self, timeout: float) -> list[Notification]:
-        """The notifications that arrive within `timeout` seconds: returns at once with the first ones, [] if none.
+        """Return the notifications that arrive within `timeout` seconds: at once with the first ones, [] if none.
 
         After `PROBE_EVERY` seconds without any, the connection itself is asked whether it still answers.
 
@@ -99,7 +99,7 @@ class Listener:
         return [Notification(notify.channel, notify.payload) for notify in found]
 
     def _check_delivery(self, url: str) -> None:
-        """Notify this connection from another one, and see whether it arrives.
+        """Notify this connection from another one, and check that the notification arrives.
 
         Raises:
             InvalidInput: it does not.

@@ -40,7 +40,7 @@ def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATI
 
 
 def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -> None:
-    """Migrate down to a revision ("base" = no tables). What the younger tables and columns held is lost.
+    """Migrate down to a revision ("base" = no tables). Data of the younger tables and columns is lost.
 
     Raises:
         Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
@@ -75,7 +75,7 @@ def _migrate(engine: sa.Engine, move: Callable[[Config, str], None], revision: s
 
 
 def check_revision(engine: sa.Engine) -> None:
-    """Raise when the database lacks what this version needs.
+    """Raise if the database lacks tables or columns that this version needs.
 
     A database of a newer version is fine: migrations only add, and an upgrade migrates first
     (docs/how-to/deployment.md).

@@ -1,4 +1,4 @@
-"""Pages of listings, in the order of the database's clock. Cursors are opaque.
+"""Pages of listings, ordered by the database's clock. Cursors are opaque.
 
 A cursor holds the id and the creation time of the last row. Those of earlier releases hold its id alone, and are read
 too: the time is that of the row, or, when that is gone, the time in its UUIDv7. In turn an API process of an earlier
@@ -52,7 +52,7 @@ class Order:
         return (self.created.desc(), self.id.desc()) if self.descending else (self.created, self.id)
 
     def place(self, cursor: str, scope: sa.ColumnElement[bool]) -> Place:
-        """Where a cursor stands.
+        """Return the position of a cursor.
 
         Args:
             scope: the rows of the listing; the row of an earlier release's cursor is looked up among them.
@@ -68,12 +68,12 @@ class Order:
         return sa.tuple_(at, sa.literal(mark.id, Id))
 
     def beyond(self, place: Place) -> sa.ColumnElement[bool]:
-        """The condition of rows that come after a place."""
+        """Return the condition of rows that come after a position."""
         here = sa.tuple_(self.created, self.id)
         return here < place if self.descending else here > place
 
     def after(self, cursor: str, scope: sa.ColumnElement[bool]) -> sa.ColumnElement[bool]:
-        """The condition of rows that come after a cursor; raises as `place`."""
+        """Return the condition of rows that come after a cursor; raises as `place`."""
         return self.beyond(self.place(cursor, scope))
 
 
@@ -96,12 +96,12 @@ class _Mark:
 
 
 def mark_of(created: datetime, identifier: UUID) -> str:
-    """The mark of a row for `cut_page`."""
+    """Return the mark of a row for `cut_page`."""
     return f"{{{identifier}}}{SEPARATOR}{created.isoformat()}"
 
 
 def page_limit(limit: int) -> int:
-    """`limit`, checked.
+    """Validate a page size and return it.
 
     Raises:
         InvalidInput: out of range.
@@ -112,19 +112,19 @@ def page_limit(limit: int) -> int:
 
 
 def cut_page(rows: Sequence[Row], limit: int, mark: Callable[[Row], str]) -> Page[Row]:
-    """The first `limit` rows of one more than asked for; the cursor is the mark of the last."""
+    """Return the first `limit` rows of one more than asked for; the cursor is the mark of the last."""
     kept = tuple(rows[:limit])
     return Page(kept, cursor_at(mark(kept[-1])) if len(rows) > limit else None)
 
 
 def cursor_at(mark: str) -> str:
-    """The cursor of the page that comes after a mark."""
+    """Return the cursor of the page that comes after a mark."""
     parts = mark.split(SEPARATOR)
     return "".join(base64.urlsafe_b64encode(part.encode()).decode() for part in parts).rstrip("=")
 
 
 def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
-    """The mark in a cursor.
+    """Decode the mark of a cursor.
 
     Raises:
         InvalidInput: it is none of ours.

@@ -15,23 +15,23 @@ CLOCK = sa.func.clock_timestamp()
 
 
 def among(column: sa.Column[Any], values: Iterable[object]) -> sa.ColumnElement[bool]:
-    """`column = ANY(array)`: one parameter, however many values."""
+    """Return `column = ANY(array)`: one parameter for any number of values."""
     return column == sa.any_(sa.literal(list(values), ARRAY(column.type)))
 
 
 def interval(seconds: float) -> sa.Function[object]:
-    """A length of time for comparisons with `CLOCK`."""
+    """Return a length of time for comparisons with `CLOCK`."""
     return sa.func.make_interval(0, 0, 0, 0, 0, 0, seconds)
 
 
 def notify(conn: sa.Connection, channel: str, payloads: Iterable[str]) -> None:
-    """NOTIFY when this transaction commits; equal ones are sent once."""
+    """NOTIFY when this transaction commits; equal payloads are sent once."""
     for payload in payloads:
         conn.execute(sa.select(sa.func.pg_notify(channel, payload)))
 
 
 def check_text(text: str | None, where: str) -> None:
-    """Check that Postgres can hold a text; what may come in is checked at the edge (`marey.core.characters`).
+    """Validate that Postgres can store a text; incoming text is checked at the edge (`marey.core.characters`).
 
     Raises:
         InvalidInput: it holds NUL or a lone surrogate.

@@ -1,4 +1,4 @@
-"""What all tables are made with."""
+"""Column types, metadata and constraints that all tables share."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ NOW = sa.text("now()")
 
 
 def one_of(column: str, values: Iterable[str]) -> str:
-    """The condition that a column holds one of some values."""
+    """Return the condition that a column holds one of some values."""
     return f"{column} IN ({', '.join(repr(str(value)) for value in values)})"
 
 
 def short_id(column: str = "id") -> sa.ColumnElement[str]:
-    """The last eight digits of an id, as its index has them."""
+    """Return the last eight digits of an id, as its index has them."""
     return sa.literal_column(f'"right"({column}::text, 8)', sa.Text)

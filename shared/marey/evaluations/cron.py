@@ -1,4 +1,4 @@
-"""When a cron line is due, in a time zone. The arithmetic is cronsim's: Debian's cron, also where clocks change.
+"""Due times of a cron line in a time zone, computed by cronsim: Debian's cron, also at clock changes.
 
 A time that a change of clocks leaves out comes at the end of the gap; one that comes twice is due once, at the first,
 unless its line names every hour or every minute.
@@ -23,7 +23,7 @@ MOST_TRIES = 10_000
 
 
 def check_cron(cron: str) -> str:
-    """The line, blanks made single.
+    """Validate a cron line and return it with single spaces.
 
     Raises:
         InvalidInput: it is none, or it names a day that no year has.
@@ -34,7 +34,7 @@ def check_cron(cron: str) -> str:
 
 
 def check_zone(name: str) -> str:
-    """The name of a time zone, as it is known.
+    """Validate the name of a time zone and return its canonical form.
 
     Raises:
         InvalidInput: there is none of that name.
@@ -47,7 +47,7 @@ def check_zone(name: str) -> str:
 
 
 def next_time(cron: str, zone: str, after: datetime) -> datetime:
-    """The first time after a moment, in UTC.
+    """Return the first due time after a moment, in UTC.
 
     Raises:
         InvalidInput: the line is none, or is never due again.
@@ -64,7 +64,8 @@ def next_time(cron: str, zone: str, after: datetime) -> datetime:
 
 
 def last_time(cron: str, zone: str, until: datetime, since: datetime) -> datetime:
-    """The last time at or before `until`, not before `since`, which is one itself: what stands for all those between.
+    """Return the last due time at or before `until`, not before `since`, which is one itself; it stands for all
+    between.
 
     Raises:
         InvalidInput: the line is none.

@@ -1,4 +1,4 @@
-"""Evaluations: rows that say where each stands, and why. Their work is jobs like any other.
+"""Evaluations: rows with state and reason. Their work is done by ordinary jobs.
 
 Every change of state happens under the lock of the evaluation's row, which comes before the locks of its jobs, and
 leaves an event with its reason. What makes an evaluation `done` stands in `scoring.py`.
@@ -38,7 +38,7 @@ from marey.webhooks.types import EventKind
 
 
 def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[EvaluationPrompt]) -> str:
-    """Keep prompts, once however often they are used; their digest."""
+    """Store prompts once, however often they are used; return their digest."""
     sha256 = prompts_sha256(prompts)
     rows = [prompt.as_json() for prompt in prompts]
     new = insert(tables.prompt_set).values(tenant_id=tenant, sha256=sha256, count=len(rows), prompts=rows)
@@ -49,7 +49,7 @@ def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[Evaluation
 
 
 def remove_unused_prompts(conn: sa.Connection) -> int:
-    """Remove prompts that no schedule and no evaluation refers to; how many sets."""
+    """Remove prompt sets without a schedule or evaluation; return their number."""
     table, schedule, evaluation = tables.prompt_set, tables.schedule.c, tables.evaluation.c
     unused = ~(
         sa.exists().where(schedule.tenant_id == table.c.tenant_id, schedule.prompts_sha256 == table.c.sha256)
@@ -66,7 +66,7 @@ def remove_unused_prompts(conn: sa.Connection) -> int:
 
 
 def load_prompts(conn: sa.Connection, tenant: str, sha256: str) -> tuple[EvaluationPrompt, ...]:
-    """The prompts of a digest.
+    """Return the prompts of a digest.
 
     Raises:
         NotFound: the tenant has none of that digest.
@@ -80,8 +80,8 @@ def load_prompts(conn: sa.Connection, tenant: str, sha256: str) -> tuple[Evaluat
 
 
 def create_evaluation(conn: sa.Connection, new: NewEvaluation) -> UUID | None:
-    """Plan an evaluation; None when its schedule has one for that time already. With an idempotency key that was used
-    for the same request within 24 hours, the id of the evaluation that was made then.
+    """Plan an evaluation; None if its schedule has one for that time already. With an idempotency key that was used for
+    the same request within 24 hours, return the id of the earlier evaluation.
 
     Raises:
         InvalidInput: text that the database cannot hold.
@@ -112,7 +112,7 @@ def create_evaluation(conn: sa.Connection, new: NewEvaluation) -> UUID | None:
 
 
 def get_evaluation(conn: sa.Connection, tenant: str, evaluation: UUID) -> EvaluationRow:
-    """One evaluation.
+    """Return one evaluation.
 
     Raises:
         NotFound: the tenant has no such evaluation.
@@ -133,7 +133,7 @@ def list_evaluations(
     cursor: str | None = None,
     limit: int = 50,
 ) -> Page[EvaluationRow]:
-    """Evaluations, newest first; of a schedule, of these states, if any are given."""
+    """Return evaluations, newest first, optionally of a schedule or in the given states."""
     table = tables.evaluation.c
     ours = table.tenant_id == tenant
     query, order = _evaluations().where(ours), Order(table.created_at, table.id)
@@ -148,15 +148,15 @@ def list_evaluations(
 
 
 def evaluation_events(conn: sa.Connection, evaluation: UUID) -> list[EvaluationEvent]:
-    """Its changes of state, in order."""
+    """Return the changes of state of an evaluation, in order."""
     table = tables.evaluation_event.c
     query = sa.select(table.state, table.reason, table.at).where(table.evaluation_id == evaluation).order_by(table.at)
     return [EvaluationEvent(EvaluationState(state), reason, at) for state, reason, at in conn.execute(query)]
 
 
 def check_baseline(conn: sa.Connection, tenant: str, request: EvaluationRequest, prompts: str) -> None:
-    """Nothing, if the baseline that is asked for, if any, can be compared with: done, of the same prompts, measured by
-    the same evaluator. Distances in the space of another one are other numbers.
+    """Validate that the requested baseline, if any, is comparable: done, of the same prompts, measured by the same
+    evaluator. Distances in the space of another evaluator are other numbers.
 
     Raises:
         InvalidInput: it cannot.
@@ -171,8 +171,8 @@ def check_baseline(conn: sa.Connection, tenant: str, request: EvaluationRequest,
 
 
 def check_comparable(run: EvaluationRow, *, prompts: str | None, evaluator: str | None, where: str) -> None:
-    """Nothing, if a run can be compared with one of these prompts (their digest) and this exact evaluator: done, of the
-    same prompts, measured by the same evaluator.
+    """Validate that a run is comparable, given the digest of the prompts and the exact evaluator: done, of the same
+    prompts, measured by the same evaluator.
 
     Raises:
         InvalidInput: it cannot; `where` is what names the run in the request.
@@ -189,7 +189,8 @@ def check_comparable(run: EvaluationRow, *, prompts: str | None, evaluator: str 
 
 
 def evaluation_waits_for(conn: sa.Connection, row: EvaluationRow) -> str | None:
-    """What an open evaluation cannot go on without: a queue that holds its work and that no living worker serves."""
+    """Return the queue that an open evaluation waits for: it holds the evaluation's work and no live worker serves
+    it."""
     job = row.scoring if row.state is EvaluationState.SCORING else row.generation
     if row.state not in OPEN_EVALUATIONS or job is None or job.state in ENDED:
         return None
@@ -206,14 +207,14 @@ def evaluation_waits_for(conn: sa.Connection, row: EvaluationRow) -> str | None:
 
 
 def open_evaluations(conn: sa.Connection) -> list[UUID]:
-    """Those that are not over, oldest first."""
+    """Return open evaluations, oldest first."""
     table = tables.evaluation.c
     return list(conn.execute(sa.select(table.id).where(table.finished_at.is_(None)).order_by(table.id)).scalars())
 
 
 def lock_evaluation(conn: sa.Connection, evaluation: UUID, *, skip_locked: bool = False) -> EvaluationRow | None:
-    """An evaluation, its row locked until the transaction ends; None when there is none (or, with `skip_locked`, when
-    somebody else has it)."""
+    """Lock an evaluation's row until the transaction ends; None if there is none (or, with `skip_locked`, it is
+    locked)."""
     table = tables.evaluation.c
     lock = sa.select(table.id).where(table.id == evaluation)
     # NO KEY: reports and events that refer to the row may be looked at by others meanwhile.
@@ -224,7 +225,7 @@ def lock_evaluation(conn: sa.Connection, evaluation: UUID, *, skip_locked: bool 
 def move_evaluation(
     conn: sa.Connection, row: EvaluationRow, state: EvaluationState, reason: str, **values: object
 ) -> None:
-    """Take an evaluation under lock to another state.
+    """Move a locked evaluation to another state.
 
     Raises:
         ValueError: it may not go there from where it is.
@@ -249,7 +250,7 @@ def move_evaluation(
 def cancel_evaluation(
     conn: sa.Connection, tenant: str, evaluation: UUID, reason: str = "cancelled by operator"
 ) -> EvaluationRow:
-    """Cancel an evaluation and the job that runs for it; what was made stays. Over already: no change.
+    """Cancel an evaluation and its running job; existing motions stay. Ended already: no change.
 
     Raises:
         NotFound: the tenant has no such evaluation.
@@ -301,7 +302,7 @@ def _evaluations() -> sa.Select[*tuple[Any, ...]]:
 
 
 def _read(conn: sa.Connection, query: sa.Select[Any]) -> list[EvaluationRow]:
-    """Evaluations with their reports: two queries, however many."""
+    """Return evaluations with their reports, in two queries."""
     rows = conn.execute(query).mappings().all()
     reports = files_of(conn, tables.evaluation_report.c.evaluation_id, [row["id"] for row in rows], ReportFile)
     return [_row(row, tuple(reports[row["id"]])) for row in rows]
@@ -343,7 +344,7 @@ def enqueue_evaluation_event(
     schedule: UUID | None,
     regressed: bool | None,
 ) -> None:
-    """Tell of an evaluation that is over, and once more if it is worse than what it was compared with."""
+    """Enqueue a webhook event for an evaluation that ended, and another one if it is worse than its baseline."""
     data = {"evaluation": evaluation, "state": state, "schedule": schedule, "regressed": regressed}
     enqueue_event(conn, tenant, EventKind.EVALUATION_ENDED, data)
     if regressed:
@@ -351,7 +352,7 @@ def enqueue_evaluation_event(
 
 
 def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
-    """Nothing, if no evaluation that is not over works with this job. Its row is locked, before the job's.
+    """Validate that no open evaluation uses this job. The evaluation's row is locked, before the job's.
 
     Raises:
         Conflict: one does.

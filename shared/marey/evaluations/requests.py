@@ -1,5 +1,5 @@
-"""From what an evaluation was asked for to what it runs: exact bundles, prompts, items. For the API, which checks, and
-for the scheduler, which does it."""
+"""Conversion of an evaluation request to exact bundles, prompts and items. The API validates with it, the scheduler
+runs it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Plan:
     prompts: tuple[EvaluationPrompt, ...]
 
     def generation(self, row: EvaluationRow) -> NewJob:
-        """The job that makes its motions."""
+        """Return the job that generates its motions."""
         return NewJob(
             items=new_items((item, self.offer) for item in self._items()),
             tenant=row.tenant,
@@ -59,7 +59,7 @@ class Plan:
 
 
 def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt, ...] | None, config: Settings) -> Plan:
-    """Look up the bundles of a request, and check that all of it can be made. Loads no model.
+    """Resolve the bundles of a request, and validate that it can run. Loads no model.
 
     Args:
         prompts: its own; None = those of the evaluator's bundle.
@@ -91,7 +91,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
 
 
 def scoring_job(row: EvaluationRow) -> NewJob:
-    """The job of one item that measures what was made."""
+    """Return the job of one item that measures the motions."""
     evaluator = row.request.evaluator
     assert evaluator is not None  # exact since its motions were asked for
     item = NewItem(
@@ -115,7 +115,7 @@ def scoring_job(row: EvaluationRow) -> NewJob:
 
 
 def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
-    """Better said now than when thousands of motions were made."""
+    """Validate that generator and evaluator share a layout, before thousands of motions are made."""
     found = unlike(generator.manifest, evaluator.manifest)
     if found is not None:
         what, made, measured = found

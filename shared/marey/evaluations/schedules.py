@@ -1,4 +1,4 @@
-"""Schedules: which evaluations come again, and when. Their times are the database's."""
+"""Schedules of recurring evaluations. Times are those of the database."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from marey.tenants import tables as tenant_tables
 
 
 def create_schedule(conn: sa.Connection, new: NewSchedule) -> UUID:
-    """A new schedule, first due at its next time from now.
+    """Create a schedule, first due at its next time from now.
 
     Raises:
         InvalidInput: of its cron line, time zone or name.
@@ -46,7 +46,7 @@ def create_schedule(conn: sa.Connection, new: NewSchedule) -> UUID:
 
 
 def get_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> ScheduleRow:
-    """One schedule.
+    """Return one schedule.
 
     Raises:
         NotFound: the tenant has no such schedule.
@@ -63,7 +63,7 @@ def get_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> ScheduleRo
 def list_schedules(
     conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50
 ) -> Page[ScheduleRow]:
-    """Schedules, newest first."""
+    """Return schedules, newest first."""
     table = tables.schedule.c
     ours = table.tenant_id == tenant
     query, order = _schedules().where(ours), Order(table.created_at, table.id)
@@ -74,8 +74,8 @@ def list_schedules(
 
 
 def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: ScheduleChange) -> ScheduleRow:
-    """Change a schedule. One that goes on after a pause, or has new times, is next due at its next time from now: what
-    it missed until then is not made up for.
+    """Change a schedule. After a pause, or with new times, it is next due at its next time from now; missed times are
+    skipped.
 
     Raises:
         NotFound: the tenant has no such schedule.
@@ -99,7 +99,7 @@ def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: Sc
 
 
 def delete_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> None:
-    """Remove a schedule. Its evaluations stay, and one that runs goes on.
+    """Delete a schedule. Its evaluations stay, and running ones continue.
 
     Raises:
         NotFound: the tenant has no such schedule.
@@ -125,13 +125,13 @@ def run_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> UUID:
 
 
 def due_schedules(conn: sa.Connection) -> list[UUID]:
-    """Those that are due, the longest first."""
+    """Return due schedules, the most overdue first."""
     table = tables.schedule.c
     return list(conn.execute(sa.select(table.id).where(_is_due()).order_by(table.next_at, table.id)).scalars())
 
 
 def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
-    """Plan the evaluation that a schedule is due for; None when it is not due (any more), or somebody else does it.
+    """Plan the due evaluation of a schedule; None if it is not due, or another process has it.
 
     After an outage the newest of the missed times stands for all of them. A schedule whose cron line or time zone is
     known no longer is paused, and its evaluation has failed with the reason.
@@ -162,7 +162,7 @@ def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
 
 
 def _give_up(conn: sa.Connection, row: ScheduleRow, due: datetime, reason: str) -> UUID | None:
-    """An evaluation that has failed: what its owner finds in the history."""
+    """Write a failed evaluation, visible in the schedule's history."""
     made = create_evaluation(conn, _evaluation(row, due, "due"))
     planned = None if made is None else lock_evaluation(conn, made)
     if planned is not None:
@@ -171,7 +171,8 @@ def _give_up(conn: sa.Connection, row: ScheduleRow, due: datetime, reason: str) 
 
 
 def _is_due() -> sa.ColumnElement[bool]:
-    """While one of its evaluations runs, a schedule waits: runs that take longer than their interval do not pile up."""
+    """Return the condition of due schedules. A schedule waits while one of its evaluations runs, so that long runs do
+    not pile up."""
     table, evaluation = tables.schedule.c, tables.evaluation.c
     runs = sa.exists().where(evaluation.schedule_id == table.id, evaluation.finished_at.is_(None))
     idle = sa.exists().where(

@@ -1,4 +1,4 @@
-"""Scoring an evaluation: what its score item is measured on, and the transaction that ends it."""
+"""Scoring of an evaluation: the input of its score item, and the transaction that ends it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ EVALUATION_OF_LEASE = sa.text("""
 
 
 def load_score(conn: sa.Connection, job: UUID) -> ScoreRows:
-    """What the score item of this job is measured on.
+    """Return the input of a job's score item.
 
     Raises:
         NotFound: no evaluation is scored by this job, or what it needs was deleted.
@@ -122,7 +122,7 @@ def _refuse_over(evaluation: EvaluationRow) -> None:
 
 
 def _made_items(conn: sa.Connection, evaluation: EvaluationRow, job: UUID, prompts: str) -> tuple[MadeItem, ...]:
-    """Items of the generation with their npz, in one query however many."""
+    """Return the items of the generation with their npz, in one query."""
     expected = [prompt.expected for prompt in load_prompts(conn, evaluation.tenant, prompts)]
     item, motion, file, asset = job_tables.item.c, job_tables.motion.c, job_tables.motion_file.c, job_tables.asset.c
     rows = conn.execute(
@@ -151,8 +151,7 @@ def _made_item(row: sa.RowMapping, expected: Sequence[str | None]) -> MadeItem:
 
 
 def _history(conn: sa.Connection, evaluation: EvaluationRow) -> tuple[EarlierRun, ...]:
-    """The last runs that can be compared with, the oldest first: of the same model and prompts, measured by the same
-    evaluator."""
+    """Return the last comparable runs, oldest first: of the same model and prompts, measured by the same evaluator."""
     table = tables.evaluation.c
     request = evaluation.request
     comparable = (
@@ -174,7 +173,7 @@ def _baseline(conn: sa.Connection, evaluation: EvaluationRow) -> EarlierRun | No
 
 
 def _earlier(conn: sa.Connection, wanted: sa.ColumnElement[bool], limit: int) -> list[EarlierRun]:
-    """Runs that are done, the newest first."""
+    """Return runs that are done, newest first."""
     table, report, asset = tables.evaluation.c, tables.evaluation_report.c, job_tables.asset.c
     query = (
         sa.select(

@@ -1,4 +1,4 @@
-"""States of evaluations, and the one table of allowed transitions. The database holds it in a trigger, too."""
+"""States of evaluations, and the table of allowed transitions. A database trigger enforces it too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class EvaluationState(StrEnum):
-    """Where an evaluation stands. `DONE`, `FAILED` and `CANCELLED` are final; to try again is a new evaluation."""
+    """State of an evaluation. `DONE`, `FAILED` and `CANCELLED` are final; a retry is a new evaluation."""
 
     PLANNED = "planned"
     GENERATING = "generating"

@@ -1,4 +1,4 @@
-"""What goes into and comes out of the repositories of evaluations and schedules."""
+"""Data types of the repositories of evaluations and schedules."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Summary = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class EvaluationRequest:
-    """What is measured, and how.
+    """Subject and parameters of an evaluation.
 
     Args:
         bundle: the generator: an exact bundle; in a schedule whatever was given, as `hgm3-starter` or `hgm3`.
@@ -53,11 +53,11 @@ class EvaluationRequest:
 
     @property
     def splits(self) -> tuple[str, ...]:
-        """The splits of the evaluator's bundle that the prompts are captions of; none = they are somebody's own."""
+        """Splits of the evaluator's bundle that hold the prompts; empty for custom prompts."""
         return tuple(self.source.split("+")) if self.source in BUNDLE_SOURCES else ()
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in its row."""
+        """Return the form that the row stores."""
         values = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return {
             **values,
@@ -67,7 +67,7 @@ class EvaluationRequest:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> EvaluationRequest:
-        """From what `as_json` gave."""
+        """Rebuild from the output of `as_json`."""
         values = dict(row)
         values["baseline"] = None if row["baseline"] is None else UUID(row["baseline"])
         return cls(**values)
@@ -101,7 +101,7 @@ class NewEvaluation:
 
 @dataclass(frozen=True)
 class EvaluationJob:
-    """A job of an evaluation, as far as it got."""
+    """A job of an evaluation, with its progress."""
 
     id: UUID
     state: JobState
@@ -125,7 +125,7 @@ class ReportFile:
 
 @dataclass(frozen=True)
 class EvaluationEvent:
-    """A change of state, and why."""
+    """A change of state with its reason."""
 
     state: EvaluationState
     reason: str
@@ -159,7 +159,7 @@ class EvaluationRow:
 
     @property
     def label(self) -> str:
-        """Its name, or the end of its id: for people."""
+        """Name, or the end of the id: for people."""
         return self.name or str(self.id)[-8:]
 
 
@@ -168,7 +168,7 @@ class EvaluationRow:
 
 @dataclass(frozen=True)
 class MadeItem:
-    """What became of one item of an evaluation's generation."""
+    """Result of one item of an evaluation's generation."""
 
     index: int
     variant: int
@@ -190,7 +190,7 @@ class MadeItem:
 
 @dataclass(frozen=True)
 class EarlierRun:
-    """An evaluation that is done, of the same prompts, by the same evaluator."""
+    """A comparable evaluation: done, of the same prompts, by the same evaluator."""
 
     id: UUID
     name: str | None
@@ -203,7 +203,7 @@ class EarlierRun:
 
 @dataclass(frozen=True)
 class ScoreRows:
-    """All that is known of an evaluation that is to be scored."""
+    """All stored data of an evaluation to score."""
 
     evaluation: EvaluationRow
     items: tuple[MadeItem, ...]
@@ -230,7 +230,7 @@ class NewScore:
 
 @dataclass(frozen=True)
 class NewSchedule:
-    """A schedule to make; `cron` has five fields, in the time of `time_zone`."""
+    """A schedule to create; `cron` has five fields, in the time of `time_zone`."""
 
     tenant: str
     cron: str
@@ -264,7 +264,7 @@ class ScheduleRow:
 
 @dataclass(frozen=True)
 class ScheduleChange:
-    """What is to be changed of a schedule; None = nothing.
+    """Changes to a schedule; None = unchanged.
 
     Args:
         request: with the digest of its prompts, None for those of the evaluator's bundle.

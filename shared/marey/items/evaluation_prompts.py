@@ -1,4 +1,4 @@
-"""The prompts of an evaluation: what a line of a file or body may hold, and the one check of it.
+"""The prompts of an evaluation: allowed values of a line of a file or body, and their only check.
 
 Standard library only: the small client reads files with it, the API bodies, and both say the same of the same line.
 """
@@ -25,21 +25,21 @@ MAX_PROMPTS = 10_000
 
 @dataclass(frozen=True)
 class EvaluationPrompt:
-    """One prompt; `expected` is a text that `marey.items.expected` reads, None = nothing is checked."""
+    """One prompt; `expected` is text for `marey.items.expected`, None = nothing is checked."""
 
     prompt: str
     seconds: float | None = None
     expected: str | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """As a line of a body: only what was given."""
+        """Return a line of a body, with the given fields only."""
         return {name: value for name in COLUMNS if (value := getattr(self, name)) is not None}
 
 
 def read_prompts(
     raws: Iterable[tuple[int | None, object]], *, where: str | None = None, check: PromptCheck | None = None
 ) -> tuple[EvaluationPrompt, ...]:
-    """All prompts, or one error with all problems.
+    """Return all prompts, or raise one error with all problems.
 
     Args:
         check: gives what else is wrong with the fields of a prompt that can be used.
@@ -67,18 +67,18 @@ def read_prompts(
 
 
 def prompts_of(rows: Iterable[Mapping[str, Any]]) -> tuple[EvaluationPrompt, ...]:
-    """Prompts from what `as_json` gave."""
+    """Rebuild prompts from the output of `as_json`."""
     return tuple(EvaluationPrompt(**row) for row in rows)
 
 
 def prompts_sha256(prompts: Sequence[EvaluationPrompt]) -> str:
-    """One digest for prompts, lengths, expectations and their order: equal ones may be compared."""
+    """Return one digest of prompts, lengths, expectations and their order: equal digests are comparable."""
     rows = json.dumps([prompt.as_json() for prompt in prompts], ensure_ascii=False, sort_keys=True)
     return hashlib.sha256(rows.encode()).hexdigest()
 
 
 def _counted(raws: Iterable[tuple[int | None, object]], where: str | None) -> Iterator[tuple[int | None, object]]:
-    """What is far too long is not looked at to its end."""
+    """Stop reading once a list is over its limit."""
     for number, row in enumerate(raws):
         if number == MAX_PROMPTS:
             raise TooLarge(f"more than {MAX_PROMPTS:,} prompts, the limit of an evaluation", where=where)

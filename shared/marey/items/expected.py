@@ -1,4 +1,4 @@
-"""What a motion is expected to show, as a person writes it: `walk`, `wave left`, `walk straight then bow`.
+"""Expected content of a motion, as a person writes it: `walk`, `wave left`, `walk straight then bow`.
 
 Acts stand in the order in which they must come, joined by `then`. Standard library only: the small client reads files
 of prompts with it, and so does the API. What it means for a motion is for whoever judges one.
@@ -27,7 +27,7 @@ MAX_ACTS = 4
 
 @dataclass(frozen=True)
 class ExpectedAct:
-    """One act. `side` is empty where none is named."""
+    """One action. `side` is empty if none is named."""
 
     act: str
     side: str = ""
@@ -35,7 +35,7 @@ class ExpectedAct:
 
 
 def read_expected(text: str) -> tuple[ExpectedAct, ...]:
-    """The acts of a text such as `walk straight then wave left`.
+    """Parse the actions of a text such as `walk straight then wave left`.
 
     Raises:
         InvalidInput: an unknown act, a word that does not belong to its act, or too many acts.
@@ -52,7 +52,7 @@ def read_expected(text: str) -> tuple[ExpectedAct, ...]:
 
 
 def format_expected(acts: tuple[ExpectedAct, ...]) -> str:
-    """The text that `read_expected` reads as these acts."""
+    """Format actions as text that `read_expected` reads."""
     words = [" ".join(filter(None, (a.act, a.side, STRAIGHT if a.straight else ""))) for a in acts]
     return f" {JOIN} ".join(words)
 

@@ -1,4 +1,4 @@
-"""What one line of input asks for, and the one check of it.
+"""One line of input, and its only check.
 
 The command line (files, `generate`) and the API (JSON and NDJSON bodies) read items through here, so that a problem
 has the same words everywhere. Standard library only: the small client imports it.
@@ -64,7 +64,7 @@ MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
 
 @dataclass(frozen=True)
 class Item:
-    """One prompt with what goes with it; None = the server or the model decides."""
+    """One prompt with its options; None = the server or the model decides."""
 
     prompt: str
     name: str | None = None
@@ -78,7 +78,7 @@ class Item:
     settings: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def as_json(self) -> dict[str, Any]:
-        """The item as a line of a request body: only what was given."""
+        """Return the item as a line of a request body, with the given fields only."""
         fields = {name: getattr(self, name) for name in FIELDS}
         fields["tags"] = list(self.tags)
         return {name: value for name, value in fields.items() if value not in (None, [], {})}
@@ -86,7 +86,7 @@ class Item:
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong with the input. `line` counts from 1; None = not about a line."""
+    """One problem of the input. `line` counts from 1; None = it concerns no line."""
 
     line: int | None
     field: str | None
@@ -98,7 +98,7 @@ class Problem:
 
 
 class InvalidItems(InvalidInput):
-    """Some lines of the input cannot be used; none was."""
+    """Input with unusable lines; none of it was used."""
 
     problem_type = "invalid-items"
 
@@ -126,14 +126,14 @@ class InvalidItems(InvalidInput):
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A line that could not even be parsed, or a part of it; `read_item` refuses it with this message."""
+    """A line, or a part of it, that could not be parsed; `read_item` refuses it with this message."""
 
     message: str
     field: str | None = None
 
 
 def read_json(line: str | bytes) -> object:
-    """The JSON value of one line, or `Unreadable`."""
+    """Parse the JSON value of one line, or return `Unreadable`."""
     try:
         return json.loads(line)
     except RecursionError:
@@ -143,7 +143,7 @@ def read_json(line: str | bytes) -> object:
 
 
 def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[Problem]]:
-    """The item in `raw`, a JSON object, or all that is wrong with it.
+    """Return the item in `raw`, a JSON object, or all its problems.
 
     Args:
         raw: what a JSON line or an element of `items` holds, or `Unreadable`.
@@ -154,7 +154,7 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
 
 
 def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], list[Problem]]:
-    """The fields of an item that can be used, and all that is wrong with it; see `read_item`."""
+    """Return the usable fields of an item, and all its problems; see `read_item`."""
     values, problems = read_fields(raw, CHECKS, line)
     seed, variants = values.get("seed"), values.get("variants", 1)
     if seed is not None and seed + variants - 1 > MAX_SEED:
@@ -163,15 +163,15 @@ def read_values(raw: object, line: int | None = None) -> tuple[dict[str, Any], l
 
 
 def names_model(values: Mapping[str, Any], problems: Iterable[Problem]) -> bool:
-    """Return True if it is known which model an item is for, so that its other fields can be held against the ranges
-    of the model, whatever else is wrong with it."""
+    """Return True if the model of an item is known, so that its other fields can be checked against the model's
+    ranges."""
     return bool(values) and all(problem.field != "model" for problem in problems)
 
 
 def read_fields(
     raw: object, checks: Mapping[str, Callable[[object], object]], line: int | None = None
 ) -> tuple[dict[str, Any], list[Problem]]:
-    """The checked values of a JSON object that has a prompt, and all that is wrong with it.
+    """Return the checked values of a JSON object that has a prompt, and all its problems.
 
     Args:
         raw: see `read_item`.
@@ -210,7 +210,7 @@ def read_items(
     where: str | None = None,
     check: Callable[[Mapping[str, Any], int | None], Iterable[Problem]] | None = None,
 ) -> Iterator[Item]:
-    """Items as they are read, as `checked` gives them.
+    """Yield items while they are read, as `checked` does.
 
     Args:
         check: gives what else is wrong with the usable fields of an item; called where `names_model`.
@@ -236,7 +236,7 @@ def read_items(
 
 
 def check_count(count: int, line: int | None, where: str | None) -> None:
-    """Check that a job may have so many motions; what is far too long is not read to its end.
+    """Validate the number of motions of a job; reading stops far above the limit.
 
     Raises:
         TooLarge: it may not.
@@ -255,8 +255,8 @@ def checked(
     *,
     where: str | None = None,
 ) -> Iterator[T]:
-    """What `read` makes of each, one after another; after the last, one error with all problems. What came before
-    counts only if none follows.
+    """Yield the results of `read` one by one; after the last, raise one error with all problems. Earlier results are
+    valid only if no error follows.
 
     Raises:
         InvalidItems: at least one is wrong.
@@ -301,7 +301,7 @@ def _seconds(value: object) -> float:
 
 
 def outside_range(seconds: float, low: float, high: float, bundle: str) -> str:
-    """The message about a length that a bundle cannot make."""
+    """Return the message about a length that a bundle cannot generate."""
     return f"{seconds:g} is outside {low:g} to {high:g} seconds, the range of {bundle}"
 
 

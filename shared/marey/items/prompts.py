@@ -1,4 +1,4 @@
-"""What may be a prompt. The one place that knows; the command line, the API and the pipeline all ask here."""
+"""The rules for prompts, for the command line, the API and the pipeline."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MIN_LATIN_SHARE = 0.5
 
 
 def check_prompt(prompt: str, *, where: str | None = None, stored: bool = False) -> str:
-    """The prompt as it is stored and parsed: Unicode NFC, runs of whitespace made one space, ends trimmed.
+    """Return the prompt as it is stored and parsed: Unicode NFC, runs of whitespace made one space, ends trimmed.
 
     Args:
         prompt: what the user wrote.

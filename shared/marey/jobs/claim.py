@@ -1,4 +1,4 @@
-"""Claim a batch, and keep its lease."""
+"""Claims of batches, and renewal of their leases."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def claim(
     prefer_batch_key: str | None = None,
     rules: Policy | None = None,
 ) -> Claim | None:
-    """Take up to `limit` ready items of one lane under a new lease; None when there is nothing to do.
+    """Claim up to `limit` ready items of one lane under a new lease; None when there is no work.
 
     The lane is that of the tenant with the smallest share running, then of the highest priority, then of the oldest
     job. With `prefer_batch_key` (the bundle and settings a worker has loaded) such a lane goes first until the one that
@@ -146,7 +146,7 @@ def heartbeat(
     progressed: bool,
     rules: Policy | None = None,
 ) -> HeartbeatReply:
-    """Renew a lease and read back what was taken away.
+    """Renew a lease and return the items that were cancelled or lost.
 
     Args:
         open_items: the items of the claim that are not committed, failed or released yet.
@@ -167,24 +167,25 @@ def heartbeat(
 
 
 def leased_items(conn: sa.Connection, lease_token: UUID) -> frozenset[UUID]:
-    """The items that a lease holds; none once it is gone."""
+    """Return the items under a lease; none once it is gone."""
     table = tables.item.c
     return frozenset(conn.execute(sa.select(table.id).where(table.lease_token == lease_token)).scalars())
 
 
 def load_texts(conn: sa.Connection, keys: Sequence[str]) -> dict[str, bytes]:
-    """The feature blobs of these keys, those that are known, in one query."""
+    """Return the known feature blobs of these keys, in one query."""
     return {row.key: row.blob for row in conn.execute(TEXTS, {"keys": list(set(keys))})}
 
 
 def waiting_batches(conn: sa.Connection, batch_sizes: Mapping[str, int]) -> dict[str, int]:
-    """How many batches wait, by queue, where a batch of queue q holds `batch_sizes[q]` items. Only queues with some."""
+    """Count waiting batches by queue, where a batch of queue q holds `batch_sizes[q]` items. Empty queues are left
+    out."""
     sizes = {"queues": list(batch_sizes), "sizes": list(batch_sizes.values())}
     return {row.queue: row.batches for row in conn.execute(WAITING, sizes)}
 
 
 def waiting_items(conn: sa.Connection) -> dict[str, int]:
-    """How many items of running jobs are ready, by queue. Only queues with some."""
+    """Count ready items of running jobs by queue. Empty queues are left out."""
     lane, job = tables.lane, tables.job
     count = sa.func.sum(lane.c.ready + lane.c.solo)
     query = (
@@ -198,7 +199,7 @@ def waiting_items(conn: sa.Connection) -> dict[str, int]:
 
 
 def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, rules: Policy) -> list[_Lane]:
-    """The lanes in the order to try: one that fits what is loaded first, unless the next in order lost its patience."""
+    """Order the lanes to try: one that fits the loaded bundle first, unless the next in order has waited too long."""
     ordered = list(lanes)
     fitting = next((lane for lane in ordered if lane.batch_key == prefer), None)
     if fitting is not None:
@@ -212,7 +213,7 @@ def _preferred_first(lanes: Sequence[_Lane], prefer: str | None, rules: Policy) 
 def _try_lane(
     conn: sa.Connection, lane: _Lane, queue: str, worker: str, limit: int, rules: Policy, *, skip_locked: bool
 ) -> tuple[Claim | None, bool]:
-    """What was taken of a lane, and whether its job could be locked.
+    """Return the items taken from a lane, and whether its job could be locked.
 
     Where nothing was taken the job is free again: two workers that each kept one job and waited for the other's would
     wait for ever.
@@ -232,9 +233,9 @@ def _try_lane(
 def _take(
     conn: sa.Connection, job: LockedJob, queue: str, lane: _Lane, worker: str, limit: int, rules: Policy
 ) -> Claim | None:
-    """Items that lost a lease in company run alone, one after the other, and beside them fresh ones. So those of a
-    killed worker start again at once however long the queue is, and an item that brings down its worker keeps no more
-    than one busy with that."""
+    """Take items of a lane. Items whose lease expired in a batch are retried one at a time, beside fresh items: items
+    of a killed worker restart at once however long the queue is, and an item that crashes its worker occupies only one
+    worker."""
     if job.control is not JobControl.RUN:
         return None
     token = uuid4()

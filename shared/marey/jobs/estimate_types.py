@@ -1,4 +1,4 @@
-"""How long motions take: what was measured, and where a job stands."""
+"""Data types of time estimates and queue positions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from marey.jobs.states import JobState
 
 @dataclass(frozen=True)
 class Speed:
-    """What was measured of a bundle."""
+    """Measured speed of a bundle."""
 
     bundle: str
     motions: int
@@ -24,7 +24,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class Estimate:
-    """How long motions take once it is their turn."""
+    """Expected duration of motions, excluding time in the queue."""
 
     items: int
     seconds: float | None
@@ -38,7 +38,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class QueuePlace:
-    """Where a job stands in the queue."""
+    """Position of a job in the queue."""
 
     state: JobState
     jobs_ahead: int

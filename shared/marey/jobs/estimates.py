@@ -1,4 +1,4 @@
-"""How long it will take: from what this platform measured of the same bundles, or no number at all."""
+"""Time estimates from this platform's own measurements of the same bundles; no estimate without measurements."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ AHEAD = sa.text("""
 
 
 def estimate(conn: sa.Connection, items: Mapping[tuple[str, str], int], *, tenants: int = 1) -> Estimate:
-    """How long so many motions take, if nothing is before them.
+    """Estimate the duration of motions with an empty queue.
 
     Args:
         items: motions by model and exact bundle.
@@ -76,7 +76,7 @@ def estimate(conn: sa.Connection, items: Mapping[tuple[str, str], int], *, tenan
 
 
 def place_of(conn: sa.Connection, tenant: str, job: UUID) -> QueuePlace:
-    """What comes before a job's waiting items, and when it may be done.
+    """Return the queue position of a job's waiting items, and when the job may be done.
 
     Raises:
         NotFound: the tenant has no such job.

@@ -1,4 +1,4 @@
-"""How the queues stand, for who watches them: a few small queries, however many items there are."""
+"""Queue figures for monitoring: a few small queries, independent of the number of items."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ WEBHOOKS = sa.text("""
 
 @dataclass(frozen=True)
 class QueueDepth:
-    """What one tenant has in one queue; times in seconds."""
+    """Load of one tenant in one queue; times in seconds."""
 
     queue: str
     tenant: str
@@ -64,39 +64,39 @@ class QueueDepth:
 
 @dataclass(frozen=True)
 class Outbox:
-    """What webhooks are still to be told, and how late the next one is, in seconds."""
+    """Pending webhook deliveries, and how overdue the next one is, in seconds."""
 
     pending: int
     overdue: float
 
 
 def queue_depths(conn: sa.Connection) -> list[QueueDepth]:
-    """Every queue and tenant that has something waiting or running."""
+    """Return every queue and tenant with waiting or running items."""
     return [QueueDepth(**row) for row in conn.execute(QUEUES).mappings()]
 
 
 def open_stream_counts(conn: sa.Connection) -> dict[str, int]:
-    """How many live streams are open, by state."""
+    """Count open live streams by state."""
     return {row.state: row.streams for row in conn.execute(STREAMS)}
 
 
 def outbox_state(conn: sa.Connection) -> Outbox:
-    """The deliveries that are pending, of webhooks that are not paused."""
+    """Count pending deliveries of webhooks that are not paused."""
     row = conn.execute(WEBHOOKS).one()
     return Outbox(row.pending, max(0.0, row.overdue))
 
 
 def overdue_leases(conn: sa.Connection, seconds: float) -> int:
-    """Leases that ran out so long ago and still stand: no sweeper runs."""
+    """Count leases that expired long ago and still exist: no sweeper runs."""
     query = sa.text("SELECT count(*) FROM lease WHERE expires_at < clock_timestamp() - make_interval(secs => :seconds)")
     return conn.execute(query, {"seconds": seconds}).scalar_one()
 
 
 def server_version(conn: sa.Connection) -> str:
-    """Which Postgres it is, as `18.4`."""
+    """Return the version of Postgres, such as `18.4`."""
     return str(conn.execute(sa.text("SHOW server_version")).scalar_one()).split()[0]
 
 
 def database_now(conn: sa.Connection) -> datetime:
-    """The database's clock."""
+    """Return the time of the database's clock."""
     return conn.execute(sa.text("SELECT clock_timestamp()")).scalar_one()

@@ -16,7 +16,7 @@ F = TypeVar("F")
 
 
 def asset_key(tenant: str, sha256: str) -> str:
-    """Key of an asset in the store: `t/{tenant}/{sha[:2]}/{sha}`."""
+    """Return the key of an asset in the store: `t/{tenant}/{sha[:2]}/{sha}`."""
     return f"t/{tenant}/{sha256[:2]}/{sha256}"
 
 
@@ -27,7 +27,7 @@ def files_of(
     kind: Callable[[str, str, int, str], F],
     *where: sa.ColumnElement[bool],
 ) -> defaultdict[UUID, list[F]]:
-    """The files of each owner by format; one query, however many.
+    """Return the files of each owner by format, in one query.
 
     Args:
         owner: the column that names the owner, in a table with `format` and `asset_id`.

@@ -1,4 +1,4 @@
-"""What a bundle offers: the items that can be made with it, and those items as rows of a job."""
+"""Capabilities of generator bundles, and conversion of items to rows of a job."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from marey.text.keys import as_served, feature_key, resolve
 
 @dataclass(frozen=True)
 class GeneratorCapabilities:
-    """A bundle that items can be made with."""
+    """A generator bundle and its limits."""
 
     bundle: Bundle
     text: TextSpec
@@ -39,7 +39,7 @@ class GeneratorCapabilities:
 
 @dataclass(frozen=True)
 class GeneratorList:
-    """List the bundles that this machine can make motions with."""
+    """The usable and the broken generator bundles of this machine."""
 
     found: tuple[GeneratorCapabilities, ...]
     broken: tuple[BrokenBundle, ...]
@@ -47,7 +47,7 @@ class GeneratorList:
 
 
 def offers(config: Settings) -> GeneratorList:
-    """Every generator's bundle of this machine, by folder; a broken one is logged and hides no other."""
+    """List every generator bundle of this machine, by folder; a broken one is logged and does not hide others."""
     bundles = scan_bundles(config=config, kind="generator")
     found: list[GeneratorCapabilities] = []
     broken = list(bundles.broken)
@@ -61,7 +61,7 @@ def offers(config: Settings) -> GeneratorList:
 
 
 def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
-    """What a generator's bundle allows.
+    """Return the capabilities of a generator bundle.
 
     Raises:
         InvalidBundle: it is no generator, or its manifest does not say what it makes.
@@ -78,7 +78,7 @@ def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
 
 
 def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[NewItem]:
-    """One row a motion: prompt times variant, with the seed drawn where none was given."""
+    """Yield one row per motion: prompt times variant, with a drawn seed where none was given."""
     batch_keys: dict[tuple[str, str], str] = {}
     for index, (item, offer) in enumerate(items):
         reference = offer.bundle.reference

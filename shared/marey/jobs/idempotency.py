@@ -1,4 +1,4 @@
-"""Idempotency keys: the same request again gives what the first one made, for 24 hours."""
+"""Idempotency keys: a repeated request returns the result of the first one, for 24 hours."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Owner = Literal["job_id", "evaluation_id"]
 def take_key(
     conn: sa.Connection, tenant: str, key: str | None, body_sha256: str | None, owner: Owner, identifier: UUID
 ) -> UUID | None:
-    """Take a key for what is about to be made, or answer what has it. Waits for a request under way with it.
+    """Register a key for a new object, or return the object that has it. Waits for a concurrent request with the key.
 
     Args:
         key: None = none was sent.

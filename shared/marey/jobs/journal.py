@@ -1,4 +1,4 @@
-"""The job row: its lock, its counters, its events. Every change of an item goes through `record`."""
+"""The job row: its lock, counters and events. Every change of an item goes through `record`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Lane = tuple[str, str]
 
 @dataclass(frozen=True)
 class LockedJob:
-    """A job row under our lock."""
+    """A locked job row."""
 
     id: UUID
     tenant: str
@@ -44,7 +44,7 @@ class LockedJob:
 
     @property
     def state(self) -> JobState:
-        """As the column of that name."""
+        """Value of the column of that name."""
         return job_state(self.control, self, started=self.started)
 
     def counters(self) -> dict[str, int]:
@@ -64,7 +64,7 @@ class NewEvent:
 
 @dataclass(frozen=True)
 class LaneChange:
-    """How much a lane gains (or loses, negative)."""
+    """Change of a lane's counter; negative = fewer items."""
 
     ready: int = 0
     solo: int = 0
@@ -73,7 +73,7 @@ class LaneChange:
 def lock_job(
     conn: sa.Connection, job: UUID, *, tenant: str | None = None, skip_locked: bool = False
 ) -> LockedJob | None:
-    """Lock a job row until the transaction ends; None when there is none (or, with `skip_locked`, none free)."""
+    """Lock a job row until the transaction ends; None if there is none (or, with `skip_locked`, it is locked)."""
     table = tables.job.c
     query = sa.select(
         table.id,
@@ -110,7 +110,7 @@ def lock_job_of(conn: sa.Connection, tenant: str, job: UUID) -> LockedJob:
 
 
 def no_such_job(job: UUID) -> NotFound:
-    """The error for a job that is not there, or somebody else's."""
+    """Return the error for a job that does not exist, or belongs to another tenant."""
     return NotFound("there is no such job", where=f"job {job}", hint="`marey jobs list` shows yours.")
 
 
@@ -123,8 +123,7 @@ def record(
     added: int = 0,
     control: JobControl | None = None,
 ) -> LockedJob:
-    """Write what happened to a job under lock: counters, control, times, events with their numbers, notification, and
-    what webhooks are told.
+    """Write changes of a locked job: counters, control, times, numbered events, notification, and webhook events.
 
     Args:
         moved: how many items went from one state to another.
@@ -160,7 +159,7 @@ def record(
 
 
 def change_lanes(conn: sa.Connection, job: UUID, changes: Mapping[Lane, LaneChange]) -> None:
-    """Add to lanes of a job under lock (and make them), tell the relay of those that gained; or take from them."""
+    """Upsert lane counters of a locked job; NOTIFY queues that grew."""
     table = tables.lane
     gains = {lane: change for lane, change in changes.items() if change.ready >= 0 and change.solo >= 0}
     if gains:
@@ -192,7 +191,7 @@ def change_lanes(conn: sa.Connection, job: UUID, changes: Mapping[Lane, LaneChan
 
 
 def returned(items: Iterable[tuple[str, str, bool]]) -> dict[Lane, LaneChange]:
-    """The gains of lanes to which these items (queue, batch key, solo) return."""
+    """Return the lane changes for items (queue, batch key, solo) that become ready again."""
     counts = Counter(items)
     return {
         (queue, key): LaneChange(ready=counts[queue, key, False], solo=counts[queue, key, True])

@@ -1,4 +1,4 @@
-"""What a lease still holds: locked, ended, given back. The fence of every write under one."""
+"""Items under a lease: locked, ended or released. The fence of every write under a lease."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LeasedItem:
 def lock_leased_items(
     conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None = None
 ) -> list[LeasedItem]:
-    """The items that a lease holds (of these, if given), in input order, locked. The job's lock must be held."""
+    """Lock the items under a lease (only the given ones, if any), in input order. The caller holds the job's lock."""
     wanted = None if items is None else list(items)
     return [LeasedItem(*row) for row in conn.execute(HELD_ITEMS, {"token": lease_token, "items": wanted})]
 
@@ -60,7 +60,8 @@ def give_back(
     solo: bool = False,
     attempts: int = 0,
 ) -> None:
-    """Leased items become ready, in their lanes; `solo` marks them, `attempts` are added. Counters are the caller's."""
+    """Return leased items to their lanes as ready; `solo` marks them, `attempts` are added. The caller updates
+    counters."""
     table = tables.item
     values: dict[str, object] = {
         "state": ItemState.READY,
@@ -75,33 +76,33 @@ def give_back(
 
 
 def end_dead(conn: sa.Connection, item: LeasedItem, problem: Problem) -> NewEvent:
-    """A leased item has used up its attempts."""
+    """End a leased item that has no attempts left."""
     attempts = item.attempts + 1
     end_items(conn, [item.id], ItemState.DEAD, Cause.ATTEMPTS_USED_UP, problem=document(problem), attempts=attempts)
     return NewEvent("item_dead", problem.message, item.id, {"attempts": attempts, "problem": document(problem)})
 
 
 def drop_empty_lease(conn: sa.Connection, lease_token: UUID) -> None:
-    """A lease ends with its last item."""
+    """Delete a lease that has no items left."""
     conn.execute(DROP_EMPTY_LEASE, {"token": lease_token})
 
 
 @dataclass(frozen=True)
 class LeasedItems:
-    """What a lease still holds: its job and these items, all locked."""
+    """A job and its items under a lease, all locked."""
 
     job: LockedJob
     items: Mapping[UUID, LeasedItem]
 
     def committed(self, asked: Iterable[UUID]) -> Committed:
-        """Which of these were written, and which were not ours any more."""
+        """Split the requested items into written and lost ones."""
         asked = tuple(dict.fromkeys(asked))
         ours = tuple(item for item in asked if item in self.items)
         return Committed(ours, tuple(item for item in asked if item not in self.items))
 
 
 def lock_lease(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] | None) -> LeasedItems | None:
-    """Lock the job, then those of the items that this lease still holds. The fence of every write."""
+    """Lock the job, then its items that are still under this lease. The fence of every write."""
     job_id = conn.execute(LEASED_JOB, {"token": lease_token}).scalar_one_or_none()
     job = None if job_id is None else lock_job(conn, job_id)
     if job is None:
@@ -110,11 +111,11 @@ def lock_lease(conn: sa.Connection, lease_token: UUID, items: Collection[UUID] |
 
 
 def end_items(conn: sa.Connection, items: Sequence[UUID], state: ItemState, cause: Cause, **more: object) -> None:
-    """Leased items come to a last state. Counters are the caller's."""
+    """Move leased items to a final state. The caller updates counters."""
     values = {"state": state, "lease_token": None, "reason": str(cause), "finished_at": CLOCK} | more
     conn.execute(sa.update(tables.item).where(among(tables.item.c.id, items)).values(values))
 
 
 def document(problem: Problem) -> dict[str, object]:
-    """A problem as it stands in a row."""
+    """Return a problem as its row stores it."""
     return asdict(problem)

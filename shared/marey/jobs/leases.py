@@ -1,4 +1,4 @@
-"""What a worker claims, says and gives back, and what a sweep takes back."""
+"""Data types of claims, heartbeats, commits and sweeps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from marey.jobs.types import JsonObject, Problem
 
 @dataclass(frozen=True)
 class ClaimedItem:
-    """An item as its worker sees it."""
+    """An item as its worker receives it."""
 
     id: UUID
     position: int
@@ -51,7 +51,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class HeartbeatReply:
-    """What the database says to a worker's heartbeat."""
+    """The database's answer to a worker's heartbeat."""
 
     lost: bool
     """The lease is gone (expired and swept, or all its items taken away): stop, throw the batch away."""
@@ -61,7 +61,7 @@ class HeartbeatReply:
 
 @dataclass(frozen=True)
 class WorkerHeartbeat:
-    """A worker says that it lives."""
+    """A worker's sign of life."""
 
     id: str
     queue: str
@@ -75,7 +75,7 @@ class WorkerHeartbeat:
 
 @dataclass(frozen=True)
 class WorkerRow:
-    """A worker that said it lives."""
+    """A known worker."""
 
     id: str
     queue: str
@@ -90,7 +90,7 @@ class WorkerRow:
 
 @dataclass(frozen=True)
 class SchedulerRow:
-    """A scheduler that said it works.
+    """A known scheduler.
 
     Attributes:
         seen: when it last made progress in all its parts; `silence`: seconds since then, by the database's clock.
@@ -107,7 +107,7 @@ class SchedulerRow:
 
 @dataclass(frozen=True)
 class AssetDigest:
-    """Content to store: its digest and size."""
+    """Digest and size of content to store."""
 
     sha256: str
     size: int
@@ -116,7 +116,7 @@ class AssetDigest:
 
 @dataclass(frozen=True)
 class NewMotion:
-    """A finished item: its files lie in the asset store already."""
+    """A finished item; its files are in the asset store already."""
 
     item: UUID
     files: Mapping[str, AssetDigest]
@@ -141,7 +141,7 @@ class NewText:
 
 @dataclass(frozen=True)
 class ItemFailure:
-    """An item that could not be made."""
+    """An item that failed."""
 
     item: UUID
     problem: Problem
@@ -150,7 +150,7 @@ class ItemFailure:
 
 @dataclass(frozen=True)
 class Committed:
-    """What became of a write under a lease."""
+    """Result of a write under a lease."""
 
     items: tuple[UUID, ...]
     """Written now."""
@@ -162,7 +162,7 @@ class Committed:
 
 @dataclass(frozen=True)
 class SweepReport:
-    """What a sweep did."""
+    """Result of a sweep."""
 
     leases_lost: int = 0
     items_returned: int = 0

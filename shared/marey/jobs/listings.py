@@ -1,4 +1,4 @@
-"""Reading: jobs, items, motions, events. Cursors are opaque; a foreign one is an `InvalidInput`."""
+"""Listings of jobs, items, motions and events. Cursors are opaque; a foreign one is an `InvalidInput`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from marey.jobs.types import EventRow, ItemRow, JobRow, MotionRow, Problem
 
 
 def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
-    """One job.
+    """Return one job.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -33,7 +33,7 @@ def get_job(conn: sa.Connection, tenant: str, job: UUID) -> JobRow:
 def list_jobs(
     conn: sa.Connection, tenant: str, *, states: Collection[JobState] = (), cursor: str | None = None, limit: int = 50
 ) -> Page[JobRow]:
-    """Jobs, newest first; of these states, if any are given."""
+    """Return jobs, newest first, optionally in the given states."""
     table = tables.job.c
     ours = table.tenant_id == tenant
     query, order = _jobs().where(ours), Order(table.created_at, table.id)
@@ -55,7 +55,7 @@ def list_items(
     cursor: str | None = None,
     limit: int = 100,
 ) -> Page[ItemRow]:
-    """Items of a job with their motions, in input order, variants within prompt; re-rolls come last.
+    """Return items of a job with their motions, in input order, variants within prompt; re-rolls come last.
 
     Args:
         states: only items in one of these.
@@ -80,14 +80,14 @@ def list_items(
 
 
 def items_of(conn: sa.Connection, items: Collection[UUID]) -> list[ItemRow]:
-    """These items, those that are there, by job and in input order. Whose they are the caller knows."""
+    """Return the existing ones of these items, by job and in input order. The caller checks their tenant."""
     table = tables.item.c
     query = _items().where(among(table.id, items)).order_by(table.job_id, table.position)
     return _with_motions(conn, conn.execute(query).mappings().all())
 
 
 def events_after(conn: sa.Connection, tenant: str, job: UUID, seq: int = 0, limit: int = 500) -> list[EventRow]:
-    """Events of a job with a greater `seq`, in order. Without gaps: `seq` is taken under the job's row lock.
+    """Return events of a job with a greater `seq`, in order. Without gaps: `seq` is assigned under the job's row lock.
 
     Raises:
         NotFound: the tenant has no such job.

@@ -1,4 +1,4 @@
-"""Reading motions with their files."""
+"""Reads of motions with their files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from marey.jobs.types import MotionFile, MotionRow
 
 
 def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
-    """One motion.
+    """Return one motion.
 
     Raises:
         NotFound: the tenant has no such motion.
@@ -26,7 +26,7 @@ def get_motion(conn: sa.Connection, tenant: str, motion: UUID) -> MotionRow:
 
 
 def motions_of(conn: sa.Connection, tenant: str, motions: Collection[UUID]) -> list[MotionRow]:
-    """These motions, in the order given, each once.
+    """Return these motions, in the order given, without duplicates.
 
     Raises:
         NotFound: the tenant lacks one of them.
@@ -47,7 +47,7 @@ def read_motions(
     conn: sa.Connection,
     wanted: sa.ColumnElement[bool],
 ) -> list[MotionRow]:
-    """Motions with their files, in no order: two queries, however many."""
+    """Return motions with their files, unordered, in two queries."""
     motion, item = tables.motion.c, tables.item.c
     later = tables.item.alias("later")
     query = (

@@ -1,4 +1,4 @@
-"""Events of jobs for webhooks."""
+"""Webhook events of jobs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marey.webhooks.types import EventKind
 def enqueue_job_event(
     conn: sa.Connection, tenant: str, job: UUID, before: JobState, after: JobState, counters: Mapping[str, int]
 ) -> None:
-    """Tell of a job that ended or was paused; of no other change."""
+    """Enqueue a webhook event for a job that ended or was paused; other changes have none."""
     if after is before:
         return
     data = {"job": job, "state": after, "counters": dict(counters)}

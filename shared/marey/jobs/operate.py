@@ -1,4 +1,4 @@
-"""What an operator does to a job. Each verb names the tenant, writes an event with its reason, and answers the job."""
+"""Operator actions on a job. Each takes the tenant, writes an event with its reason, and returns the job."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from marey.tenants.quotas import reserve_quotas
 
 
 def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by operator") -> JobRow:
-    """Claim no more of this job's items; leased ones finish. Paused already: no change.
+    """Stop claiming items of this job; leased items finish. Paused already: no change.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -34,7 +34,7 @@ def pause(conn: sa.Connection, tenant: str, job: UUID, reason: str = "paused by 
 
 
 def resume(conn: sa.Connection, tenant: str, job: UUID, reason: str = "resumed by operator") -> JobRow:
-    """Go on with a paused job. Running already: no change.
+    """Continue a paused job. Running already: no change.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -107,7 +107,7 @@ def retry(
 
 
 def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int, reason: str = "set by operator") -> JobRow:
-    """Order of the job among its tenant's, −1000 … 1000, higher first.
+    """Set the job's priority among its tenant's jobs, −1000 … 1000, higher first.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -124,7 +124,7 @@ def set_priority(conn: sa.Connection, tenant: str, job: UUID, priority: int, rea
 def set_fail_early(
     conn: sa.Connection, tenant: str, job: UUID, share: float | None, reason: str = "set by operator"
 ) -> JobRow:
-    """Cancel what is open once more than this share of the job's items has failed: at once, if it has. None = never.
+    """Set the failure ratio above which open items are cancelled; applied at once. None = never.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -153,7 +153,7 @@ def set_comment(conn: sa.Connection, tenant: str, job: UUID, comment: str | None
 def cancel_open_items(
     conn: sa.Connection, job: LockedJob, cause: Cause, reason: str, *, control: JobControl | None
 ) -> None:
-    """Cancel what is ready or leased of a job under lock; its leases end."""
+    """Cancel ready and leased items of a locked job; its leases end."""
     table = tables.item
     conn.execute(
         sa.update(table)
@@ -173,7 +173,7 @@ def cancel_open_items(
 
 
 def cancel_if_failing(conn: sa.Connection, job: LockedJob) -> None:
-    """Cancel what is open of a job under lock of which more items failed or died than it allows; most allow all."""
+    """Cancel open items of a locked job once its failure ratio exceeds `fail_early` (off by default)."""
     broken = job.failed + job.dead
     if job.fail_early is None or broken <= job.fail_early * job.total or job.ready + job.leased == 0:
         return
@@ -182,7 +182,7 @@ def cancel_if_failing(conn: sa.Connection, job: LockedJob) -> None:
 
 
 def refuse_erased(job: LockedJob, verb: str) -> None:
-    """Nothing, if the job's prompts are still there.
+    """Validate that the job's prompts still exist.
 
     Raises:
         Conflict: they were erased.
@@ -196,7 +196,7 @@ def refuse_erased(job: LockedJob, verb: str) -> None:
 
 
 def _refuse_unread(conn: sa.Connection, job: UUID, items: sa.ColumnElement[bool]) -> None:
-    """A backup holds nothing of what was read of a prompt; what brings such an item back could not make it."""
+    """Validate that no item lacks text features. A backup holds none, so a restored item could not be generated."""
     table = tables.item.c
     unread = items & (table.text_key == NO_TEXT) & (table.model != EVALUATOR_QUEUE)
     if conn.execute(sa.select(table.id).where(unread).limit(1)).one_or_none() is not None:

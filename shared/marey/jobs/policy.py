@@ -1,4 +1,4 @@
-"""Times and limits of the queue; every comparison with them is made by the database's clock."""
+"""Time limits of the queue; all are compared by the database's clock."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from marey.core.settings import settings
 
 @dataclass(frozen=True)
 class Policy:
-    """Times in seconds."""
+    """Time limits, in seconds."""
 
     lease: float = 10.0
     stall: float = 120.0
@@ -34,7 +34,7 @@ class Policy:
 
 @lru_cache(maxsize=1)
 def policy() -> Policy:
-    """The policy of this process, from its settings."""
+    """Return the policy of this process, from its settings."""
     chosen = settings()
     return Policy(
         lease=chosen.lease_seconds,

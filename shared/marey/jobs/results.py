@@ -1,4 +1,4 @@
-"""Writes under a lease: every one is fenced by the lease token, the first committed result wins."""
+"""Writes under a lease: each is fenced by the lease token, the first committed result wins."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ FINISH = sa.text("""
 
 
 def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetDigest]) -> bool:
-    """Announce what is about to be PUT (rows `writing`), in a transaction of its own before the PUT.
+    """Announce assets before their upload (rows `writing`), in a transaction of its own.
 
     Content that is there already is announced again: the garbage collector leaves it alone while this lease lives.
 
@@ -91,7 +91,7 @@ def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetD
 
 
 def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[NewMotion]) -> Committed:
-    """Finish items: assets stored, motions, counters and one progress event in this transaction.
+    """Finish items: assets, motions, counters and one progress event in this transaction.
 
     The files must lie in the asset store and have been announced by `begin_assets`.
     """
@@ -108,7 +108,7 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 
 
 def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText]) -> Committed:
-    """Store text features and send their items on to the stage `generate`.
+    """Store text features and move their items to the stage `generate`.
 
     Ready items of the same job with the same key go with them.
     """
@@ -131,8 +131,8 @@ def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText
 def fail_items(
     conn: sa.Connection, lease_token: UUID, failures: Sequence[ItemFailure], *, rules: Policy | None = None
 ) -> Committed:
-    """Record errors: permanent ones end the item `failed`; retryable ones cost an attempt and come back after a delay,
-    or end it `dead` when the attempts are used up."""
+    """Record errors: permanent ones end the item as `failed`; retryable ones count an attempt and retry after a delay,
+    or end it as `dead` when no attempts are left."""
     rules = rules or policy()
     leased = lock_lease(conn, lease_token, [failure.item for failure in failures])
     if leased is None:
@@ -153,7 +153,7 @@ def fail_items(
 
 
 def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence[UUID] | None = None) -> Committed:
-    """Give items back (all of the lease, by default), at no cost of an attempt: SIGTERM, a store or database outage."""
+    """Release items (the whole lease, by default) without counting an attempt: SIGTERM, a store or database outage."""
     leased = lock_lease(conn, lease_token, items)
     if leased is None:
         return Committed((), tuple(items or ()))
@@ -169,7 +169,7 @@ def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence
 
 
 def store_assets(conn: sa.Connection, job: LockedJob, digests: Collection[str]) -> dict[str, UUID]:
-    """Announced assets are stored, in the transaction that refers to them; their ids by digest.
+    """Mark announced assets as stored, in the transaction that refers to them; return their ids by digest.
 
     Raises:
         ValueError: one was not announced by `begin_assets`.
@@ -181,7 +181,7 @@ def store_assets(conn: sa.Connection, job: LockedJob, digests: Collection[str]) 
 
 
 def _finish(conn: sa.Connection, job: LockedJob, motions: Sequence[NewMotion]) -> None:
-    """Items succeeded, with their motions; their announced assets are stored."""
+    """Write succeeded items with their motions; mark their announced assets as stored."""
     ids = {motion.item: str(new_id()) for motion in motions}
     rows = [
         {
@@ -213,7 +213,7 @@ def _store(
     motions: Sequence[Mapping[str, object]] = (),
     files: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, UUID]:
-    """Announced assets are stored, with the motions of items that end so; the assets by digest."""
+    """Mark announced assets as stored, and write motions and succeeded items; return the assets by digest."""
     values = {
         "tenant": job.tenant,
         "job": job.id,

@@ -1,4 +1,4 @@
-"""States of items and jobs, and the one table of allowed transitions.
+"""States of items and jobs, and the table of allowed transitions.
 
 The database holds the same table in the trigger `item_transition` (a test walks every pair against it), and computes
 a job's state from its counters as a generated column with the rule of `job_state`.
@@ -11,7 +11,7 @@ from typing import Protocol
 
 
 class ItemState(StrEnum):
-    """Where an item stands. `SUCCEEDED` is final; a re-roll is a new item."""
+    """State of an item. `SUCCEEDED` is final; a re-roll is a new item."""
 
     READY = "ready"
     LEASED = "leased"
@@ -24,14 +24,14 @@ class ItemState(StrEnum):
 
 
 class Stage(StrEnum):
-    """What is done to an item next."""
+    """Next processing stage of an item."""
 
     TEXT = "text"
     GENERATE = "generate"
 
 
 class JobControl(StrEnum):
-    """What the operator wants of a job."""
+    """The operator's intent for a job."""
 
     RUN = "run"
     PAUSED = "paused"
@@ -39,7 +39,7 @@ class JobControl(StrEnum):
 
 
 class JobState(StrEnum):
-    """What a job is doing, derived from its control and counters."""
+    """State of a job, derived from its control and counters."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -51,7 +51,7 @@ class JobState(StrEnum):
 
 
 class Cause(StrEnum):
-    """Why an item changed its state; stands in its event."""
+    """Cause of an item's change of state; stored in its event."""
 
     CLAIMED = "claimed"
     COMMITTED = "committed"
@@ -91,12 +91,12 @@ ENDED = frozenset({JobState.SUCCEEDED, JobState.PARTIAL, JobState.FAILED, JobSta
 
 
 def allowed(before: ItemState, after: ItemState) -> bool:
-    """Whether an item may go from `before` to `after`."""
+    """Return True if an item may go from `before` to `after`."""
     return (before, after) in TRANSITIONS
 
 
 class Review(StrEnum):
-    """What a person thought of a motion; any may follow any."""
+    """Verdict of a reviewer on a motion; any may follow any."""
 
     KEPT = "kept"
     REJECTED = "rejected"
@@ -105,7 +105,7 @@ class Review(StrEnum):
 
 
 class Counters(Protocol):
-    """How many items of a job are in each state; the states add up to `total`."""
+    """Number of a job's items by state; the states add up to `total`."""
 
     @property
     def total(self) -> int: ...
@@ -124,7 +124,7 @@ class Counters(Protocol):
 
 
 def job_state(control: JobControl, counters: Counters, *, started: bool) -> JobState:
-    """The state of a job, from what its operator wants and how its items stand.
+    """Return the state of a job, from its control and counters.
 
     Open items left: paused if the operator says so, running once any item was ever leased, else queued. None left:
     succeeded if all did; cancelled if the operator cancelled it before that; partial if some succeeded; else failed.

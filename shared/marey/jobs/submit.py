@@ -1,4 +1,4 @@
-"""Submit: job, items, lanes, event and idempotency row in one transaction."""
+"""Submission: job, items, lanes, event and idempotency row in one transaction."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Id
 
 
 def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
-    """Write a job and its items; nothing is published, the relay is notified when the transaction commits.
+    """Write a job and its items; the relay is notified when the transaction commits.
 
     Items whose text features are in the database already skip the text stage. With an idempotency key, a second submit
     of the same body within 24 hours answers the first one's job, `replayed`.
@@ -99,7 +99,7 @@ def _begin(conn: sa.Connection, identifier: UUID, total: int) -> None:
 
 
 def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob | None:
-    """Take the idempotency key for this job, or answer the job that has it."""
+    """Register the idempotency key for this job, or return the job that has it."""
     made = take_key(conn, job.tenant, job.idempotency_key, job.body_sha256, "job_id", identifier)
     if made is None:
         return None
@@ -108,8 +108,8 @@ def _earlier(conn: sa.Connection, job: NewJob, identifier: UUID) -> SubmittedJob
 
 
 def write_items(conn: sa.Connection, job: UUID, items: Iterable[NewItem], *, first: int = 0) -> Counter[Lane]:
-    """COPY the items in chunks, their positions from `first` on; how many each lane has got. Counters and lanes are the
-    caller's."""
+    """COPY the items in chunks, with positions from `first` on; return the size of each lane. The caller updates
+    counters and lanes."""
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock_shared(TEXTS_LOCK)))
     lanes: Counter[Lane] = Counter()
     connection = cast("psycopg.Connection", conn.connection.driver_connection)
@@ -156,7 +156,7 @@ def _check_item(item: NewItem) -> None:
 
 
 def check_share(share: float | None) -> None:
-    """Nothing, if a job may fail early above this share of failed items; None = it never does.
+    """Validate a failure ratio for `fail_early`; None = off.
 
     Raises:
         InvalidInput: it is not between 0 and 1.

@@ -1,4 +1,4 @@
-"""The sweeper: what time alone changes."""
+"""The sweeper: transitions driven by time."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from marey.webhooks.deliveries import forget_events
 
 
 def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
-    """Take back expired leases, make due items ready, forget old idempotency rows, workers, events of webhooks and of
-    the audit log.
+    """Reclaim expired leases, make due items ready, and delete old idempotency rows, workers, webhook events and audit
+    rows.
 
     An item of a lost lease is marked `solo`: it is claimed alone next time, and only the loss of a lease it was alone
     in (as such) counts as an attempt. Safe to run in several processes at once; each job is a transaction of its own.
@@ -46,7 +46,7 @@ def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
 
 
 def make_due(engine: sa.Engine) -> int:
-    """Make items ready whose pause before the next try is over; how many. `sweep` does this, too.
+    """Make items ready whose retry delay is over; return their number. Part of `sweep`.
 
     Raises:
         Unreachable: the database does not answer.
@@ -62,7 +62,7 @@ def make_due(engine: sa.Engine) -> int:
 
 
 def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:
-    """The expired leases of one job."""
+    """Reclaim the expired leases of one job."""
     job = lock_job(conn, job_id)
     report = SweepReport()
     if job is None:
@@ -121,7 +121,7 @@ def _make_due_ready(conn: sa.Connection, job_id: UUID) -> int:
 
 
 def _tidy(conn: sa.Connection, rules: Policy) -> int:
-    """Forget what is old; how many assets are stale (their removal needs the store: `remove_stale_assets`)."""
+    """Delete old rows; return the number of stale assets (their removal needs the store: `remove_stale_assets`)."""
     keys, workers, assets, audits = tables.idempotency, tables.worker, tables.asset, tenant_tables.audit_event
     conn.execute(sa.delete(keys).where(keys.c.created_at < CLOCK - interval(rules.idempotency)))
     conn.execute(sa.delete(workers).where(workers.c.seen_at < CLOCK - interval(rules.worker_kept)))

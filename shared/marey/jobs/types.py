@@ -1,4 +1,4 @@
-"""What goes into and comes out of the repositories of `marey.jobs`: frozen dataclasses, nothing that knows SQL."""
+"""Data types of the repositories of `marey.jobs`: frozen dataclasses without SQL."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class Problem:
-    """Why an item failed, for a person: the shape of `marey.core.errors.MareyError`."""
+    """Reason of an item's failure, for users: the fields of `marey.core.errors.MareyError`."""
 
     type: str
     message: str
@@ -39,7 +39,7 @@ class Problem:
 
     @classmethod
     def of(cls, error: MareyError) -> Problem:
-        """The problem that an expected error describes."""
+        """Convert an expected error."""
         return cls(error.problem_type, error.message, error.where, error.hint)
 
 
@@ -48,7 +48,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class NewItem:
-    """One motion to make: a prompt in one variant. Expansion into variants and the drawing of seeds is the caller's.
+    """One motion to generate: a prompt in one variant. The caller expands variants and draws seeds.
 
     Args:
         index: place of the prompt in the input, from 0; variants share it.
@@ -82,7 +82,7 @@ class NewItem:
 
 @dataclass(frozen=True)
 class NewJob:
-    """A job to submit. `items` is read once, in order, and never held as a whole."""
+    """A job to submit. `items` is read once, in order, and never held in memory as a whole."""
 
     items: Iterable[NewItem]
     tenant: str = DEFAULT_TENANT
@@ -106,7 +106,7 @@ class NewJob:
 
 @dataclass(frozen=True)
 class SubmittedJob:
-    """A job that stands in the database; `replayed` when an earlier submit with the same key had made it."""
+    """A job in the database; `replayed` if an earlier submit with the same key created it."""
 
     id: UUID
     replayed: bool

@@ -1,4 +1,4 @@
-"""Who works: a row per worker, renewed by its heartbeat."""
+"""Registered workers: a row per worker, renewed by its heartbeat."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SCHEDULER_LIVE = 30.0
 
 
 def beat(conn: sa.Connection, worker: WorkerHeartbeat) -> None:
-    """Note that a worker lives."""
+    """Record a worker's heartbeat."""
     values = {
         "queue": worker.queue,
         "host": worker.host,
@@ -35,12 +35,12 @@ def beat(conn: sa.Connection, worker: WorkerHeartbeat) -> None:
 
 
 def retire(conn: sa.Connection, worker: str) -> None:
-    """Forget a worker that stops in good order."""
+    """Remove a worker that stops gracefully."""
     conn.execute(sa.delete(tables.worker).where(tables.worker.c.id == worker))
 
 
 def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[str, int]:
-    """How many workers live, by queue."""
+    """Count live workers by queue."""
     table = tables.worker.c
     rows = conn.execute(
         sa.select(table.queue, sa.func.count().label("workers"))
@@ -51,7 +51,7 @@ def live_workers(conn: sa.Connection, *, rules: Policy | None = None) -> dict[st
 
 
 def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[WorkerRow]:
-    """Every worker seen within a day, newest heartbeat first."""
+    """Return every worker seen within a day, newest heartbeat first."""
     table = tables.worker.c
     rows = conn.execute(
         sa.select(
@@ -67,7 +67,7 @@ def list_workers(conn: sa.Connection, *, rules: Policy | None = None) -> list[Wo
 
 
 def record_scheduler_heartbeat(conn: sa.Connection, name: str, *, host: str, pid: int) -> None:
-    """Note that a scheduler works, and at its first word forget those that fell silent: this one is in their place."""
+    """Record a scheduler's heartbeat; the first one removes silent schedulers, which it replaces."""
     table = tables.worker.c
     known = conn.execute(sa.select(table.id).where(table.id == name)).one_or_none()
     if known is None:
@@ -77,7 +77,7 @@ def record_scheduler_heartbeat(conn: sa.Connection, name: str, *, host: str, pid
 
 
 def list_schedulers(conn: sa.Connection) -> list[SchedulerRow]:
-    """Every scheduler that was not told to stop, that heard of last first."""
+    """Return every scheduler that did not stop gracefully, latest heartbeat first."""
     table = tables.worker.c
     rows = conn.execute(
         sa.select(

@@ -1,1 +1,1 @@
-"""Comparing measurements: numpy alone, for workers that report and servers that answer."""
+"""Comparison of measurements: numpy alone, for workers that report and servers that answer."""

@@ -1,4 +1,4 @@
-"""What changed between two runs on the same prompts, and how sure that is."""
+"""Paired bootstrap of the difference between two runs on the same prompts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AT_ONCE = 2_000_000  # draws held: under 64 MB with what they pick
 
 @dataclass(frozen=True)
 class Difference:
-    """What changed from one run to another on the same prompts; scores are such that more is better.
+    """Difference between two runs on the same prompts; higher scores are better.
 
     Attributes:
         mean: of after - before.
@@ -30,12 +30,12 @@ class Difference:
 
     @property
     def worse(self) -> bool:
-        """The whole interval is under 0."""
+        """True if the whole interval is below 0."""
         return self.high < 0
 
     @property
     def better(self) -> bool:
-        """The whole interval is over 0."""
+        """True if the whole interval is above 0."""
         return self.low > 0
 
 
@@ -72,7 +72,8 @@ def paired_bootstrap(
 
 
 def _resampled_means(sums: Array, sizes: Numbers, rounds: int, rng: np.random.Generator) -> Array:
-    """Means (rounds,) of as many groups as there are, drawn with replacement; `sums` (G,) and `sizes` (G,) of each."""
+    """Return means (rounds,) of as many groups as there are, drawn with replacement; `sums` (G,) and `sizes` (G,) of
+    each."""
     means = np.empty(rounds)
     chunk = max(1, _AT_ONCE // len(sums))
     for begin in range(0, rounds, chunk):

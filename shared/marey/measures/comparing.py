@@ -1,4 +1,4 @@
-"""Two evaluations of the same prompts, motion against motion: what changed.
+"""Comparison of two evaluations of the same prompts, motion by motion.
 
 Motions are paired by prompt and repeat, and the repeats of a prompt are resampled together. Only metrics with a number
 a motion can be paired; a distance of distributions has none.
@@ -26,7 +26,7 @@ Verdict = Literal["better", "worse", "no difference found"]
 
 @dataclass(frozen=True)
 class MetricChange:
-    """What became of one metric, in per cent.
+    """Change of one metric, in per cent.
 
     Attributes:
         metric: its key.
@@ -52,7 +52,7 @@ class MetricChange:
 def compare(
     before: Sequence[MotionScore], after: Sequence[MotionScore], *, seed: int, where: str
 ) -> tuple[MetricChange, ...]:
-    """What became of each metric that can be paired; one that fewer than two prompts have in both runs is left out.
+    """Return the change of each paired metric; metrics with fewer than two prompts in both runs are left out.
 
     Args:
         before: scores of the earlier run.

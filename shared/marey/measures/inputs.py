@@ -1,4 +1,4 @@
-"""What every metric asks of its arrays, checked at the edge: one NaN row would otherwise come out as a score."""
+"""Input checks shared by all metrics: one NaN row would otherwise come out as a score."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 def embeddings(name: str, values: Numbers | Sequence[float], *, axes: str = "ND") -> Array:
-    """One finite float64 array, with as many axes as `axes` has letters and none of them empty.
+    """Validate one finite float64 array, with as many axes as `axes` has letters and none of them empty.
 
     Raises:
         InvalidInput: of another shape, or a value that float32 does not hold (NaN, infinite, larger).
@@ -39,7 +39,7 @@ def embeddings(name: str, values: Numbers | Sequence[float], *, axes: str = "ND"
 
 
 def pairs(first: Numbers, second: Numbers, *, names: tuple[str, str] = ("text", "motion")) -> tuple[Array, Array]:
-    """Two arrays (N, D) whose rows belong together.
+    """Validate two arrays (N, D) whose rows correspond.
 
     Raises:
         InvalidInput: as `embeddings`, or shapes that differ.
@@ -55,7 +55,7 @@ def pairs(first: Numbers, second: Numbers, *, names: tuple[str, str] = ("text", 
 
 
 def integers(name: str, values: Numbers, *, count: int | None = None) -> Integers:
-    """Whole numbers (N,), as many as `count` where it is given.
+    """Validate whole numbers (N,), as many as `count` if it is given.
 
     Raises:
         InvalidInput: of another shape, or not integers.
@@ -71,6 +71,6 @@ def integers(name: str, values: Numbers, *, count: int | None = None) -> Integer
 
 
 def at_least(name: str, value: int, least: int, *, hint: str) -> None:
-    """Raises InvalidInput where `value`, a size or a count, is under `least`."""
+    """Validate that `value`, a size or a count, is at least `least`; raise InvalidInput otherwise."""
     if value < least:
         raise InvalidInput(f"{value} is too few, {least} are needed", where=name, hint=hint)

@@ -1,4 +1,4 @@
-"""What was measured on each motion of an evaluation: the part of a report that later runs are paired with.
+"""Scores of each motion of an evaluation: the part of a report that later runs are paired with.
 
 Standard library only. The rest of a report is the evaluator's own (`marey.evaluator.report`).
 """
@@ -16,7 +16,7 @@ SCHEMA, VERSION = "marey.evaluation-report", 1
 
 @dataclass(frozen=True)
 class MotionScore:
-    """What later runs are paired with, motion by motion; None where it was not measured.
+    """Scores of one motion; None if not measured.
 
     Attributes:
         index: of the prompt.
@@ -37,7 +37,7 @@ class MotionScore:
 
 
 def check_document(document: object, where: str) -> dict[str, Any]:
-    """The fields of a report that was read as JSON.
+    """Return the fields of a report that was parsed from JSON.
 
     Raises:
         InvalidFile: it is no report, or of another version.
@@ -51,7 +51,7 @@ def check_document(document: object, where: str) -> dict[str, Any]:
 
 
 def read_scores(data: bytes, where: str) -> tuple[MotionScore, ...]:
-    """The scores of a report as JSON; nothing else of it is looked at.
+    """Return the scores of a JSON report; the rest is ignored.
 
     Raises:
         InvalidFile: no such JSON, of another version, or scores that are none.

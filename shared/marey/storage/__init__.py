@@ -1,4 +1,4 @@
-"""Asset stores: one port, a folder and S3 behind it.
+"""Asset stores: one interface, implemented by a folder and by S3.
 
 store = open_store(settings())
 digest = asset_digest(path)
@@ -28,7 +28,7 @@ __all__ = [
 
 
 def open_store(chosen: Settings) -> AssetStore:
-    """The store that the settings name: `s3://bucket`, a folder, or `home/assets`.
+    """Open the store that the settings name: `s3://bucket`, a folder, or `home/assets`.
 
     Raises:
         InvalidInput: an S3 store without keys, or an unknown kind of URL.

@@ -1,4 +1,4 @@
-"""HTTP connections to an object store: a deadline for each read and write, and none of the pool that fell silent.
+"""HTTP connections to an object store with a deadline for each read and write; silent connections are not reused.
 
 A deadline counts one operation on the socket, never a whole object: one that moves slowly but steadily takes as long
 as it takes.
@@ -33,7 +33,7 @@ answer runs already."""
 
 
 class Silence:
-    """When a connection last missed a deadline; what was opened earlier is not used again.
+    """Time of the last missed deadline; connections opened earlier are not reused.
 
     Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
     cost its next user a deadline.
@@ -43,7 +43,7 @@ class Silence:
         self.last = -math.inf
 
     def note(self, error: BaseException | None) -> None:
-        """Note an error, if it is a missed deadline."""
+        """Record an error, if it is a missed deadline."""
         while error is not None:
             if isinstance(error, TimeoutError | urllib3.exceptions.TimeoutError):
                 self.last = time.monotonic()
@@ -52,7 +52,7 @@ class Silence:
 
 
 def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolManager:
-    """Make the connections of one client.
+    """Create the connections of one client.
 
     Args:
         silence: shared by the clients of one store.
@@ -60,7 +60,7 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
     """
 
     class Deadlines:
-        """Mixed into urllib3's connections."""
+        """Mixin for urllib3's connections."""
 
         opened = -math.inf
         sock: socket.socket | None
@@ -71,7 +71,7 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
 
         @property
         def is_connected(self) -> bool:
-            """Asked by the pool before it uses a connection again."""
+            """Return False for a stale connection; urllib3's pool asks before reuse."""
             return super().is_connected and self.opened > silence.last
 
         def send(self, data: Any) -> None:

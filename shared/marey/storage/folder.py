@@ -58,7 +58,7 @@ class FolderStore:
                     left.unlink(missing_ok=True)
 
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
-        """See `AssetStore.put`. The media type is the caller's to keep."""
+        """See `AssetStore.put`. The media type is not stored."""
         with io.BytesIO(source) if isinstance(source, bytes) else source.open("rb") as content:
             return self._put_together([(key, content)])[0]
 
@@ -113,7 +113,7 @@ class FolderStore:
         yield from found
 
     def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
-        """None: a folder has no URLs."""
+        """Return None: a folder has no URLs."""
         checked_key(key)
 
     def check(self) -> None:
@@ -125,11 +125,12 @@ class FolderStore:
                 file.write(b"marey")
 
     def path(self, key: str) -> Path:
-        """The file of a key: always inside the folder, for `checked_key` lets no part begin with a dot."""
+        """Return the file of a key: always inside the folder, since `checked_key` rejects parts that begin with a
+        dot."""
         return self.root / checked_key(key)
 
     def _put_together(self, contents: Sequence[tuple[str, BinaryIO]]) -> list[Digest]:
-        """Each step for all of them, so that the fsyncs of a step wait for the disk at the same time.
+        """Run each step for all objects, so that the fsyncs of a step wait for the disk at the same time.
 
         A flush of the disk takes milliseconds and serves everybody who asked for one before it began: two files an item
         cost 2 to 3 ms when each of eight threads took them one by one, 0.3 ms like this.
@@ -144,7 +145,7 @@ class FolderStore:
 
     @contextmanager
     def _incoming(self, count: int) -> Generator[list[Path]]:
-        """Names for files being written; what was not moved away goes when something fails."""
+        """Yield names for temporary files; those that were not moved away are removed on failure."""
         incoming = self.root / INCOMING
         names = [incoming / secrets.token_hex(8) for _ in range(count)]
         try:
@@ -156,7 +157,7 @@ class FolderStore:
             raise
 
     def _write(self, temporaries: Sequence[Path], contents: Sequence[tuple[str, BinaryIO]]) -> list[Digest]:
-        """Write and fsync what the keys say."""
+        """Write and fsync contents that match their keys."""
         with ExitStack() as opened:
             files: list[tuple[int, str, BinaryIO]] = []
             for temporary, (key, content) in zip(temporaries, contents, strict=True):
@@ -165,7 +166,8 @@ class FolderStore:
             return self._at_once(_write_one, files)
 
     def _at_once(self, action: Callable[[Value], Result], values: Iterable[Value]) -> list[Result]:
-        """What `action` makes of each value; returns, or raises the first error, when no call is under way any more."""
+        """Run `action` for each value in parallel; return the results, or raise the first error, after all calls have
+        ended."""
         futures = [self._syncs.submit(action, value) for value in values]
         wait(futures)
         return [future.result() for future in futures]
@@ -185,7 +187,7 @@ def _raise(error: OSError) -> None:
 
 
 def _create(path: Path) -> int:
-    """A descriptor of a new file that only this user can read."""
+    """Create a file that only this user can read; return its descriptor."""
     try:
         return os.open(path, CREATE, 0o600)
     except FileNotFoundError:
@@ -194,7 +196,7 @@ def _create(path: Path) -> int:
 
 
 def _write_one(file: tuple[int, str, BinaryIO]) -> Digest:
-    """Write to a descriptor what its key says, durably."""
+    """Write content that matches its key to a descriptor, durably."""
     descriptor, key, content = file
     digest = _copy(content, descriptor)
     check_content(key, digest)
@@ -203,7 +205,7 @@ def _write_one(file: tuple[int, str, BinaryIO]) -> Digest:
 
 
 def _copy(content: BinaryIO, descriptor: int) -> Digest:
-    """Write all of the content; says what was written."""
+    """Write all of the content; return its digest."""
     sha256, size = hashlib.sha256(), 0
     while chunk := content.read(CHUNK):
         sha256.update(chunk)
@@ -223,7 +225,7 @@ def _move(temporary: Path, path: Path) -> None:
 
 
 def _make_folder(folder: Path) -> None:
-    """Make a folder and those above it, durably: without its name, what lies in it is lost."""
+    """Create a folder and its parents durably: without its directory entry its files would be lost."""
     if not folder.parent.is_dir():
         _make_folder(folder.parent)
     folder.mkdir(exist_ok=True)
@@ -231,7 +233,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _fsync_folder(folder: Path) -> None:
-    """Make a rename durable; some file systems refuse to open folders (Windows), and need it not."""
+    """Make a rename durable; some file systems refuse to open folders (Windows), and do not need it."""
     if os.name == "nt":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -243,7 +245,7 @@ def _fsync_folder(folder: Path) -> None:
 
 @contextmanager
 def _outages(root: Path, key: str | None = None) -> Generator[None]:
-    """Turn errors of the file system into `NotFound` (of `key`) or `Unreachable`."""
+    """Convert errors of the file system to `NotFound` (of `key`) or `Unreachable`."""
     try:
         yield
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:

@@ -1,4 +1,4 @@
-"""The port: what every asset store does. Keys are `t/{tenant}/{sha[:2]}/{sha}`; content never changes under a key."""
+"""The interface of asset stores. Keys are `t/{tenant}/{sha[:2]}/{sha}`; content never changes under a key."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
 
 @dataclass(frozen=True)
 class Digest:
-    """What content is: SHA-256 in hex, and its size in bytes."""
+    """SHA-256 of content in hex, and its size in bytes."""
 
     sha256: str
     size: int
@@ -28,7 +28,7 @@ class Digest:
 
 @dataclass(frozen=True)
 class Opened:
-    """Content being read: `size` is that of the whole object, `chunks` yields the range asked for.
+    """An open object: `size` is that of the whole object, `chunks` yields the requested range.
 
     Read `chunks` to its end or `close()` it: an S3 store holds a connection until then.
     """
@@ -37,7 +37,7 @@ class Opened:
     chunks: Iterator[bytes]
 
     def close(self) -> None:
-        """Let go of the connection or file."""
+        """Close the connection or file."""
         close = getattr(self.chunks, "close", None)
         if close is not None:
             close()
@@ -61,11 +61,11 @@ class AssetStore(Protocol):
     """
 
     def prepare(self) -> None:
-        """Make what the store needs (folder, bucket) and remove what killed writers left. To be run again at will."""
+        """Create the store's folder or bucket and remove leftovers of killed writers. Idempotent."""
         ...
 
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
-        """Store the bytes, or the content of a file, under `key`: wholly or not at all.
+        """Store bytes, or the content of a file, under `key`, atomically.
 
         Raises:
             InvalidInput: the last part of `key` is a SHA-256, and not that of the content.
@@ -73,14 +73,14 @@ class AssetStore(Protocol):
         ...
 
     def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
-        """Store a batch, in less time than a `put` of each takes; yields the keys of what is stored for good.
+        """Store a batch, faster than single `put` calls; yield the keys that are stored durably.
 
         Nothing happens before it is read. When it raises, as `put` does, put again what it has not yielded.
         """
         ...
 
     def get(self, key: str) -> bytes:
-        """The whole content.
+        """Return the whole content.
 
         Raises:
             NotFound: no such object.
@@ -88,7 +88,8 @@ class AssetStore(Protocol):
         ...
 
     def open(self, key: str, start: int = 0, length: int | None = None) -> Opened:
-        """Content from byte `start`, `length` bytes (None = to the end; past the end: what there is), in chunks.
+        """Open content from byte `start`, `length` bytes (None = to the end; past the end: the available rest), in
+        chunks.
 
         Raises:
             NotFound: no such object.
@@ -97,11 +98,11 @@ class AssetStore(Protocol):
         ...
 
     def exists(self, key: str) -> bool:
-        """Whether there is such an object."""
+        """Return True if there is such an object."""
         ...
 
     def size(self, key: str) -> int:
-        """Bytes of an object.
+        """Return the size of an object in bytes.
 
         Raises:
             NotFound: no such object.
@@ -109,22 +110,22 @@ class AssetStore(Protocol):
         ...
 
     def delete(self, key: str) -> None:
-        """Remove an object; none there is fine."""
+        """Delete an object; a missing one is no error."""
         ...
 
     def keys(self, prefix: str = "") -> Iterator[str]:
-        """The keys that begin with `prefix`, in order."""
+        """Yield the keys that begin with `prefix`, in order."""
         ...
 
     def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
-        """A URL that gives the object to whoever has it, for `seconds`, as a download called `filename`.
+        """Return a URL that gives access to the object for `seconds`, as a download named `filename`.
 
         None where the store has no URLs (a folder): send the content then.
         """
         ...
 
     def check(self) -> None:
-        """Whether the store would take an object now; for /readyz and doctor.
+        """Check that the store accepts objects now; for /readyz and doctor.
 
         Raises:
             Unreachable: it would not.
@@ -133,7 +134,7 @@ class AssetStore(Protocol):
 
 
 def asset_digest(source: bytes | Path) -> Digest:
-    """SHA-256 and size of bytes or of a file, in constant memory."""
+    """Return SHA-256 and size of bytes or of a file, in constant memory."""
     if isinstance(source, bytes):
         return Digest(hashlib.sha256(source).hexdigest(), len(source))
     with source.open("rb") as file:
@@ -141,7 +142,7 @@ def asset_digest(source: bytes | Path) -> Digest:
 
 
 def checked_key(key: str) -> str:
-    """`key`, if it is one: parts of letters, digits and `._-`, none beginning with a dot.
+    """Validate `key` and return it: parts of letters, digits and `._-`, none beginning with a dot.
 
     Raises:
         InvalidInput: it is not (an absolute path, `..`, a backslash, NUL, …).
@@ -152,7 +153,7 @@ def checked_key(key: str) -> str:
 
 
 def check_content(key: str, digest: Digest) -> None:
-    """Refuse content that is not what its key says.
+    """Validate that content matches its key.
 
     Raises:
         InvalidInput: the last part of `key` is the SHA-256 of other content.
@@ -163,17 +164,17 @@ def check_content(key: str, digest: Digest) -> None:
 
 
 def no_such_object(key: str) -> NotFound:
-    """The error for a key without an object."""
+    """Return the error for a key without an object."""
     return NotFound("no such object in the asset store", where=key)
 
 
 def range_past_end(key: str, start: int, size: int) -> InvalidInput:
-    """The error for a range that begins past the end."""
+    """Return the error for a range that begins past the end."""
     return InvalidInput(f"the range begins at byte {start} of {size}", where=key)
 
 
 def read_chunks(file: BinaryIO, length: int) -> Iterator[bytes]:
-    """The next `length` bytes of an open file in chunks; the file is closed at the end.
+    """Yield the next `length` bytes of an open file in chunks; the file is closed at the end.
 
     No read asks for more than is left: it is given that much memory before the first byte is there, and most files
     are a hundredth of a chunk.

@@ -64,7 +64,7 @@ REASONS = {
 
 @dataclass(frozen=True)
 class S3Options:
-    """Where the store is.
+    """Connection options of the store.
 
     Attributes:
         endpoint: `http://host:port`, `https://host`, or `host:port`.
@@ -100,7 +100,7 @@ class S3Store:
         self._public = self._client if public == options.endpoint else _client(options, public, self._silence)
 
     def prepare(self) -> None:
-        """See `AssetStore.prepare`. Unfinished multipart uploads are the business of the bucket's lifecycle rules."""
+        """See `AssetStore.prepare`. Unfinished multipart uploads are left to the bucket's lifecycle rules."""
         bucket = self.options.bucket
         with self._outages():
             if self._client.bucket_exists(bucket):
@@ -126,7 +126,7 @@ class S3Store:
         return digest
 
     def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
-        """See `AssetStore.put_all`. After an error, what has not begun is left for the next try."""
+        """See `AssetStore.put_all`. After an error, uploads that have not begun are skipped."""
         keys = {
             self._puts.submit(self.put, one.key, one.content, media_type=one.media_type): one.key for one in objects
         }
@@ -184,7 +184,7 @@ class S3Store:
                     yield found.object_name
 
     def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
-        """See `AssetStore.presign`. Computed here: no request is made."""
+        """See `AssetStore.presign`. Computed locally: no request is made."""
         return self._public.presigned_get_object(
             self.options.bucket,
             checked_key(key),
@@ -223,7 +223,7 @@ class S3Store:
 
     @contextmanager
     def _outages(self, key: str | None = None) -> Generator[None]:
-        """Turn errors of the SDK into `NotFound` (of `key`) or `Unreachable`."""
+        """Convert errors of the SDK to `NotFound` (of `key`) or `Unreachable`."""
         try:
             yield
         except Unreachable:
@@ -244,8 +244,8 @@ class S3Store:
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
     def _told(self, error: S3Error) -> S3Error:
-        """The error, or a better one: that to a HEAD says neither that the bucket is missing nor what is wrong with
-        the keys, so the same is asked by a GET."""
+        """Return the error, or a more precise one: the answer to a HEAD names neither a missing bucket nor invalid
+        keys, so the request is repeated as a GET."""
         try:
             if error.code in MISSING and self._client.bucket_exists(self.options.bucket):
                 return error
@@ -258,7 +258,7 @@ class S3Store:
         return error
 
     def _because(self, code: str, message: str | None = None) -> Unreachable:
-        """The error for an answer of the store."""
+        """Return the error for an answer of the store."""
         what, hint = REASONS.get(code, (None, None))
         if what is None or hint is None:
             return self._unreachable(f"{code}: {message}")

@@ -1,4 +1,4 @@
-"""Where a stream stands among the acts of its prompt."""
+"""Progress of a stream through the actions of its prompt."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class ActionStart(NamedTuple):
-    """An act of the prompt that was in force began to play."""
+    """Start of an action of the prompt in force."""
 
     frame: int
     """The first that was drawn under it."""

@@ -1,4 +1,4 @@
-"""What a client asks of a running stream: messages from any API process to the worker that holds the stream.
+"""Control messages of clients to a running stream: from any API process to the worker that holds the stream.
 
 They lie in a Redis stream of their own and stay when the worker dies: the next one reads on from the last message that
 the durable state of the stream names.
@@ -25,7 +25,7 @@ FIELD = b"m"
 
 @dataclass(frozen=True)
 class Control:
-    """One message; `prompt` is the new text of a steer, and nothing else has one."""
+    """One control message; only a steer has a `prompt`, the new text."""
 
     kind: Kind
     prompt: str | None = None
@@ -37,13 +37,13 @@ class Control:
             raise InvalidInput("a steer has a prompt, and no other message has", where="stream control")
 
     def to_bytes(self) -> bytes:
-        """JSON."""
+        """Encode as JSON."""
         message = {"kind": self.kind} if self.prompt is None else {"kind": self.kind, "prompt": self.prompt}
         return json.dumps(message, ensure_ascii=False).encode()
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Control:
-        """The message in these bytes.
+        """Decode a message.
 
         Raises:
             InvalidInput: it is none that this release knows.
@@ -62,7 +62,7 @@ class Control:
 
 
 class ControlQueue:
-    """The messages of one stream.
+    """Control messages of one stream.
 
     Args:
         client: as for `FrameStream`.
@@ -75,14 +75,14 @@ class ControlQueue:
         self._redis: Any = client
 
     def send(self, control: Control) -> str:
-        """Add a message; its id. Ids grow."""
+        """Append a message; return its id. Ids grow."""
         with reached(self.stream), self._redis.pipeline() as pipe:
             pipe.xadd(self.key, {FIELD: control.to_bytes()}, maxlen=KEPT_MESSAGES, approximate=False)
             pipe.pexpire(self.key, KEEP_MS)
             return pipe.execute()[0].decode()
 
     def read(self, after: str = START, *, block_ms: int = 0) -> list[tuple[str, Control | InvalidInput]]:
-        """All messages after the one with this id, oldest first, each with its own.
+        """Return all messages after the one with this id, oldest first, each with its own id.
 
         A message that this release does not know comes as the error that says so: a worker that stopped at it would
         stop at it for ever.

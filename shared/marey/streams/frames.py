@@ -1,4 +1,4 @@
-"""One frame of a live stream as bytes: where the root is, and how every joint turns.
+"""Binary format of one frame of a live stream: root position and joint rotations.
 
     offset  size  what (little-endian)
     0       2     `MF`
@@ -62,12 +62,12 @@ class Frame:
 
 
 def frame_bytes(joints: int) -> int:
-    """How many bytes a frame of a skeleton has."""
+    """Return the size of a frame of a skeleton, in bytes."""
     return HEADER.size + JOINT_BYTES * joints
 
 
 def encode_frame(frame: Frame) -> bytes:
-    """The bytes of a frame.
+    """Encode a frame.
 
     Raises:
         InvalidInput: wrong shapes, numbers out of range or not finite, quaternions that are not unit.
@@ -83,7 +83,7 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def decode_frame(data: bytes, *, joints: int | None = None) -> Frame:
-    """The frame in these bytes, rotations unit again.
+    """Decode a frame; rotations are unit quaternions again.
 
     Args:
         data: exactly one frame.

@@ -1,4 +1,4 @@
-"""Tells live workers that a stream has just begun, so that nobody waits for their next look at the rows.
+"""Notification of live workers about a new stream, ahead of their next poll of the rows.
 
 A counter that they compare twenty times a second. Who misses it, or has no Redis for a moment, finds the row half a
 second later: nothing depends on it but that half second.
@@ -17,7 +17,7 @@ KEY = "marey:streams:begun"
 
 
 class StreamNotifier:
-    """One end of it.
+    """One end of the notification channel.
 
     Args:
         client: as for `FrameStream`.
@@ -28,7 +28,7 @@ class StreamNotifier:
         self._heard: bytes | None = None
 
     def notify(self) -> None:
-        """A stream waits for a worker; its row is committed.
+        """Notify workers of a waiting stream, after its row is committed.
 
         Raises:
             Unreachable: Redis does not answer.
@@ -37,7 +37,7 @@ class StreamNotifier:
             self._redis.incr(KEY)
 
     def poll(self) -> bool:
-        """Whether it did since this end last asked.
+        """Return True if there was a notification since this end's last poll.
 
         Raises:
             Unreachable: Redis does not answer.

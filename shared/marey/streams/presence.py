@@ -1,4 +1,4 @@
-"""Who watches a stream: a key that API processes renew while a socket is open. A stream that nobody sees ends."""
+"""Presence of viewers: a key that API processes renew while a socket is open. A stream without viewers ends."""
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 from __future__ import annotations
@@ -14,7 +14,7 @@ REFRESH_SECONDS = 3.0  # two may fail before the key is gone
 
 
 class ViewerPresence:
-    """The watchers of one stream.
+    """Viewers of one stream.
 
     Args:
         client: as for `FrameStream`.
@@ -27,7 +27,7 @@ class ViewerPresence:
         self._redis: Any = client
 
     def refresh(self) -> None:
-        """Somebody watches; to be called every 3 s.
+        """Record an active viewer; call it every 3 s.
 
         Raises:
             Unreachable: Redis does not answer.
@@ -36,7 +36,7 @@ class ViewerPresence:
             self._redis.set(self.key, b"1", px=KEEP_MS)
 
     def is_active(self) -> bool:
-        """Whether somebody did within the last 10 s.
+        """Return True if a viewer was recorded within the last 10 s.
 
         Raises:
             Unreachable: Redis does not answer.

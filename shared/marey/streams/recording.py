@@ -1,4 +1,4 @@
-"""The recording of a live stream: its tokens and prompts, from which its clip is made by the queue of its model."""
+"""Recording of a live stream: tokens and prompts, from which the queue of its model makes its clip."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Prompts: TypeAlias = Sequence[tuple[int, str]]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """All of a stream that decides its clip.
+    """Everything of a stream that determines its clip.
 
     Attributes:
         stream: its id.
@@ -38,7 +38,7 @@ class Recording:
     text: TextFeatures = field(repr=False)
 
     def to_blob(self) -> bytes:
-        """Safetensors; equal recordings are equal bytes."""
+        """Encode as safetensors; equal recordings are equal bytes."""
         about = {"format": FORMAT, "stream": self.stream, "prompts": [[frame, text] for frame, text in self.prompts]}
         arrays = {
             "recording": np.frombuffer(json.dumps(about, ensure_ascii=False).encode(), np.uint8),
@@ -49,7 +49,7 @@ class Recording:
 
     @classmethod
     def from_blob(cls, blob: bytes) -> Recording | None:
-        """Read what `to_blob` wrote; None for any other safetensors.
+        """Decode the output of `to_blob`; None for any other safetensors.
 
         Raises:
             InvalidFile: damaged, or of another version.

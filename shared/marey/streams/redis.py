@@ -1,4 +1,4 @@
-"""Frame streams on Redis: one worker writes, any number of API processes read, and a reader that comes back goes on.
+"""Frame streams on Redis: one worker writes, any number of API processes read, and readers can resume.
 
 A stream has four keys, all in one hash slot: `frames` (a Redis stream of the last 1,200 frames, one minute at 20 fps;
 frame n has the id `{n+1}-0`, since 0-0 is none), `lease` (who writes; gone 1.5 s after its last renewal), `fence` (the
@@ -78,12 +78,12 @@ return {'written', first + count}
 
 
 class LeaseLost(Conflict):
-    """The stream is another worker's, or was not renewed in time: write nothing more."""
+    """The lease expired, or another worker has the stream: write nothing more."""
 
 
 @dataclass(frozen=True)
 class Lease:
-    """The right to write a stream.
+    """Exclusive right to write a stream.
 
     Attributes:
         fence: goes up with every lease of the stream.
@@ -97,13 +97,13 @@ class Lease:
 
     @property
     def value(self) -> str:
-        """What the lease key holds."""
+        """Value of the lease key."""
         return f"{self.fence}:{self.token}"
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Frames that a reader asked for and that are no more: `first` to `first + count - 1`."""
+    """Requested frames that no longer exist: `first` to `first + count - 1`."""
 
     first: int
     count: int
@@ -111,7 +111,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class StoredFrame:
-    """A frame as it is sent on to a client."""
+    """A frame in the encoding that clients receive."""
 
     number: int
     data: bytes
@@ -150,7 +150,7 @@ class FrameStream:
         self._write = self._redis.register_script(_WRITE)
 
     def acquire(self, *, above: int = 0) -> Lease | None:
-        """Take the stream, if nobody has it.
+        """Acquire the lease of the stream, if it is free.
 
         Args:
             above: the highest fencing number that is known of it elsewhere; the new one is higher.
@@ -167,7 +167,7 @@ class FrameStream:
         return Lease(fence, token, following) if fence else None
 
     def renew(self, lease: Lease) -> None:
-        """Keep the stream for another 1.5 s; to be called every 0.4 s.
+        """Extend the lease by 1.5 s; call it every 0.4 s.
 
         Raises:
             LeaseLost: it is another's, or ran out.
@@ -178,12 +178,12 @@ class FrameStream:
             raise self._lost(lease)
 
     def release(self, lease: Lease) -> bool:
-        """Give the stream back, so that another worker need not wait; False when it was lost already."""
+        """Release the lease, so that another worker need not wait; return False if it was lost already."""
         with reached(self.stream):
             return bool(self._release(keys=[self.lease_key], args=[lease.value]))
 
     def write(self, lease: Lease, frames: Sequence[Frame]) -> None:
-        """Add frames, all or none. The same call made twice writes once.
+        """Append frames, all or none. Idempotent.
 
         Raises:
             LeaseLost: the lease is another's, or ran out.
@@ -207,7 +207,7 @@ class FrameStream:
             raise Conflict(f"frame {first} does not follow; the next is {following}", where=f"stream {self.stream}")
 
     def bounds(self) -> tuple[int, int]:
-        """Number of the oldest frame that is kept, and of the one that comes next; (0, 0) without frames."""
+        """Return the numbers of the oldest stored frame and of the next one; (0, 0) without frames."""
         with reached(self.stream):
             oldest = self._redis.xrange(self.frames_key, count=1)
             newest = self._redis.xrevrange(self.frames_key, count=1)
@@ -219,7 +219,7 @@ class FrameStream:
             self._redis.delete(self.frames_key, self.lease_key, self.fence_key, stream_key(self.stream, "control"))
 
     def reader(self, at: int = 0) -> FrameReader:
-        """Read from frame `at` on, which may be one that comes later."""
+        """Return a reader that starts at frame `at`, which may lie in the future."""
         return FrameReader(self._redis, self, at)
 
     def _lost(self, lease: Lease) -> LeaseLost:
@@ -228,7 +228,7 @@ class FrameStream:
 
 
 class FrameReader:
-    """One client's way through a stream: every frame once and in order, and gaps told with their size.
+    """One client's position in a stream: every frame once and in order, gaps reported with their size.
 
     Attributes:
         at: number of the next frame to read; what a client that comes back gives.
@@ -242,7 +242,7 @@ class FrameReader:
         self._stream = stream
 
     def read(self, *, count: int = 64, block_ms: int = 0) -> list[StoredFrame | Gap]:
-        """The next frames, a gap before those that follow it.
+        """Return the next frames, a gap before those that follow it.
 
         Args:
             count: at most so many frames.
@@ -261,7 +261,7 @@ class FrameReader:
         return found
 
     def skip(self) -> Gap | None:
-        """Go on with the newest frame, for a client that is too slow; what it misses, if anything."""
+        """Skip to the newest frame, for a client that is too slow; return the gap, if any."""
         newest = max(self._stream.bounds()[1] - 1, self.at)
         missed = Gap(self.at, newest - self.at)
         self.at = newest
@@ -269,7 +269,7 @@ class FrameReader:
 
 
 def stream_key(stream: str, part: str) -> str:
-    """A key of a stream; the braces put all of them in one hash slot.
+    """Return a key of a stream; the braces put all of them in one hash slot.
 
     Raises:
         InvalidInput: the id is none.
@@ -281,7 +281,7 @@ def stream_key(stream: str, part: str) -> str:
 
 @contextmanager
 def reached(stream: str) -> Generator[None]:
-    """Turn what redis-py raises when Redis cannot serve into `Unreachable`."""
+    """Convert redis-py's connection errors to `Unreachable`."""
     try:
         yield
     except (NoConnection, TookTooLong, OutOfMemoryError, ReadOnlyError) as error:
@@ -295,12 +295,12 @@ def reached(stream: str) -> Generator[None]:
 
 
 def _number(identity: bytes) -> int:
-    """Number of the frame with this id."""
+    """Return the number of the frame with this id."""
     return int(identity.split(b"-")[0]) - 1
 
 
 def stream_entries(answer: Any) -> list[tuple[bytes, dict[bytes, bytes]]]:
-    """Entries of the one stream that an XREAD asked for: pairs of key and list in RESP2, a mapping in RESP3."""
+    """Return the entries of the single stream of an XREAD: pairs of key and list in RESP2, a mapping in RESP3."""
     if not answer:
         return []
     if isinstance(answer, dict):

@@ -1,4 +1,4 @@
-"""Live streams: rows that say where each stands, and chunks of tokens from which it goes on after its worker died.
+"""Live streams: rows with the state of each, and chunks of tokens from which it resumes after its worker died.
 
 Who may write a stream is decided on Redis (`marey.streams.redis`): a lease of 1.5 s with a fencing number. Every write
 of a worker here names that number, and changes nothing once a newer lease has written.
@@ -37,7 +37,7 @@ RETRY_SECONDS = 10
 
 
 def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID:
-    """A new stream, waiting for a worker.
+    """Create a stream that waits for a worker.
 
     Args:
         limit: how many may be open at once under one API key, where its tenant has no quota of its own.
@@ -80,7 +80,7 @@ def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID
 
 
 def get_stream(conn: sa.Connection, tenant: str, stream: UUID) -> StreamRow:
-    """One stream.
+    """Return one stream.
 
     Raises:
         NotFound: the tenant has no such stream.
@@ -95,7 +95,7 @@ def get_stream(conn: sa.Connection, tenant: str, stream: UUID) -> StreamRow:
 def list_streams(
     conn: sa.Connection, tenant: str, *, is_open: bool = False, cursor: str | None = None, limit: int = 50
 ) -> Page[StreamRow]:
-    """Streams, newest first; with `is_open` those that are not over."""
+    """Return streams, newest first; with `is_open` only open ones."""
     table = tables.stream.c
     ours = table.tenant_id == tenant
     query, order = _streams().where(ours), Order(table.created_at, table.id)
@@ -108,14 +108,14 @@ def list_streams(
 
 
 def stream_prompts(conn: sa.Connection, stream: UUID) -> list[tuple[int, str]]:
-    """Every prompt of a stream that is on record, with the frame from which it was in force."""
+    """Return every recorded prompt of a stream, with its first frame."""
     table = tables.stream_chunk.c
     query = sa.select(table.prompts).where(table.stream_id == stream).order_by(table.first)
     return [(int(frame), str(text)) for prompts in conn.execute(query).scalars() for frame, text in prompts]
 
 
 def prompts_with_rewrites(conn: sa.Connection, stream: UUID) -> list[StreamPrompt]:
-    """`stream_prompts`, each with how it was read."""
+    """Return `stream_prompts`, each with its rewrite."""
     table = tables.stream_chunk.c
     query = sa.select(table.prompts, table.reads).where(table.stream_id == stream).order_by(table.first)
     return [
@@ -126,7 +126,7 @@ def prompts_with_rewrites(conn: sa.Connection, stream: UUID) -> list[StreamPromp
 
 
 def stream_acts(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
-    """Every act of a stream that began and is on record; none of what workers wrote that did not record acts."""
+    """Return every recorded action start of a stream; none from workers that did not record actions."""
     table = tables.stream_chunk.c
     query = sa.select(table.acts).where(table.stream_id == stream, table.acts.is_not(None)).order_by(table.first)
     return [ActionStart(*act) for acts in conn.execute(query).scalars() for act in acts]
@@ -136,8 +136,8 @@ def stream_acts(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
 
 
 def open_streams(conn: sa.Connection, bundle: str, limit: int = 200) -> list[StreamRow]:
-    """The streams of a bundle that are not over, oldest first: those that wait, and those that a worker has or had (the
-    lease on Redis tells which). None that waits of a tenant that is suspended."""
+    """Return the open streams of a bundle, oldest first: waiting ones, and those that a worker has or had (the lease on
+    Redis tells which). Waiting streams of suspended tenants are left out."""
     table, tenant = tables.stream.c, tenant_tables.tenant.c
     idle = sa.exists().where(tenant.id == table.tenant_id, tenant.suspended_at.is_not(None))
     wanted = (table.bundle == bundle) & table.ended_at.is_(None) & ((table.state != StreamState.WAITING) | ~idle)
@@ -146,8 +146,7 @@ def open_streams(conn: sa.Connection, bundle: str, limit: int = 200) -> list[Str
 
 
 def take_stream(conn: sa.Connection, stream: UUID, fence: int, worker: str) -> StreamPast | None:
-    """Put a stream under the lease `fence` and read what is needed to go on with it; None when it is over, or when a
-    newer lease was here."""
+    """Put a stream under the lease `fence` and read its past; None if the stream has ended or a newer lease exists."""
     table = tables.stream
     taken = conn.execute(
         sa.update(table)
@@ -170,8 +169,8 @@ def take_stream(conn: sa.Connection, stream: UUID, fence: int, worker: str) -> S
 
 
 def add_chunk(conn: sa.Connection, stream: UUID, fence: int, chunk: StreamChunk) -> bool:
-    """Write down what was made since the last chunk, and how the stream stands; False when a newer lease was here, or
-    the stream is over. A chunk without frames is a sign of life."""
+    """Record the frames since the last chunk and the stream's state; return False if a newer lease exists or the stream
+    has ended. A chunk without frames is a sign of life."""
     table = tables.stream
     values: dict[str, Any] = {"seen_at": CLOCK, "control": chunk.control, "frames": chunk.first + chunk.frames}
     if chunk.state is not None:
@@ -202,7 +201,7 @@ def end_stream(
     problem: Problem | None = None,
     clip: tuple[NewItem, bytes] | None = None,
 ) -> bool:
-    """A stream is over; its clip, if it has one, becomes a job of one item.
+    """End a stream; its clip, if it has one, becomes a job of one item.
 
     Args:
         fence: number of the worker's lease; None = nobody holds it (the scheduler).
@@ -241,7 +240,7 @@ def end_stream(
 
 
 def abandoned_streams(conn: sa.Connection, seconds: float) -> Sequence[UUID]:
-    """Open streams that no worker wrote for so long."""
+    """Return open streams without a write for the given time."""
     table = tables.stream.c
     query = sa.select(table.id).where(table.ended_at.is_(None), table.seen_at < CLOCK - interval(seconds))
     return list(conn.execute(query.order_by(table.id)).scalars())
@@ -280,6 +279,6 @@ def _row(row: sa.RowMapping) -> StreamRow:
 def enqueue_stream_event(
     conn: sa.Connection, tenant: str, stream: UUID, state: StreamState, *, frames: int, job: UUID | None
 ) -> None:
-    """Tell of a stream that is over; `job` makes its clip."""
+    """Enqueue a webhook event for a stream that ended; `job` makes its clip."""
     data = {"stream": stream, "state": state, "counters": {"frames": frames}, "job": job}
     enqueue_event(conn, tenant, EventKind.STREAM_ENDED, data)

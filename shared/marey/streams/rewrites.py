@@ -1,4 +1,4 @@
-"""How the prompts of a stream were read."""
+"""Rewrites of the prompts of a stream."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class PromptRewrite(NamedTuple):
-    """What the model was told for a prompt."""
+    """Text that the model received for a prompt."""
 
     rewritten: str
     """The prompt itself where no rewriter changed it."""

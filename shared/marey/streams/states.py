@@ -1,4 +1,4 @@
-"""States of live streams, and the one table of allowed transitions. The database holds it in a trigger, too."""
+"""States of live streams, and the table of allowed transitions. A database trigger enforces it too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class StreamState(StrEnum):
-    """Where a live stream stands. `ENDED` and `FAILED` are final."""
+    """State of a live stream. `ENDED` and `FAILED` are final."""
 
     WAITING = "waiting"
     LIVE = "live"

@@ -1,4 +1,4 @@
-"""What goes into and comes out of the repository of live streams."""
+"""Data types of the repository of live streams."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marey.streams.states import StreamState
 
 @dataclass(frozen=True)
 class NewStream:
-    """A live stream to begin.
+    """A live stream to create.
 
     Args:
         key: the caller's API key.
@@ -66,7 +66,7 @@ class StreamRow:
 
 
 class StreamPrompt(NamedTuple):
-    """A prompt of a stream as whoever watches is told of it."""
+    """A prompt of a stream as viewers receive it."""
 
     frame: int
     """From which it was in force."""
@@ -77,7 +77,7 @@ class StreamPrompt(NamedTuple):
 
 @dataclass(frozen=True)
 class StreamPast:
-    """What a worker goes on from.
+    """State from which a worker resumes a stream.
 
     Attributes:
         tokens: int16, little-endian, a column of V levels for each of `row.frames`.
@@ -93,7 +93,7 @@ class StreamPast:
 
 @dataclass(frozen=True)
 class StreamChunk:
-    """What was made since the last one.
+    """Frames and changes since the last chunk.
 
     Args:
         first: number of its first frame.

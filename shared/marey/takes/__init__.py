@@ -1,4 +1,4 @@
-"""What people do with motions: search, reviews and re-rolls, references, retention, erasure, garbage collection."""
+"""User actions on motions: search, reviews and re-rolls, references, retention, erasure, garbage collection."""
 
 from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions

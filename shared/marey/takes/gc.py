@@ -27,14 +27,14 @@ PAGE = 500
 
 
 class ObjectStore(Protocol):
-    """What garbage collection needs of an asset store (`marey.storage.AssetStore` fits)."""
+    """Methods of an asset store that garbage collection needs (`marey.storage.AssetStore` fits)."""
 
     def delete(self, key: str) -> None: ...
     def keys(self, prefix: str = "") -> Iterator[str]: ...
 
 
 def collect_garbage(engine: sa.Engine, store: ObjectStore) -> GarbageReport:
-    """Remove assets that nothing refers to (and that no living lease announced), and objects without a row.
+    """Remove unreferenced assets (unless a live lease announced them), and objects without a row.
 
     Each removal holds the lock of its asset row, so that a worker about to write the same content waits and writes it
     anew. Keys outside `t/` are not ours and stay.
@@ -55,7 +55,8 @@ def collect_garbage(engine: sa.Engine, store: ObjectStore) -> GarbageReport:
 
 
 def remove_stale_assets(engine: sa.Engine, store: ObjectStore, *, rules: Policy | None = None) -> int:
-    """The sweeper's part of it: assets still `writing` an hour after they were announced, their lease gone.
+    """Remove assets that are still `writing` an hour after they were announced and whose lease is gone; for the
+    sweeper.
 
     Raises:
         Unreachable: the store or the database does not answer.
@@ -66,7 +67,8 @@ def remove_stale_assets(engine: sa.Engine, store: ObjectStore, *, rules: Policy 
 
 
 def remove_unused_assets(engine: sa.Engine, store: ObjectStore) -> int:
-    """Remove stored assets that nothing refers to; how many. Objects without a row are left to `collect_garbage`.
+    """Remove stored assets without references; return their number. Objects without a row are left to
+    `collect_garbage`.
 
     Raises:
         Unreachable: the store or the database does not answer; what is left goes the next time.
@@ -112,7 +114,7 @@ def _known(engine: sa.Engine, keys: Sequence[str]) -> set[str]:
 
 
 def _remove_orphan(engine: sa.Engine, store: ObjectStore, key: str) -> bool:
-    """Remove an object without a row, behind a row of our own that nobody else ever sees."""
+    """Remove an object without a row, behind a temporary row of its own."""
     found = KEY.fullmatch(key)
     assert found is not None
     tenant, sha256 = found.groups()
@@ -138,7 +140,7 @@ def _remove_orphan(engine: sa.Engine, store: ObjectStore, key: str) -> bool:
 
 
 def _missing(engine: sa.Engine, store: ObjectStore, found: set[str]) -> tuple[str, ...]:
-    """Keys of stored assets that the listing lacked, and that are stored still."""
+    """Return the keys of stored assets that the listing lacked, and that are still stored."""
     table = job_tables.asset.c
     with transaction(engine, MAINTENANCE) as conn:
         rows = conn.execute(sa.select(table.tenant_id, table.sha256).where(table.state == "stored")).all()

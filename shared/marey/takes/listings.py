@@ -1,4 +1,4 @@
-"""Listings of motions, newest first or in the order they were made."""
+"""Listings of motions, newest first or in creation order."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def list_motions(
     cursor: str | None = None,
     limit: int = 50,
 ) -> Page[MotionRow]:
-    """Motions that a filter finds: of a job in the order they were made; of the whole tenant newest first.
+    """Return motions that match a filter: of a job in creation order; of the whole tenant newest first.
 
     Raises:
         NotFound: the tenant has no such job.

@@ -1,4 +1,4 @@
-"""References that a person types: the last digits of an id, a name, `last`, a motion's place in its job.
+"""Short references: the last digits of an id, a name, `last`, a motion's place in its job.
 
 All readings of a reference are looked up, each by an index, within one tenant. Readings that agree are one match; where
 they do not, every match is answered and the caller says that the reference is ambiguous. None wins over another, but
@@ -54,7 +54,7 @@ class ReferenceKind(StrEnum):
 
 @dataclass(frozen=True)
 class ReferenceMatch:
-    """Something that a reference may stand for."""
+    """A candidate of a reference."""
 
     kind: ReferenceKind
     id: UUID
@@ -116,7 +116,7 @@ def resolve_reference(
 
 
 def _newest(found: Sequence[ReferenceMatch]) -> list[ReferenceMatch]:
-    """Each once, newest first."""
+    """Sort newest first, without duplicates."""
     once = {match.id: match for match in found}
     return sorted(once.values(), key=lambda match: (match.created, match.id), reverse=True)[:MOST]
 
@@ -145,7 +145,7 @@ def _read(
     *,
     last: bool,
 ) -> list[Sequence[Any]]:
-    """The newest rows of each reading, and the newest of all for `last`."""
+    """Return the newest rows of each reading, and the newest of all for `last`."""
     rows: list[Sequence[Any]] = []
     for reading in readings:
         # A fence: by the order of creation the planner would walk the whole listing for what is rare.
@@ -158,7 +158,7 @@ def _read(
 
 
 def _by_id(reference: str, identifier: sa.Column[Any]) -> list[sa.ColumnElement[bool]]:
-    """The condition of a whole id, or of its last digits."""
+    """Return the condition of a whole id, or of its last digits."""
     if _WHOLE.fullmatch(reference):
         return [identifier == UUID(reference)]
     if not _DIGITS.fullmatch(reference):

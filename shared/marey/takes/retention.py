@@ -1,4 +1,4 @@
-"""What goes by itself or for good: jobs whose days are over, prompts that are to be forgotten, their files."""
+"""Retention and erasure: expired jobs, erased prompts, and their files."""
 
 from __future__ import annotations
 
@@ -75,14 +75,15 @@ FORGET_TEXTS = sa.text("""
 
 
 class FileStore(ObjectStore, Protocol):
-    """What rewriting files needs of an asset store (`marey.storage.AssetStore` fits)."""
+    """Methods of an asset store that rewriting files needs (`marey.storage.AssetStore` fits)."""
 
     def get(self, key: str) -> bytes: ...
     def put(self, key: str, source: bytes) -> object: ...
 
 
 def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
-    """Remove a job that has ended, with its items, events and motions; their files go at the next garbage collection.
+    """Delete a job that has ended, with its items, events and motions; its files are removed by the next garbage
+    collection.
 
     Raises:
         NotFound: the tenant has no such job.
@@ -99,7 +100,7 @@ def delete(conn: sa.Connection, tenant: str, job: UUID) -> None:
 
 
 def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
-    """Delete jobs whose days are over, with motions and files; how many. One that an evaluation works with waits.
+    """Delete jobs past their retention, with motions and files; return their number. Jobs of an open evaluation wait.
 
     Raises:
         Unreachable: the store or the database does not answer.
@@ -123,8 +124,8 @@ def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
 
 
 def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
-    """Forget the prompts of a job that has ended: prompts, their rewritten forms, graphs and features, at once; the npz
-    files, whose manifests hold them, are given to nobody any more and written anew by `rewrite_files`.
+    """Erase the prompts of a job that has ended: prompts, rewrites, graphs and features at once; the npz files, whose
+    manifests hold them, are no longer served and are rewritten by `rewrite_files`.
 
     Names, tags, verdicts, motions and every other file stay. Erased already: no change.
 
@@ -146,7 +147,7 @@ def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
 
 
 def rewrite_files(engine: sa.Engine, store: FileStore, scrub: Callable[[bytes], bytes]) -> int:
-    """Write the files of erased jobs anew, and remove the old ones; how many.
+    """Rewrite the files of erased jobs, and remove the old ones; return their number.
 
     Args:
         scrub: a file's bytes without its prompt; a file that it cannot read (`InvalidFile`) is removed.
@@ -221,7 +222,7 @@ def _waiting(conn: sa.Connection) -> list[_File]:
 
 
 def _rewrite(engine: sa.Engine, store: FileStore, file: _File, scrub: Callable[[bytes], bytes]) -> bool:
-    """Whether it is done; not, where the collector came between: then the next round does it again."""
+    """Rewrite a file; return False if the garbage collector interfered: the next round tries again."""
     try:
         data = scrub(store.get(asset_key(file.tenant, file.sha256)))
     except (InvalidFile, NotFound):

@@ -1,4 +1,4 @@
-"""What people think of motions: keep, reject, roll again. Who said it, when and why stands on the motion."""
+"""Reviews of motions: keep, reject, re-roll. Reviewer, time and comment are stored with the motion."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def review(
     by: str,
     comment: str | None = None,
 ) -> list[MotionRow]:
-    """Say what you think of motions; None takes back what was said. What was said already changes nothing.
+    """Set the verdict on motions; None removes it. An equal verdict changes nothing.
 
     Args:
         by: who says it.
@@ -74,7 +74,7 @@ def reroll(
     by: str,
     comment: str | None = None,
 ) -> list[Reroll]:
-    """Ask for another take of motions: each a new item of the same job, with the next seed of its prompt.
+    """Request another take of motions: each a new item of the same job, with the next seed of its prompt.
 
     A motion has one take after it: asked again, the same item is answered. To go on, re-roll that take.
 
@@ -125,7 +125,7 @@ def _roll_again(
     by: str,
     comment: str | None,
 ) -> set[UUID]:
-    """New takes of motions of one job under lock; those that had none before."""
+    """Create new takes of motions of one locked job; motions that have one are skipped."""
     refuse_erased(job, "re-rolled")
     table = job_tables.item.c
     wanted = {row.item: row for row in motions}
@@ -159,7 +159,7 @@ def _roll_again(
 
 
 class _Numbers:
-    """The next position of a job under lock, and the next seeds and variants of its prompts."""
+    """Next position of a locked job, and next seeds and variants of its prompts."""
 
     def __init__(self, conn: sa.Connection, job: UUID, prompts: set[int]) -> None:
         table = job_tables.item.c
@@ -175,7 +175,7 @@ class _Numbers:
             self._variants[index] = max(self._variants[index], variant)
 
     def seed(self, index: int) -> int:
-        """The one after the last that this prompt had; after the greatest there is, the first that is free."""
+        """Return the seed after the prompt's last one; after the maximum, the first that is free."""
         used = self._seeds[index]
         following = max(used) + 1
         if following == SEED_LIMIT:
@@ -184,7 +184,7 @@ class _Numbers:
         return following
 
     def variant(self, index: int) -> int:
-        """Variants go on counting."""
+        """Return the next variant of the prompt."""
         self._variants[index] += 1
         return self._variants[index]
 
@@ -208,7 +208,7 @@ def _refuse_streams(conn: sa.Connection, items: Sequence[UUID]) -> None:
 def _say(
     conn: sa.Connection, motions: Sequence[UUID], verdict: Review | None, by: str, comment: str | None
 ) -> Counter[UUID]:
-    """Write a verdict where another stands; how many motions of which job it changed."""
+    """Write a verdict where another one is set; return the number of changed motions by job."""
     table = job_tables.motion
     new: sa.ColumnElement[bool] = table.c.review.is_distinct_from(verdict)
     if comment is not None and verdict is not None:

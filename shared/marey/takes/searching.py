@@ -1,4 +1,4 @@
-"""Search among a million motions: two ways of finding a page, neither of which the planner may choose for itself.
+"""Search among a million motions: two query plans, each forced, since the planner would choose badly.
 
 `motion_search` holds a row of each motion, and its `terms` all that a filter names. A page is looked for
 
@@ -42,7 +42,7 @@ _FETCH = ("indexscan", "indexonlyscan", "bitmapscan", "sort")
 def find_motions(
     conn: sa.Connection, tenant: str, found: MotionFilter, *, job: UUID | None, cursor: str | None, limit: int
 ) -> list[UUID]:
-    """Ids of the motions that a filter finds: of a job in the order they were made; of the whole tenant newest first.
+    """Return ids of the motions that match a filter: of a job in creation order; of the whole tenant newest first.
 
     Raises:
         InvalidInput: a filter that holds what no text can, or a cursor of something else.
@@ -79,7 +79,7 @@ def find_motions(
 
 
 def motions_at(conn: sa.Connection, job: UUID, index: int) -> list[UUID]:
-    """Ids of the motions of one prompt of a job, by the prompt's index; more than one where it has variants."""
+    """Return ids of the motions of one prompt of a job, by the prompt's index; several for variants."""
     table = tables.motion_search.c
     terms = (_lexeme("j", str(job)), _lexeme("x", str(index)))
     with _plan(conn, _LOOK_UP):
@@ -89,14 +89,14 @@ def motions_at(conn: sa.Connection, job: UUID, index: int) -> list[UUID]:
 
 @contextmanager
 def fetching_by_id(conn: sa.Connection) -> Generator[None]:
-    """Let statements that name some ids go by index alone, whatever the statistics say."""
+    """Make statements that name some ids use indexes only, independent of the statistics."""
     with _plan(conn, _FETCH):
         yield
 
 
 @contextmanager
 def _plan(conn: sa.Connection, allowed: Sequence[str]) -> Generator[None]:
-    """Leave the planner these ways alone, until the end of the block."""
+    """Restrict the planner to these scan types until the end of the block."""
     wanted = {**_PLAIN, **{f"enable_{name}": "on" if name in allowed else "off" for name in _SWITCHES}}
     conn.exec_driver_sql("; ".join(f"SET LOCAL {name} = '{value}'" for name, value in wanted.items()))
     yield  # after an error the transaction is over, and with it the settings
@@ -104,7 +104,7 @@ def _plan(conn: sa.Connection, allowed: Sequence[str]) -> Generator[None]:
 
 
 def _conditions(found: MotionFilter, terms: sa.ColumnElement[Any]) -> list[sa.ColumnElement[bool]]:
-    """The conditions of a filter, each one for itself: the index goes through them hand in hand."""
+    """Return the conditions of a filter separately, so that the index can intersect them."""
     for where, text in (("name", found.name), ("text", found.text), *(("tag", tag) for tag in found.tags)):
         check_text(text, where)
     wanted = [_has(terms, _lexeme("g", tag)) for tag in found.tags]
@@ -121,12 +121,12 @@ def _conditions(found: MotionFilter, terms: sa.ColumnElement[Any]) -> list[sa.Co
 
 
 def _lexeme(kind: str, value: str) -> sa.ColumnElement[str]:
-    """A term of `tables.motion_search` as a query."""
+    """Return a term of `tables.motion_search` as a query."""
     return sa.literal(f"'\x01{kind}{_escaped(value)}'")
 
 
 def _escaped(text: str) -> str:
-    """The text as it stands between the quotes of a tsquery."""
+    """Escape text for the quotes of a tsquery."""
     return text.replace("\\", "\\\\").replace("'", "''")
 
 

@@ -1,4 +1,4 @@
-"""Values that the repositories of takes give and take."""
+"""Data types of the repositories of takes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from marey.jobs.states import ItemState, Review
 
 @dataclass(frozen=True)
 class MotionFilter:
-    """Which motions a listing shows: those that fit everything given."""
+    """Filter of a motion listing: all given conditions must match."""
 
     tags: Sequence[str] = ()
     """All of them, as written."""
@@ -41,7 +41,7 @@ class Reroll:
 
 @dataclass(frozen=True)
 class GarbageReport:
-    """What a garbage collection removed."""
+    """Result of a garbage collection."""
 
     rows: int
     """Asset rows that nothing refers to, with their objects."""

@@ -1,4 +1,5 @@
-"""The audit log: who did what from which key, when. Written in the transaction of what it tells; holds no prompts."""
+"""The audit log: actor, key, verb and time of each change. Written in the transaction of the change; holds no
+prompts."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from marey.tenants.types import Actor, AuditRow
 
 
 def audit(conn: sa.Connection, tenant: str, actor: Actor, verb: str, target: object, **data: object) -> None:
-    """Note that somebody did something.
+    """Record an action.
 
     Args:
         verb: noun and verb: "job.cancel".
@@ -47,7 +48,7 @@ def list_audit(
     cursor: str | None = None,
     limit: int = 50,
 ) -> Page[AuditRow]:
-    """What was done, newest first; by one key, of one kind, in one tenant, if they are given.
+    """Return recorded actions, newest first, filtered by key, verb and tenant.
 
     Args:
         verb: "job.cancel", or a noun: "job".

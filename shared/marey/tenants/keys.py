@@ -42,7 +42,7 @@ def create_key(
     lifetime: float | None = None,
     rates: Mapping[str, str] | None = None,
 ) -> NewApiKey:
-    """Make a key `marey_<prefix>_<secret>`.
+    """Create a key `marey_<prefix>_<secret>`.
 
     A plain SHA-256 is enough for it: the secret has 256 random bits, nothing to guess from a list.
 
@@ -67,7 +67,7 @@ def _make_key(
     lifetime: float | None,
     rates: Mapping[str, str] | None,
 ) -> NewApiKey:
-    """`create_key`, with the name of a stored key as it is."""
+    """Create a key as `create_key` does; the name is taken as stored."""
     unknown = set(scopes) - SCOPES
     if unknown or not scopes:
         what = f"unknown scopes: {', '.join(sorted(unknown))}" if unknown else "a key needs a scope"
@@ -94,7 +94,7 @@ def _make_key(
 
 
 def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
-    """The key this secret belongs to; compared in constant time. Its use is noted, at most once a minute.
+    """Return the key of a secret; compared in constant time. Its use is recorded, at most once a minute.
 
     Raises:
         Unauthenticated: malformed, unknown, revoked or expired.
@@ -116,7 +116,7 @@ def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
 
 
 def check_key(conn: sa.Connection, key: UUID) -> None:
-    """Nothing, if a key that was let in may stay: for what is open for minutes.
+    """Validate a key that was accepted earlier, for connections that stay open for minutes.
 
     Raises:
         Unauthenticated, Refused: as `authenticate`.
@@ -128,20 +128,20 @@ def check_key(conn: sa.Connection, key: UUID) -> None:
 
 
 def keys_still_valid(conn: sa.Connection, keys: Collection[UUID]) -> set[UUID]:
-    """Those of these keys that `check_key` would let stay; one query for all that is open."""
+    """Return those of the given keys that `check_key` accepts, in one query."""
     rows = conn.execute(_standing().where(tables.api_key.c.id.in_(keys))).mappings()
     return {row["id"] for row in rows if row["revoked"] is None and not row["expired"] and not row["suspended"]}
 
 
 def list_keys(conn: sa.Connection, tenant: str) -> list[ApiKey]:
-    """Keys of a tenant, newest first, revoked ones too."""
+    """Return the keys of a tenant, newest first, with revoked ones."""
     table = tables.api_key.c
     rows = conn.execute(_keys().where(table.tenant_id == tenant).order_by(table.created_at.desc(), table.id.desc()))
     return [_key(row) for row in rows.mappings()]
 
 
 def keys_named(conn: sa.Connection, tenant: str, name: str) -> list[ApiKey]:
-    """Valid keys of a tenant with this name, newest first: neither revoked nor expired."""
+    """Return valid keys of a tenant with this name, newest first: neither revoked nor expired."""
     table = tables.api_key.c
     valid = table.revoked_at.is_(None) & (table.expires_at.is_(None) | (table.expires_at > CLOCK))
     found = _keys().where(table.tenant_id == tenant, table.name == name, valid)
@@ -149,7 +149,7 @@ def keys_named(conn: sa.Connection, tenant: str, name: str) -> list[ApiKey]:
 
 
 def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = OVERLAP) -> NewApiKey:
-    """A new key in the place of another, with its name, scopes, rates and length of life; the old one works a while.
+    """Replace a key by a new one with its name, scopes, rates and lifetime; the old one works until the overlap ends.
 
     Args:
         overlap: seconds; 0 = the old one is invalid from now on. Never longer than it would have lived.
@@ -183,7 +183,7 @@ def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = 
 
 
 def revoke_key(conn: sa.Connection, tenant: str, key: UUID) -> ApiKey:
-    """Make a key invalid from now on. Revoked already: no change.
+    """Revoke a key from now on. Revoked already: no change.
 
     Raises:
         NotFound: the tenant has no such key.
@@ -215,7 +215,7 @@ def _unknown(prefix: str) -> Unauthenticated:
 
 
 def _shown(prefix: str) -> str:
-    """What may be shown of a key."""
+    """Return the public part of a key."""
     return f"marey_{prefix}_…"
 
 
@@ -249,7 +249,7 @@ def _keys() -> sa.Select[*tuple[Any, ...]]:
 
 
 def _standing() -> sa.Select[*tuple[Any, ...]]:
-    """Keys with what says whether they are valid."""
+    """Select keys with everything that decides whether they are valid."""
     table, tenant = tables.api_key.c, tables.tenant.c
     return (
         _keys()

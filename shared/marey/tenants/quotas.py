@@ -1,4 +1,4 @@
-"""What a tenant uses of its quotas, and whether there is room for more.
+"""Use of a tenant's quotas, and checks against them.
 
 No counter is kept for this, so none can drift: queued and running items are those of the counters on the tenant's open
 jobs, which change in the transactions of the items themselves; bytes are summed over the rows of the files. Who needs
@@ -41,7 +41,7 @@ OF_A_MOTION = sa.text("""
 
 
 def usage(conn: sa.Connection, tenant: str) -> Usage:
-    """What a tenant has now."""
+    """Return the current use of a tenant."""
     queued, running = _open_items(conn, tenant)
     return Usage(
         queued=queued,
@@ -53,8 +53,8 @@ def usage(conn: sa.Connection, tenant: str) -> Usage:
 
 
 def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
-    """Nothing, if a tenant's queue has room for so many more items now. Bytes, which cost a sum over the files, are not
-    looked at, and others may take of the same room.
+    """Validate that a tenant's queue has capacity for more items. Bytes, which need a sum over the files, are not
+    checked, and concurrent requests may take the same capacity.
 
     Raises:
         QuotaUsedUp: it has not.
@@ -66,7 +66,7 @@ def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
 
 
 def check_quotas(conn: sa.Connection, tenant: str, items: int) -> tuple[QuotaHeadroom, ...]:
-    """What so many more items would take of each quota that a tenant has; others may take of the same room.
+    """Return the demand of more items on each quota of a tenant; concurrent requests may take the same capacity.
 
     Raises:
         QuotaUsedUp: one has no room for them.
@@ -88,7 +88,7 @@ def check_quotas(conn: sa.Connection, tenant: str, items: int) -> tuple[QuotaHea
 
 
 def reserve_quotas(conn: sa.Connection, tenant: str, items: int) -> None:
-    """`check_quotas`, and nobody else takes of the same room until the transaction ends.
+    """Run `check_quotas`, and reserve the capacity until the transaction ends.
 
     Raises:
         QuotaUsedUp, NotFound: as it.
@@ -101,7 +101,7 @@ def reserve_quotas(conn: sa.Connection, tenant: str, items: int) -> None:
 
 
 def runnable_items(conn: sa.Connection, tenant: str, wanted: int) -> int:
-    """How many of `wanted` items a tenant may run beside those it runs; its row stays locked."""
+    """Return how many of `wanted` items a tenant may run beside its running ones; its row stays locked."""
     _lock(conn, tenant)
     limit = get_tenant(conn, tenant).quotas.running
     if limit is None:
@@ -111,18 +111,18 @@ def runnable_items(conn: sa.Connection, tenant: str, wanted: int) -> int:
 
 
 def bytes_of_a_motion(conn: sa.Connection, tenant: str) -> int:
-    """What the files of its next motion will likely take: the mean of the newest."""
+    """Estimate the size of the files of a tenant's next motion: the mean of the newest."""
     mean = conn.execute(OF_A_MOTION, {"tenant": tenant, "measured": MEASURED}).scalar_one()
     return EXPECTED_BYTES if mean is None else round(mean)
 
 
 def _lock(conn: sa.Connection, tenant: str) -> None:
-    """NO KEY: rows that refer to the tenant may be inserted by others meanwhile."""
+    """Lock the tenant's row. NO KEY: rows that refer to the tenant may be inserted meanwhile."""
     conn.execute(sa.select(tables.tenant.c.id).where(tables.tenant.c.id == tenant).with_for_update(key_share=True))
 
 
 def _open_items(conn: sa.Connection, tenant: str) -> tuple[int, int]:
-    """Queued, and of these running."""
+    """Count queued items, and running ones among them."""
     row = conn.execute(OPEN_ITEMS, {"tenant": tenant}).one()
     return row.queued, row.running
 
@@ -152,7 +152,7 @@ def _refuse_beyond(tenant: str, headroom: QuotaHeadroom) -> None:
 
 
 def _queue_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
-    """What is said, what to do, and when to ask again."""
+    """Return message, hint and retry delay."""
     return (
         f"{headroom.asked} items are more than the quota of queued items has room for: "
         f"{headroom.used} of {headroom.limit} are queued, {headroom.left} are left",

@@ -1,4 +1,4 @@
-"""Tenants: who shares a server, what each may have, and who may not work for now."""
+"""Tenants: their quotas, and suspension."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COLUMNS = {name: f"max_{name}" for name in LARGEST}
 
 
 def create_tenant(conn: sa.Connection, tenant: str, quotas: Quotas | None = None) -> TenantRow:
-    """A new tenant.
+    """Create a tenant.
 
     Args:
         tenant: its name, which stands in the keys of its files.
@@ -44,7 +44,7 @@ def create_tenant(conn: sa.Connection, tenant: str, quotas: Quotas | None = None
 
 
 def get_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
-    """One tenant.
+    """Return one tenant.
 
     Raises:
         NotFound: there is none of that name.
@@ -56,12 +56,12 @@ def get_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
 
 
 def list_tenants(conn: sa.Connection) -> list[TenantRow]:
-    """Every tenant, by name."""
+    """Return all tenants, by name."""
     return [_row(row) for row in conn.execute(_tenants().order_by(tables.tenant.c.id)).mappings()]
 
 
 def set_quotas(conn: sa.Connection, tenant: str, changes: Mapping[str, int | None]) -> TenantRow:
-    """Change quotas, by the names of `Quotas`; None takes one away. What a tenant has beyond a new one stays.
+    """Change quotas, by the names of `Quotas`; None removes one. Use above a new quota stays.
 
     Raises:
         NotFound: there is no such tenant.
@@ -75,8 +75,8 @@ def set_quotas(conn: sa.Connection, tenant: str, changes: Mapping[str, int | Non
 
 
 def suspend_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
-    """Answer none of its requests and claim nothing of it; what is being made is finished. Live streams lose their
-    watchers, and end by themselves then. Suspended already: no change.
+    """Suspend a tenant: refuse its requests and claim none of its items; running items are finished. Its live streams
+    lose their viewers, and end by themselves. Suspended already: no change.
 
     Raises:
         NotFound: there is no such tenant.
@@ -88,7 +88,7 @@ def suspend_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
 
 
 def reinstate_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
-    """End a suspension; its jobs go on. Not suspended: no change.
+    """End a suspension; the tenant's jobs continue. Not suspended: no change.
 
     Raises:
         NotFound: there is no such tenant.
@@ -98,7 +98,7 @@ def reinstate_tenant(conn: sa.Connection, tenant: str) -> TenantRow:
 
 
 def no_such_tenant(tenant: str) -> NotFound:
-    """The error for a tenant that is not there."""
+    """Return the error for a tenant that does not exist."""
     return NotFound("there is no such tenant", where=f"tenant {tenant}", hint="`marey admin tenants list` shows them.")
 
 

@@ -1,4 +1,4 @@
-"""Tenants, their keys, and who did what."""
+"""Tables of tenants, their keys, and the audit log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tenants are to the rest: their keys, quotas and what is used of them, and who did what."""
+"""Data types of tenants, keys, quotas and the audit log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DEFAULT_TENANT = "default"
 
 @dataclass(frozen=True)
 class Quotas:
-    """What a tenant may have at once; None = as much as there is."""
+    """Quotas of a tenant; None = unlimited."""
 
     queued: int | None = None
     """Items that are not done yet: waiting or being made."""
@@ -26,7 +26,7 @@ class Quotas:
 
 @dataclass(frozen=True)
 class Usage:
-    """What a tenant has, counted where it stands."""
+    """Current use of a tenant's quotas."""
 
     queued: int
     running: int
@@ -40,7 +40,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class QuotaHeadroom:
-    """What something would take of a quota: items, or bytes."""
+    """Demand of a request on a quota, in items or bytes."""
 
     quota: str
     """`queued` or `bytes`."""
@@ -53,12 +53,12 @@ class QuotaHeadroom:
 
     @property
     def used(self) -> int:
-        """What stands and what is expected."""
+        """Stored and expected amount."""
         return self.stands + self.expected
 
     @property
     def left(self) -> int:
-        """What there is still room for, with nothing asked."""
+        """Remaining amount before the request."""
         return max(self.limit - self.used, 0)
 
 
@@ -94,7 +94,7 @@ class ApiKey:
 
 @dataclass(frozen=True)
 class NewApiKey:
-    """A key just made; `secret` is shown once and stored nowhere."""
+    """A new key; `secret` is shown once and stored nowhere."""
 
     key: ApiKey
     secret: str
@@ -102,7 +102,7 @@ class NewApiKey:
 
 @dataclass(frozen=True)
 class Actor:
-    """Who does something."""
+    """The originator of an action."""
 
     name: str
     """Of the API key, or of the person at the command line."""
@@ -111,7 +111,7 @@ class Actor:
 
 @dataclass(frozen=True)
 class AuditRow:
-    """Something that was done."""
+    """A recorded action."""
 
     id: UUID
     at: datetime

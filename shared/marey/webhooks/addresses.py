@@ -1,4 +1,4 @@
-"""Which addresses may be told: those of the internet, unless `MAREY_WEBHOOK_ALLOW` says otherwise.
+"""Addresses that webhooks may reach: public ones, unless `MAREY_WEBHOOK_ALLOW` allows others.
 
 A webhook is a request that somebody else chose and this machine sends: without a rule it reaches what only this machine
 may reach. What counts is the address that is connected to, never how it was written or what a name led to earlier.
@@ -19,7 +19,7 @@ HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."
 
 
 def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
-    """The one to connect to, of the addresses that a name has.
+    """Return the address to connect to, from the addresses of a name.
 
     One that may not be told spoils them all: a name that leads inside and outside is a trick or a mistake.
 
@@ -37,7 +37,7 @@ def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
 
 
 def check_url(text: str, allowed: Allowed) -> str:
-    """The address of a receiver, in its normal form. Names are looked up only when there is something to tell.
+    """Validate the URL of a receiver and return its normal form. Names are resolved at delivery.
 
     Raises:
         InvalidInput: it is none, or one that may not be told.
@@ -64,7 +64,7 @@ def check_url(text: str, allowed: Allowed) -> str:
 
 
 def _literal(host: str) -> str | None:
-    """The address that a host is, however it is written (`2130706433`, `0x7f.1`); None for a name."""
+    """Return the address in a host, in any notation (`2130706433`, `0x7f.1`); None for a name."""
     host = host.rstrip(".")  # which names the same
     if host == "localhost" or host.endswith(".localhost"):
         return "127.0.0.1"

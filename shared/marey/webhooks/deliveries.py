@@ -1,4 +1,4 @@
-"""Deliveries of events to webhooks: claimed, tried, written down, replayed. At least once, under one id.
+"""Deliveries of events to webhooks: claimed, attempted, recorded, replayed. At least once, under one id.
 
 A claim is a lease by time: who dies with one loses it after `HOLD` seconds, and the next one tries again. It fences
 the record of the try, so that of two who both tried one writes.
@@ -84,15 +84,15 @@ CLAIM = sa.text("""
 def claim_deliveries(
     conn: sa.Connection, limit: int, *, each: int, busy: Mapping[UUID, int] | None = None, hold: float = HOLD
 ) -> list[DueDelivery]:
-    """Take deliveries that are due: at most `limit`, and of one webhook no more than `each` with those that are under
-    way already (`busy`)."""
+    """Claim due deliveries: at most `limit`, and per webhook no more than `each`, counting those in flight (`busy`)."""
     token, busy = new_id(), busy or {}
     values = {"claim": token, "limit": limit, "each": each, "busy": list(busy), "counts": list(busy.values())}
     return [DueDelivery(token, *row) for row in conn.execute(CLAIM, {**values, "hold": hold})]
 
 
 def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> DeliveryState | None:
-    """Write down how a try went; where the delivery stands then. None when the claim was lost: nothing is written.
+    """Record the result of an attempt and return the delivery's new state; None if the claim was lost and nothing was
+    written.
 
     A receiver that is gone is told nothing more: its webhook is paused, which the audit log says.
     """
@@ -137,19 +137,19 @@ def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> D
 
 
 def delay_after(tries: int) -> float:
-    """Seconds until the next try after so many."""
+    """Return the delay in seconds before the next attempt."""
     return DELAYS[tries - 1] * random.uniform(1 - JITTER, 1 + JITTER)  # noqa: S311
 
 
 def give_back_deliveries(conn: sa.Connection, due: Sequence[DueDelivery]) -> None:
-    """Claims that are not used: their deliveries are due again, at no cost of a try."""
+    """Release unused claims: their deliveries are due again, and no attempt is counted."""
     for each in due:
         ours = _is(each.webhook, each.event) & (webhook_delivery.c.claim == each.claim)
         conn.execute(sa.update(webhook_delivery).where(ours).values(claim=None, next_at=CLOCK))
 
 
 def send_test(conn: sa.Connection, tenant: str, webhook: UUID) -> DeliveryRow:
-    """An event of kind `webhook.test` for this webhook alone, tried once.
+    """Create an event of kind `webhook.test` for one webhook, attempted once.
 
     Raises:
         NotFound: the tenant has no such webhook.
@@ -165,7 +165,7 @@ def send_test(conn: sa.Connection, tenant: str, webhook: UUID) -> DeliveryRow:
 
 
 def replay_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID) -> DeliveryRow:
-    """Deliver once more, from now, with all tries; or now, what waits for its next try.
+    """Deliver again, from now, with all attempts; a pending delivery becomes due now.
 
     Raises:
         NotFound: the tenant has no such webhook, or that no such delivery.
@@ -178,7 +178,7 @@ def replay_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID
 
 
 def get_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID) -> DeliveryRow:
-    """One delivery.
+    """Return one delivery.
 
     Raises:
         NotFound: the tenant has no such webhook, or that no such delivery.
@@ -203,7 +203,7 @@ def list_deliveries(
     cursor: str | None = None,
     limit: int = 50,
 ) -> Page[DeliveryRow]:
-    """Deliveries of a webhook, newest event first; of these states, if any are given.
+    """Return deliveries of a webhook, newest event first, optionally in the given states.
 
     Raises:
         NotFound: the tenant has no such webhook.
@@ -221,7 +221,7 @@ def list_deliveries(
 
 
 def delivery_attempts(conn: sa.Connection, webhook: UUID, event: UUID) -> list[AttemptRow]:
-    """The log of a delivery, in order."""
+    """Return the log of a delivery, in order."""
     c = webhook_attempt.c
     query = sa.select(c.number, c.at, c.status, c.seconds, c.error)
     rows = conn.execute(query.where(c.webhook_id == webhook, c.event_id == event).order_by(c.number))
@@ -229,7 +229,7 @@ def delivery_attempts(conn: sa.Connection, webhook: UUID, event: UUID) -> list[A
 
 
 def forget_events(conn: sa.Connection) -> None:
-    """Remove events older than they are kept, with their deliveries and log."""
+    """Remove expired events, with their deliveries and log."""
     conn.execute(sa.delete(webhook_event).where(webhook_event.c.at < CLOCK - interval(KEPT)))
 
 

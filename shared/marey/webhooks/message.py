@@ -1,4 +1,4 @@
-"""A message as it is sent: JSON with `type`, `timestamp` and `data`, signed as Standard Webhooks say."""
+"""The message format: JSON with `type`, `timestamp` and `data`, signed according to Standard Webhooks."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ NOUNS = {
 
 
 def message_of(due: DueDelivery, api: str) -> bytes:
-    """The body, the same in every try; `api` is the address of the API."""
+    """Return the body, the same in every attempt; `api` is the address of the API."""
     urls = {noun: api + path.format(due.data[noun]) for noun, path in NOUNS.items() if due.data.get(noun) is not None}
     document = {"type": due.kind, "timestamp": due.at.isoformat(), "data": {**due.data, "urls": urls}}
     return json.dumps(document, separators=(",", ":"), sort_keys=True).encode()
 
 
 def headers_of(due: DueDelivery, body: bytes, secrets: Sequence[str], now: datetime | None = None) -> Mapping[str, str]:
-    """The headers of one try: the id of the event, the time of the try, the signatures over both and the body. While a
-    secret is rotated there are two, of which receivers know one."""
+    """Return the headers of one attempt: event id, time, and the signatures over both and the body. While a secret is
+    rotated there are two signatures, of which receivers know one."""
     at = now or datetime.now(UTC)
     identifier = str(due.event)
     return {

@@ -1,4 +1,4 @@
-"""The outbox: what webhooks are told is written in the transaction of what happened, or not at all.
+"""The transactional outbox: webhook events are written in the transaction of the change.
 
 Events hold ids, states and counters; never a name, a prompt or an error's text, which may quote one.
 """
@@ -28,6 +28,6 @@ WRITE = sa.text("""
 
 
 def enqueue_event(conn: sa.Connection, tenant: str, kind: EventKind, data: Mapping[str, object]) -> None:
-    """Write an event for the webhooks of a tenant that want it; nothing, if none does."""
+    """Write an event for the tenant's webhooks that subscribe to its kind; no row without a subscriber."""
     values = {"tenant": tenant, "kind": str(kind), "event": new_id(), "data": json.dumps(data, default=str)}
     conn.execute(WRITE, values)

@@ -1,4 +1,4 @@
-"""Webhooks: who wants to be told of what. Their signing secrets come here encrypted."""
+"""Webhook subscriptions. Signing secrets are encrypted before they reach this module."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ OVERLAP, LONGEST_OVERLAP = 86_400.0, 30 * 86_400.0
 
 
 def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
-    """A new webhook; it is told of what happens from now on.
+    """Create a webhook; it receives events from now on.
 
     Raises:
         InvalidInput: no events, or text that the database cannot hold.
@@ -52,7 +52,7 @@ def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
 
 
 def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRow:
-    """One webhook.
+    """Return one webhook.
 
     Raises:
         NotFound: the tenant has no such webhook.
@@ -65,7 +65,7 @@ def get_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> WebhookRo
 
 
 def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None, limit: int = 50) -> Page[WebhookRow]:
-    """Webhooks, newest first."""
+    """Return webhooks, newest first."""
     table = webhook.c
     ours = table.tenant_id == tenant
     query, order = _webhooks().where(ours), Order(table.created_at, table.id)
@@ -76,7 +76,7 @@ def list_webhooks(conn: sa.Connection, tenant: str, *, cursor: str | None = None
 
 
 def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: WebhookChange) -> WebhookRow:
-    """Change a webhook. While it is paused its deliveries wait; afterwards they go on, to the address it has then.
+    """Change a webhook. While it is paused its deliveries wait; afterwards they go to its current URL.
 
     Raises:
         NotFound: the tenant has no such webhook.
@@ -101,7 +101,7 @@ def change_webhook(conn: sa.Connection, tenant: str, identifier: UUID, change: W
 def rotate_secret(
     conn: sa.Connection, tenant: str, identifier: UUID, secret: bytes, *, overlap: float = OVERLAP
 ) -> WebhookRow:
-    """Sign with another secret, and for a while with the one in force as well; an older one no longer works.
+    """Sign with a new secret, and with the current one until the overlap ends; older secrets are dropped.
 
     Args:
         secret: encrypted.
@@ -134,7 +134,7 @@ def delete_webhook(conn: sa.Connection, tenant: str, identifier: UUID) -> None:
 
 
 def no_such_webhook(identifier: UUID) -> NotFound:
-    """The error for a webhook that is not there, or somebody else's."""
+    """Return the error for a webhook that does not exist, or belongs to another tenant."""
     return NotFound(
         "there is no such webhook", where=f"webhook {identifier}", hint="`marey webhooks list` shows yours."
     )

@@ -1,4 +1,4 @@
-"""Tables of webhooks: who wants to be told, what there is to tell (the outbox), and how telling went.
+"""Tables of webhooks: subscriptions, the outbox of events, deliveries and attempts.
 
 Who writes an event holds the lock of the row that it is about, and takes webhook rows (KEY SHARE) after it; nobody
 goes from a webhook to such a row.

@@ -1,4 +1,4 @@
-"""What goes into and comes out of the repositories of webhooks: frozen dataclasses, nothing that knows SQL."""
+"""Data types of webhook repositories: frozen dataclasses without SQL."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from uuid import UUID
 
 
 class EventKind(StrEnum):
-    """What a webhook can be told of."""
+    """Kinds of webhook events."""
 
     JOB_ENDED = "job.ended"
     """A job has no open items any more; again after each retry."""
@@ -28,7 +28,7 @@ TEST_KIND = "webhook.test"
 
 
 class DeliveryState(StrEnum):
-    """Where the delivery of an event to a webhook stands. What ended may be replayed."""
+    """State of a delivery. Ended ones may be replayed."""
 
     PENDING = "pending"
     DELIVERED = "delivered"
@@ -39,7 +39,7 @@ class DeliveryState(StrEnum):
 
 @dataclass(frozen=True)
 class NewWebhook:
-    """A webhook to write; `secret` is encrypted already."""
+    """A webhook to write; `secret` is already encrypted."""
 
     tenant: str
     url: str
@@ -77,7 +77,7 @@ class WebhookRow:
 
 @dataclass(frozen=True)
 class DeliveryRow:
-    """An event on its way to a webhook, or at the end of it."""
+    """The delivery of an event to a webhook."""
 
     webhook: UUID
     event: UUID
@@ -97,7 +97,7 @@ class DeliveryRow:
 
 @dataclass(frozen=True)
 class AttemptRow:
-    """One try of a delivery."""
+    """One attempt of a delivery."""
 
     number: int
     at: datetime
@@ -108,7 +108,7 @@ class AttemptRow:
 
 @dataclass(frozen=True)
 class DueDelivery:
-    """A delivery that is ours to try, until its claim runs out."""
+    """A claimed delivery, valid until its claim expires."""
 
     claim: UUID
     webhook: UUID
@@ -124,7 +124,7 @@ class DueDelivery:
 
 @dataclass(frozen=True)
 class Attempt:
-    """How a try went."""
+    """Result of an attempt."""
 
     status: int | None
     seconds: float

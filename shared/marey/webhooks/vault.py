@@ -1,5 +1,5 @@
-"""Signing secrets at rest: encrypted under a key that is not in the database, so that a copy of the one without the
-other signs nothing.
+"""Signing secrets at rest, encrypted under a key that is not in the database: a copy of the database alone signs
+nothing.
 
 `MAREY_WEBHOOK_KEY` may hold several keys: the first encrypts, all decrypt, so that keys can be changed. `marey serve`
 draws one into a file of its home.
@@ -42,7 +42,7 @@ class Vault:
 
     @classmethod
     def of(cls, config: Settings) -> Vault:
-        """The vault of this installation.
+        """Return the vault of this installation.
 
         Raises:
             Refused: it has no key.
@@ -55,11 +55,11 @@ class Vault:
         return cls(config.webhook_key.get_secret_value())
 
     def encrypt(self, secret: str) -> bytes:
-        """What the database keeps of a secret."""
+        """Encrypt a secret for the database."""
         return self._fernet.encrypt(secret.encode())
 
     def decrypt(self, stored: bytes) -> str:
-        """The secret.
+        """Decrypt a stored secret.
 
         Raises:
             InvalidInput: it was encrypted under another key.
@@ -72,12 +72,12 @@ class Vault:
 
 
 def new_signing_secret() -> str:
-    """A secret in the form of Standard Webhooks: `whsec_` and base64."""
+    """Return a new secret in the form of Standard Webhooks: `whsec_` and base64."""
     return PREFIX + base64.b64encode(secrets.token_bytes(SECRET_BYTES)).decode()
 
 
 def key_file(folder: Path) -> Path:
-    """The file with this folder's key, readable by its owner alone; drawn if it is not there."""
+    """Return the file with this folder's key, readable by its owner alone; create it if missing."""
     path = folder / KEY_FILE
     temporary = path.with_suffix(".key.part")
     if not path.exists():

@@ -1,4 +1,4 @@
-"""Live sessions of one bundle: prompts in, finished frames out; all sessions move on together, one frame a step.
+"""Live sessions of one bundle: prompts in, finished frames out; all sessions advance together, one frame per step.
 
 A session goes through three kinds of state, each with a row for every session: keys and values of the transformer
 (`Streams`), the past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). What a session
@@ -39,7 +39,7 @@ WARM_CALLS = 3
 
 @dataclass
 class _Session:
-    """Frames shown, the number of the prompt in force, and what the session is called among the streams."""
+    """Number of shown frames, number of the prompt in force, and the session's index among the streams."""
 
     shown: int
     prompt: int
@@ -48,7 +48,7 @@ class _Session:
 
 @dataclass(frozen=True)
 class _Paused:
-    """All that a session is, while it takes no part in steps."""
+    """Complete state of a session that is excluded from steps."""
 
     stream: dict[str, torch.Tensor]
     decoded: DecoderState
@@ -59,7 +59,7 @@ class LiveSessionPool:
     """Sessions of one loaded bundle; they join, are steered and leave between frames. Not thread-safe."""
 
     def __init__(self, generator: Generator, capacity: int, settings: Settings | None = None) -> None:
-        """Make pool for `capacity` sessions, all drawn with the same settings.
+        """Allocate `capacity` sessions, all sampled with the same settings.
 
         Raises:
             InvalidBundle: a layout whose root cannot be followed frame by frame.
@@ -87,7 +87,7 @@ class LiveSessionPool:
 
     @property
     def fps(self) -> float:
-        """Frames of a second."""
+        """Frames per second."""
         return self.generator.limits.fps
 
     @property
@@ -102,12 +102,12 @@ class LiveSessionPool:
 
     @property
     def min_frames(self) -> int:
-        """The shortest clip."""
+        """Length of the shortest clip, in frames."""
         return self.generator.limits.min_frames
 
     @property
     def levels(self) -> int:
-        """V, codes of a frame."""
+        """V, codes per frame."""
         return self.generator.config.tokenizer.levels
 
     def start(
@@ -119,7 +119,7 @@ class LiveSessionPool:
         prompt: int = 0,
         began: ActionStart | None = None,
     ) -> int:
-        """A new session, or one that another worker began.
+        """Start a session, or resume one of another worker.
 
         Args:
             text: of the prompt in force.
@@ -153,7 +153,7 @@ class LiveSessionPool:
         return self._started
 
     def steer(self, session: int, text: TextFeatures) -> None:
-        """Another prompt, in force from the next frame on.
+        """Set another prompt, in force from the next frame on.
 
         Raises:
             InvalidInput: no such session, it is paused, or features of another encoder.
@@ -164,7 +164,7 @@ class LiveSessionPool:
         about.prompt += 1
 
     def stop(self, session: int) -> None:
-        """Forget a session, paused or not.
+        """Remove a session, paused or not.
 
         Raises:
             InvalidInput: there is none of that name.
@@ -176,7 +176,7 @@ class LiveSessionPool:
         del self._sessions[session]
 
     def pause(self, session: int) -> None:
-        """Leave a session out of the steps until `resume`; its pool stays its own.
+        """Exclude a session from steps until `resume`; its slot stays reserved.
 
         Raises:
             InvalidInput: no such session, or it is paused.
@@ -189,7 +189,7 @@ class LiveSessionPool:
         self._leave(session)
 
     def resume(self, session: int) -> None:
-        """Let a paused session go on: with the very frames that it would have shown.
+        """Resume a paused session, with the same frames that it would have shown.
 
         Raises:
             InvalidInput: it is not paused.
@@ -202,7 +202,7 @@ class LiveSessionPool:
 
     @torch.inference_mode()
     def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
-        """The next frames of one session alone, at once; the others stand still meanwhile.
+        """Return the next frames of one session alone, at once; the other sessions stand still meanwhile.
 
         Raises:
             InvalidInput: no such session, or it is paused.
@@ -221,12 +221,12 @@ class LiveSessionPool:
 
     @torch.inference_mode()
     def step(self) -> dict[int, LiveFrame]:
-        """The next frame of every session that is not paused."""
+        """Return the next frame of every session that is not paused."""
         drawn = self._streams.step()
         return self._shown(drawn) if drawn else {}
 
     def _shown(self, drawn: Mapping[int, torch.Tensor]) -> dict[int, LiveFrame]:
-        """Frames of the columns that were drawn for the sessions in the rows."""
+        """Return frames of the columns that were drawn for the sessions in the rows."""
         columns = torch.stack([drawn[self._sessions[session].stream] for session in self._rows])  # (S, V)
         features, self._decoded = self.generator.tokenizer.decode_next(columns[:, None], self._decoded)
         shown, self._body = self._motion.step(features[:, 0].cpu().numpy(), self._body)
@@ -261,7 +261,7 @@ class LiveSessionPool:
 
 
 def create_live_model() -> LiveModel:
-    """What the live loop of `marey worker mogo` serves: the bundle that this machine has.
+    """Load the live model of `marey worker mogo`: the bundle of this machine.
 
     Raises:
         NotFound, InvalidBundle: there is none, or a damaged one.
@@ -282,7 +282,8 @@ def create_live_model() -> LiveModel:
 
 
 def _warm(pool: LiveSessionPool, pipeline: TextPipeline) -> LiveSessionPool:
-    """The pool, whose first frames will not wait for what torch does once. No rewriter is asked: it may cost money."""
+    """Run the pool once, so that its first frames do not wait for torch's one-time work. No rewriter is called: it may
+    cost money."""
     words = ("a", "person", "stands")
     graph = SemanticGraph(" ".join(words), words, (Node(0, "motion", " ".join(words), (0, 1, 2)),), ())
     session = pool.start(TextFeatures(graph.text, graph.text, graph, pipeline.encode(graph)), 0)
