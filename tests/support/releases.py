@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import subprocess
 import tarfile
 import time
@@ -16,8 +15,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from tests.support.marey import COMMAND, REPOSITORY
-from tests.support.wheels import build_wheel, make_environment
+from tests.support.marey import REPOSITORY
+from tests.support.wheels import Environment, build_wheel, make_environment
 
 SECONDS = 120.0
 THREADS = {"MAREY_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -82,13 +81,12 @@ def earlier_release(commit: str, folder: Path, values: Mapping[str, str]) -> Rel
     with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
         archive.extractall(tree, filter="data")
     made = make_environment(folder / "environment", [build_wheel(tree, folder / "wheels")], borrow=True)
+    return installed_release(made, values, folder)
+
+
+def installed_release(made: Environment, values: Mapping[str, str], folder: Path) -> Release:
+    """The release whose wheel an environment holds."""
     return Release((made.marey,), made.environ({**THREADS, **values}), folder)
-
-
-def this_release(values: Mapping[str, str]) -> Release:
-    """This tree."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_")}
-    return Release(COMMAND, {**kept, **THREADS, **values}, REPOSITORY)
 
 
 def wait_until(ready: Callable[[], object], log: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from importlib.metadata import distribution
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 
 from tests.support.marey import REPOSITORY
@@ -32,6 +34,16 @@ def refuse(event, arguments):
 
 sys.addaudithook(refuse)
 """
+
+
+def this_wheel(factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this tree: built once a run, whichever process of the run asks first."""
+    base = factory.getbasetemp()
+    run = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder = run / "wheel-of-this-tree"
+    with (run / "wheel-of-this-tree.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return next(folder.glob("*.whl"), None) or build_wheel(REPOSITORY, folder)
 
 
 def build_wheel(tree: Path, folder: Path) -> Path:
@@ -82,21 +94,9 @@ def make_environment(folder: Path, wheels: Iterable[Path], *, borrow: bool) -> E
     """
     _run([sys.executable, "-m", "venv", "--without-pip", str(folder)])
     made = Environment(folder)
-    for wheel in wheels:
-        _run(
-            [
-                sys.executable,
-                "-m",
-                "pip",
-                "--python",
-                made.python,
-                "install",
-                "-q",
-                "--no-deps",
-                "--no-index",
-                str(wheel),
-            ]
-        )
+    installer = [str(DEVELOPMENT.parents[2] / "bin" / "uv"), "pip", "install", "-q", "--no-deps", "--no-index"]
+    if names := [str(wheel) for wheel in wheels]:
+        _run([*installer, "--no-cache", "--no-config", "--python", made.python, *names])
     if borrow:
         (made.packages / "borrowed.pth").write_text(f"{DEVELOPMENT}\n")
     else:
@@ -119,7 +119,7 @@ def _copy_requirements(made: Environment) -> None:
         found = distribution(requirement.name)
         for file in found.files or ():
             source = Path(str(found.locate_file(file)))
-            if source.is_file() and source.is_relative_to(DEVELOPMENT) and "__pycache__" not in file.parts:
+            if source.is_file() and source.is_relative_to(DEVELOPMENT):  # compiled files too: they start faster
                 target = made.packages / file
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target)
@@ -135,3 +135,17 @@ def _required(packages: Path, name: str) -> list[str]:
 def _run(command: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def bundles_wheel(family: str, models: Path, folder: Path) -> Path:
+    """Build `marey-bundles-FAMILY` of other bundles than the checkout's.
+
+    Args:
+        models: a folder with a bundle for each that the distribution holds, by the same folder's name.
+        folder: where the wheel and its tree are written.
+    """
+    tree = folder / "models"
+    shutil.copytree(REPOSITORY / "models" / "packages" / family, tree / "packages" / family)
+    for bundle in models.iterdir():
+        (tree / bundle.name).symlink_to(bundle)
+    return build_wheel(tree / "packages" / family, folder / "wheel")

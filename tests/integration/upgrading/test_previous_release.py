@@ -1,6 +1,6 @@
 """The previous release and this one on the same rows, as server, worker and client of each other.
 
-The previous release is a wheel in an environment of its own, to which this checkout is closed.
+Each is a wheel in an environment of its own, to which this checkout is closed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import sqlalchemy as sa
 from marey.bundles import Bundle
 from tests.servers.ports import free_ports
 from tests.support.marey import TINY, tiny_models
-from tests.support.releases import Release, earlier_release, this_release, wait_until
+from tests.support.releases import Release, earlier_release, installed_release, wait_until
+from tests.support.wheels import make_environment, this_wheel
 
 PREVIOUS = "26b0fe97"
 """The last commit in which the code was three packages."""
@@ -95,10 +96,11 @@ def fetched_by(client: Release, job_id: str, folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("commit", [PREVIOUS, pytest.param(FORMAT_1, marks=pytest.mark.slow)])
 def test_each_release_finishes_what_the_other_has_queued(
-    tmp_path: Path, models: Path, values: Mapping[str, str], commit: str
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, models: Path, values: Mapping[str, str], commit: str
 ) -> None:
     previous = earlier_release(commit, tmp_path / "previous", values)
-    current = this_release(values)
+    made = make_environment(tmp_path / "current", [this_wheel(tmp_path_factory)], borrow=True)
+    current = installed_release(made, values, tmp_path)
     log = tmp_path / "log"
     reference = Bundle.open(models / TINY).reference
     key = new_key(previous)
