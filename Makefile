@@ -12,7 +12,7 @@ PARALLEL := -n 3 --dist loadfile
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all pytest chaos soak lint check-deploy format bench lock clean
+.PHONY: help setup demo test test-all pytest chaos soak lint check-deploy format bench lock wheels clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -76,6 +76,12 @@ lock: $(STAMP) ## Write the locks and docs/reference/dependencies.md anew
 	done
 	$(BIN)/pip install -q --no-deps --require-hashes -r requirements/dev.lock
 	$(BIN)/python -m requirements.dependencies docs/reference/dependencies.md
+
+wheels: $(STAMP) ## Build the wheels of Marey and of its bundles, into dist
+	rm -rf dist
+	for tree in . models/packages/open models/packages/starter; do \
+	  (cd $$tree && $(CURDIR)/$(BIN)/python -m hatchling build -t wheel -d $(CURDIR)/dist) || exit 1; \
+	done
 
 clean: ## Remove what the targets made
 	rm -rf $(VENV) out .pytest_cache .ruff_cache .hypothesis

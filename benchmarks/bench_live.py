@@ -25,12 +25,11 @@ import sqlalchemy as sa
 from websockets.sync.client import ClientConnection
 
 from marey.client.transport import Transport
-from marey.core.settings import REPOSITORY
 from marey.db import create_engine
 from marey.models.mogo.bundle import random_bundle
 from marey.streams import tables
 from marey.streams.frames import Frame, decode_frame
-from tests.support.marey import Marey, Serving, serving, socket_of
+from tests.support.marey import REPOSITORY, Marey, Serving, serving, socket_of
 
 STREAMS = 20
 KILLS = 5

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from marey.core.errors import InvalidInput
-from marey.core.settings import REPOSITORY, Settings
+from marey.core.settings import Settings
 from marey.db import transaction
 from marey.models.mogo.bundle import random_bundle
 from marey.streams import StreamChunk, StreamState, add_chunk, end_stream, take_stream
@@ -26,6 +26,7 @@ from marey.streams.control import START, Control, ControlQueue
 from marey.streams.frames import Frame, encode_frame
 from marey.streams.redis import FrameStream
 from marey.streams.rewrites import PromptRewrite
+from tests.support.marey import REPOSITORY
 
 JOINTS = 22
 BUNDLE = "mogo-paperclip"

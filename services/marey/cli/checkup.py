@@ -123,12 +123,14 @@ def models(config: Settings) -> Iterator[Check]:
     """Every bundle that is here: whole, and with what reads its prompts."""
     from marey.bundles import find_bundle, scan_bundles
     from marey.bundles.limits import seconds_of
+    from marey.bundles.places import STARTER
 
     bundles = scan_bundles(config=config)
     for left_out in bundles.broken:
         yield broken("models", left_out.error)
     if not bundles.found and not bundles.broken:
-        yield Check("models", "warn", "no bundle here", "Put one into the folder that MAREY_MODELS names.")
+        hint = f"`pip install {STARTER}`, or put one into the folder that MAREY_MODELS names."
+        yield Check("models", "warn", "no bundle here", hint)
     for found in bundles.found:
         try:
             bundle = find_bundle(found.path.name, config=config)

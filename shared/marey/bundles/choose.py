@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from marey.bundles.bundle import Bundle
 from marey.bundles.find import find_bundle, has_bundle, list_bundles
 from marey.bundles.manifest import BundleManifest
+from marey.bundles.places import STARTER, how_to_get
 from marey.core.errors import InvalidBundle, NotFound, Refused
 from marey.core.settings import Settings, settings
 
@@ -32,7 +33,8 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
         known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))
         raise NotFound(
             f"there is no model or bundle named {name!r}",
-            hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder.",
+            hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder."
+            + how_to_get(name),
         )
     chosen = min(found, key=lambda bundle: (bundle.manifest.random, bundle.manifest.name))
     return find_bundle(chosen.manifest.name, config=config, verify=verify)
@@ -63,7 +65,9 @@ def choose_evaluator(name: str | None, *, generator: Bundle | None = None, confi
         found = list(list_bundles(config=config, kind="evaluator"))
         if not found:
             raise NotFound(
-                "there is no evaluator's bundle here", hint="`marey train evaluator` makes one; MAREY_MODELS names it."
+                "there is no evaluator's bundle here",
+                hint="`marey train evaluator` makes one; MAREY_MODELS names its folder. "
+                f"A trained one comes with `pip install {STARTER}`.",
             )
         name = min(
             (bundle.manifest for bundle in found),

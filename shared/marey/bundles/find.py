@@ -12,6 +12,7 @@ from typing import Literal
 
 from marey.bundles.bundle import Bundle
 from marey.bundles.manifest import MANIFEST_NAME
+from marey.bundles.places import folders, how_to_get
 from marey.core.characters import escape
 from marey.core.errors import InvalidBundle, MareyError, NotFound, Refused
 from marey.core.settings import Settings, settings
@@ -106,11 +107,6 @@ def scan_bundles(*, config: Settings | None = None, kind: Kind | None = None) ->
     return Bundles(chosen, tuple(broken.values()))
 
 
-def folders(config: Settings) -> tuple[Path, ...]:
-    """Where bundles lie; the first one that has a name wins."""
-    return (config.models, config.home / "models")
-
-
 def has_bundle(name: str, config: Settings) -> bool:
     """Return True if a folder of that name holds a manifest, whole or broken."""
     return any(_is_bundle_folder(folder / name) for folder in folders(config))
@@ -165,5 +161,6 @@ def _locate(name: str, config: Settings) -> Path:
     known = ", ".join(sorted({path.name for folder in folders(config) for path in _bundle_folders(folder)}))
     raise NotFound(
         f"there is no model bundle named {name!r}",
-        hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder.",
+        hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder."
+        + how_to_get(name),
     )

@@ -33,7 +33,6 @@ from marey.core.errors import InvalidInput
 from marey.core.origins import check_origins
 from marey.core.rates import check_rates
 
-REPOSITORY = Path(__file__).resolve().parents[3]
 PREFIX = "MAREY_"
 BY_FILE = (
     *("database_url", "listen_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
@@ -123,8 +122,8 @@ class Settings(BaseSettings):
     home: Path = Field(default_factory=lambda: user_data_path("marey", appauthor=False))
     """Database, assets, logs, lock and `server.json` of the embedded server."""
 
-    models: Path = REPOSITORY / "models"
-    """Folder of the model bundles."""
+    models: Path | None = None
+    """Folder of model bundles; unset = `models` of the checkout, where the code runs from one."""
 
     database_url: Database | None = None
     """`postgresql+psycopg://…`; unset = the embedded Postgres of `home`."""

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from marey.bundles.places import folders
 from marey.core.errors import InvalidFile, NotFound
 from marey.core.hashing import sha256_of
 from marey.core.settings import Settings, settings
@@ -73,13 +74,14 @@ class TextEncoder(Protocol):
 
 
 def find_weights(name: str, *, config: Settings | None = None) -> Path:
-    """The folder of an encoder's weights: `<models>/<name>`, an installed package, or the hub's cache on this machine.
+    """The folder of an encoder's weights: beside the bundles, an installed package, or the hub's cache on this machine.
 
     Raises:
         NotFound: there is none; the hint says how to get it.
     """
     config = config or settings()
-    for folder in (config.models / name, config.home / "models" / name):
+    places = [folder / name for folder in folders(config)]
+    for folder in places:
         if any(folder.glob("*.safetensors")):
             return folder
     if name == "minilm" and (package := find_spec(MINILM_PACKAGE)) and package.origin:
@@ -88,7 +90,7 @@ def find_weights(name: str, *, config: Settings | None = None) -> Path:
         return cached
     raise NotFound(
         f"the weights of the text encoder {name!r} are not on this machine",
-        where=str(config.models / name),
+        where=str(places[0]),
         hint="Run `marey models fetch minilm`."
         if name == "minilm"
         else f"Run `hf download {HUB[name]} --local-dir {name}` in the folder that MAREY_MODELS names.",

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from marey.core.settings import REPOSITORY, Settings
+from marey.core.settings import Settings
 from marey.db import transaction
 from marey.evaluations import EvaluationState
 from marey.storage import FolderStore
@@ -23,6 +23,7 @@ from tests.support.evaluations import (
     state_of,
     wait,
 )
+from tests.support.marey import REPOSITORY
 from tests.support.runtime import Loop
 from tests.support.schedules import (
     new_schedule,

@@ -18,7 +18,6 @@ from cryptography.fernet import Fernet
 from standardwebhooks.webhooks import Webhook
 
 from marey.core.addresses import Allowed
-from marey.core.settings import REPOSITORY
 from marey.db import transaction
 from marey.jobs import cancel, list_schedulers
 from marey.scheduler.sending import Sender
@@ -29,6 +28,7 @@ from marey.webhooks.vault import Vault, new_signing_secret
 from tests.servers.jobs import claim_some, let_expire, parse_texts, submit_items
 from tests.servers.receiver import LOOPBACK, Receiver, hang, status
 from tests.support.evaluations import wait
+from tests.support.marey import REPOSITORY
 from tests.support.toy_jobs import job_row
 from tests.support.webhooks import KEY, SECRET, VAULT, deliveries, errors, new_webhook, time_passes
 

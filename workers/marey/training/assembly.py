@@ -11,13 +11,12 @@ from typing import Any, TypeVar
 from torch import Tensor
 
 from marey.bundles import Bundle, DataSource, TextSpec
+from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
 from marey.data.prepared import PreparedData
 from marey.training.parts import Part, save_part
 from marey.training.staging import ModelConfig, Recipe
 from marey.training.texts import CaptionTexts
-
-REPOSITORY = Path(__file__).resolve().parents[3]
 
 C = TypeVar("C", bound=ModelConfig)
 
@@ -83,9 +82,13 @@ def _terms(licences: Sequence[str]) -> str:
 
 
 def _commit() -> str | None:
+    """The commit of the checkout; None for an installed wheel, whatever repository its environment lies in."""
+    root = checkout()
+    if root is None:
+        return None
     try:
         found = subprocess.run(
-            ["git", "rev-parse", "HEAD"], cwd=REPOSITORY, capture_output=True, text=True, check=True, timeout=10
+            ["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=True, timeout=10
         )
     except (OSError, subprocess.SubprocessError):
         return None

@@ -20,6 +20,7 @@ from typing import Any
 
 from marey.bundles import find_bundle
 from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
+from marey.core.checkout import checkout
 from marey.core.errors import MareyError
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
@@ -27,7 +28,8 @@ from marey.models.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
 from marey.text.features import TextFeatures
 from marey.training.obedience import pipeline_of
 
-OUTPUT = Path(__file__).parents[4] / "services" / "marey" / "api" / "live" / "examples.json"
+OUTPUT = Path("services", "marey", "api", "live", "examples.json")
+"""In the checkout."""
 SETS = ("evaluation", "development")
 CANDIDATES = 3
 """Prompts of each act."""
@@ -113,7 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("bundle")
     parser.add_argument("--seeds", type=int, default=SEEDS, help="sessions that begin with each prompt")
     parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, default=OUTPUT)
+    root = checkout()
+    parser.add_argument("-o", "--output", type=Path, default=root and root / OUTPUT, required=root is None)
     chosen = parser.parse_args(arguments)
     reference = find_bundle(chosen.bundle).reference
     generator = Generator.load(chosen.bundle, threads=chosen.threads)

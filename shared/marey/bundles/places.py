@@ -1,0 +1,57 @@
+"""Folders that hold bundles, in the order in which they are searched.
+
+A distribution of bundles names its package in the entry-point group `marey.bundles`; the package is a folder of bundles
+and is never imported.
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import lru_cache
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
+
+from marey.core.checkout import checkout
+from marey.core.settings import Settings
+
+GROUP = "marey.bundles"
+OPEN, STARTER = "marey-bundles-open", "marey-bundles-starter"
+DISTRIBUTIONS = {"srl-light": OPEN, "hgm3-starter": STARTER, "mogo-starter": STARTER, "evaluator-starter": STARTER}
+"""The distribution on the package index that brings each bundle of this release."""
+
+log = logging.getLogger(__name__)
+
+
+def folders(config: Settings) -> tuple[Path, ...]:
+    """Folders of bundles; the first one that has a name wins.
+
+    `MAREY_MODELS`, `models` of the home, `models` of the checkout unless `MAREY_MODELS` replaces it, installed
+    distributions.
+    """
+    root = checkout()
+    given = () if config.models is None else (config.models,)
+    beside = (root / "models",) if root is not None and config.models is None else ()
+    return (*given, config.home / "models", *beside, *installed())
+
+
+@lru_cache(maxsize=1)
+def installed() -> tuple[Path, ...]:
+    """Folders of the installed distributions of bundles, by entry-point name."""
+    found: list[Path] = []
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        try:
+            spec = find_spec(entry.value)
+        except (ImportError, ValueError):
+            spec = None
+        if spec is None or not spec.submodule_search_locations:
+            log.warning("the entry point %r of %s names no package: %s", entry.name, GROUP, entry.value)
+            continue
+        found += map(Path, spec.submodule_search_locations)
+    return tuple(found)
+
+
+def how_to_get(name: str) -> str:
+    """The sentence that names the distribution of a bundle, or of a model's own bundle; empty for other names."""
+    distribution = DISTRIBUTIONS.get(name) or DISTRIBUTIONS.get(f"{name}-starter")
+    return f" It comes with `pip install {distribution}`." if distribution else ""
