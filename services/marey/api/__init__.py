@@ -1,1 +1,1 @@
-"""The HTTP API. One folder a noun: routes, schemas, service."""
+"""The HTTP API. One folder per noun: routes, schemas, service."""

@@ -1,4 +1,4 @@
-"""`python -m marey.api docs/openapi.json` writes the document that is checked in."""
+"""`python -m marey.api docs/openapi.json` writes the checked-in OpenAPI document."""
 
 import sys
 from pathlib import Path

@@ -68,7 +68,7 @@ DESCRIPTION = "Text in, 3D human motion out. Errors are problems of RFC 9457 wit
 
 
 def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> FastAPI:
-    """The application, of these nouns; connects to nothing before it starts."""
+    """Create the application with these routers; connects to nothing before it starts."""
     app = FastAPI(
         title="Marey",
         version=version("marey"),
@@ -138,7 +138,7 @@ def _operation_id(route: APIRoute) -> str:
 
 
 def write_openapi(path: Path) -> None:
-    """Write the document that is checked in."""
+    """Write the checked-in OpenAPI document."""
     document = create_app(Settings(public_url=None)).openapi()
     path.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
@@ -149,7 +149,7 @@ def protocol_options(config: Settings) -> dict[str, Any]:
 
 
 def serve() -> None:
-    """Serve until SIGTERM; `MAREY_HOST` and `MAREY_PORT` say where.
+    """Serve at `MAREY_HOST` and `MAREY_PORT` until SIGTERM.
 
     Raises:
         InvalidInput: the database passes no notifications on.

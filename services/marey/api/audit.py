@@ -1,4 +1,4 @@
-"""Notes in the audit log of what a request did, in the transaction in which it does it."""
+"""Audit log entries of requests, written in the request's transaction."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from marey import tenants
 
 
 def note(conn: sa.Connection, key: tenants.ApiKey, verb: str, target: object, **data: object) -> None:
-    """Note that this key did something; see `marey.tenants.audit`."""
+    """Record an action of this key; see `marey.tenants.audit`."""
     tenants.audit(conn, key.tenant, tenants.Actor(key.name, key.id), verb, target, **data)

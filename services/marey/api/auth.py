@@ -21,7 +21,7 @@ bearer = HTTPBearer(auto_error=False, description="An API key: `marey admin keys
 
 
 def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials | None, Security(bearer)]) -> ApiKey:
-    """The key that a request shows.
+    """Return the key of a request.
 
     Raises:
         Unauthenticated: none, or not a valid one.
@@ -30,7 +30,7 @@ def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials |
 
 
 def authenticated(shared: Context, secret: str | None) -> ApiKey:
-    """The key of this secret; raises as `caller`."""
+    """Return the key of this secret; raises as `caller`."""
     if not secret:
         raise no_key()
     with transaction(shared.engine) as conn:
@@ -38,7 +38,7 @@ def authenticated(shared: Context, secret: str | None) -> ApiKey:
 
 
 def authorize(shared: Context, key: ApiKey, scope: str, kind: str | None = None) -> None:
-    """Nothing, if the key has the scope and has not asked too often.
+    """Validate that the key has the scope, and count the request against its rate limit.
 
     Args:
         kind: class of the request (`marey.core.rates`), where it is not called as its scope.
@@ -52,7 +52,7 @@ def authorize(shared: Context, key: ApiKey, scope: str, kind: str | None = None)
 
 
 def check_scope(key: ApiKey, scope: str) -> None:
-    """Nothing, if the key has the scope. `admin` holds all that concern its own tenant.
+    """Validate that the key has the scope. `admin` includes all scopes of its own tenant.
 
     Raises:
         Refused: it has not.
@@ -62,7 +62,7 @@ def check_scope(key: ApiKey, scope: str) -> None:
 
 
 def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiKey, SecurityScopes], ApiKey]:
-    """A dependency: the caller's key, if `authorize` lets it pass for the scopes that the route's `Security` names.
+    """Return a dependency: the caller's key, authorized for the scopes that the route's `Security` names.
 
     The OpenAPI document says them, too.
     """

@@ -1,4 +1,4 @@
-"""One thread a process that listens for new events and feeds every open event stream."""
+"""One thread per process that listens for new events and feeds every open event stream."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CLOSED = None
 
 @dataclass(frozen=True)
 class EventBatch:
-    """New events of one job for all who stand where they begin: put into words once, not once a client."""
+    """New events of one job for all clients at the same position: encoded once, not once per client."""
 
     wire: bytes
     last: bool
@@ -58,7 +58,7 @@ class Subscription:
     queue: asyncio.Queue[EventBatch | None] = field(default_factory=lambda: asyncio.Queue(QUEUE_LIMIT))
 
     def put(self, batch: EventBatch | None) -> None:
-        """On its own loop."""
+        """Queue a batch; called on the subscription's own loop."""
         if self.queue.full():
             self.queue.get_nowait()
             batch = CLOSED
@@ -66,10 +66,10 @@ class Subscription:
 
 
 class EventBroadcaster:
-    """Reads the new events of the jobs that somebody follows, once for all who do."""
+    """Reads new events of followed jobs, once for all their clients."""
 
     def __init__(self, engine: sa.Engine, url: str, words: Callable[[EventRow], bytes]) -> None:
-        """`words`: an event as its streams send it."""
+        """Set the connection and `words`, the encoder of an event for its streams."""
         self._engine = engine
         self._url = url
         self._words = words
@@ -82,7 +82,7 @@ class EventBroadcaster:
         self._thread = threading.Thread(target=self._run, name="broadcaster", daemon=True)
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Start listening."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -94,8 +94,8 @@ class EventBroadcaster:
 
     @contextlib.asynccontextmanager
     async def follow(self, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[Subscription]:
-        """A subscription to a job's events with a greater `seq`; those that stand already come first. It is closed
-        within seconds of the key's end: that the tenant is suspended, too."""
+        """Subscribe to a job's events with a greater `seq`; existing ones come first. The subscription is closed within
+        seconds after the key becomes invalid or the tenant is suspended."""
         subscription = Subscription(key.tenant, key.id, job, seq, asyncio.get_running_loop())
         with self._lock:
             self._subscriptions[job].add(subscription)
@@ -165,7 +165,7 @@ class EventBroadcaster:
                 raise
 
     def _close_invalid(self) -> None:
-        """Close what follows by a key that is revoked or expired since, or whose tenant is suspended."""
+        """Close subscriptions whose key was revoked or has expired, or whose tenant is suspended."""
         now = time.monotonic()
         if now < self._keys_due:
             return
@@ -206,7 +206,7 @@ class EventBroadcaster:
 
 
 def _tell(told: Iterable[tuple[Subscription, EventBatch | None]]) -> None:
-    """Hand over to the loops of the streams, each woken once however many of its streams are told."""
+    """Pass batches to the loops of the streams; each loop is woken once, however many of its streams get one."""
     by_loop: dict[asyncio.AbstractEventLoop, list[tuple[Subscription, EventBatch | None]]] = defaultdict(list)
     for subscription, batch in told:
         by_loop[subscription.loop].append((subscription, batch))
@@ -221,6 +221,6 @@ def _put_all(pairs: list[tuple[Subscription, EventBatch | None]]) -> None:
 
 
 def last_progress_only(events: list[EventRow]) -> list[EventRow]:
-    """The events without those progress ones that a later one in the list makes stale."""
+    """Drop progress events that a later one in the list makes stale."""
     last = max((e.seq for e in events if e.kind == PROGRESS), default=None)
     return [event for event in events if event.kind != PROGRESS or event.seq == last]

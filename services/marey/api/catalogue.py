@@ -1,4 +1,4 @@
-"""Which exact bundle a request means, asked of the disk now and then."""
+"""Resolution of model names to exact bundles, cached for a few seconds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DEFAULT_MODEL = "hgm3"
 
 
 class Catalogue:
-    """GeneratorList by the name they were asked for, remembered for a few seconds. Safe in threads."""
+    """Generator capabilities by requested name, cached for a few seconds. Thread-safe."""
 
     def __init__(self, config: Settings) -> None:
         self._config = config
@@ -23,7 +23,7 @@ class Catalogue:
         self._lock = threading.Lock()
 
     def offer(self, name: str | None) -> GeneratorCapabilities:
-        """The offer for a model (`hgm3`), a bundle or an exact bundle; None = the default model.
+        """Return the capabilities of a model (`hgm3`), a bundle or an exact bundle; None = the default model.
 
         Raises:
             NotFound, InvalidBundle, Refused: as `choose_bundle`.

@@ -1,4 +1,4 @@
-"""What the routes share: of each of these one a process."""
+"""Shared objects of the routes, one of each per process."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LARGE_THREADS = 1
 
 @dataclass
 class Context:
-    """Made at start-up, closed at shutdown."""
+    """Shared objects, created at start-up, closed at shutdown."""
 
     config: Settings
     engine: sa.Engine
@@ -58,7 +58,7 @@ class Context:
 
 
 async def context(asked: HTTPConnection) -> Context:
-    """The context of this process; of a request or a socket. Async: no thread is needed to find it."""
+    """Return the context of this process, for a request or a socket. Async: needs no thread."""
     return asked.app.state.context
 
 
@@ -88,12 +88,12 @@ def deadline(kind: Deadline) -> Callable[[Route], Route]:
 
 
 def no_key() -> Unauthenticated:
-    """The error of a request that shows no key."""
+    """Return the error of a request without a key."""
     return Unauthenticated("no API key was sent", hint="Send the header `Authorization: Bearer <key>`.")
 
 
 def connection(shared: Shared, asked: HTTPConnection) -> Iterator[sa.Connection]:
-    """A transaction that lasts as long as the route's function, and commits before the answer is sent.
+    """Open a transaction for the duration of the route's function; it commits before the answer is sent.
 
     Raises:
         Unauthenticated: no key is shown. Strangers take no connection; whether a key is valid is looked up later.

@@ -1,4 +1,4 @@
-"""JSON bodies with one long list, read from a file piece by piece: memory does not grow with the list.
+"""JSON bodies with one long list, parsed from a file piece by piece: memory does not grow with the list.
 
 Every value is decoded by Python's own `json`, which a whole body would be read with too. So the same is accepted, and
 what is refused is told in the same words with the same line and column. Only the object around the list, and the list's
@@ -47,7 +47,7 @@ class Document:
         """It has more than `limit` elements, and what follows it was not read."""
 
     def fields(self) -> dict[str, Any]:
-        """Everything but the list: what stands beside it, and at its place if that is no list.
+        """Return all fields but the list; a value in its place that is not a list is included.
 
         Raises:
             InvalidInput: it is no JSON, no object, or names the list twice.
@@ -61,7 +61,7 @@ class Document:
         return found
 
     def elements(self) -> Iterator[tuple[int, object]]:
-        """The elements of the list with their numbers, from 1; raises as `fields`."""
+        """Yield the elements of the list with their numbers, from 1; raises as `fields`."""
         return self._read({})
 
     def _read(self, fields: dict[str, Any]) -> Iterator[tuple[int, object]]:
@@ -116,8 +116,8 @@ class Document:
 
 
 class _Window:
-    """The text of a file around the place that is read, always with `MAX_VALUE` characters ahead or all that is left.
-    What lies behind is forgotten but for the number of its lines."""
+    """Text of a file around the parser's position, with at least `MAX_VALUE` characters ahead, or the rest. Text behind
+    the position is dropped; its lines are counted."""
 
     def __init__(self, body: BinaryIO) -> None:
         body.seek(0)
@@ -131,7 +131,7 @@ class _Window:
         self._fields = 0  # characters of all fields so far
 
     def skip(self) -> str:
-        """Go to the next character that is not blank; empty at the end."""
+        """Skip blanks and return the next character; empty at the end."""
         while True:
             self._fill()
             found = BLANK.match(self._text, self._at)
@@ -143,22 +143,22 @@ class _Window:
                 return ""
 
     def step(self) -> None:
-        """Go on behind the character that `skip` found."""
+        """Move behind the character that `skip` found."""
         self._at += 1
 
     def comma(self) -> None:
-        """Go on behind a comma; raises InvalidInput where there is none."""
+        """Move behind a comma; raise InvalidInput if there is none."""
         if self.skip() != ",":
             raise self.error("Expecting ',' delimiter")
         self._at += 1
 
     def end(self) -> None:
-        """Raise InvalidInput if anything but blanks is left."""
+        """Raise InvalidInput if non-blank text is left."""
         if self.skip():
             raise self.error("Extra data")
 
     def field(self) -> object:
-        """A value that is no element of the list, or a name; raises as `value`."""
+        """Parse a value outside the list, or a name; raises as `value`."""
         before = self._gone + self._at
         found = self.value("body")
         self._fields += self._gone + self._at - before
@@ -167,7 +167,7 @@ class _Window:
         return found
 
     def value(self, where: str) -> object:
-        """The value that begins here.
+        """Parse the value that begins here.
 
         Raises:
             InvalidInput: it is no JSON.
@@ -189,7 +189,7 @@ class _Window:
         return found
 
     def error(self, message: str, at: int | None = None) -> InvalidInput:
-        """The error for what is no JSON, as `json` tells it of a whole text."""
+        """Return the error for invalid JSON, with the position that `json` reports for a whole text."""
         at = self._at if at is None else at
         line = self._lines + self._text.count("\n", 0, at) + 1
         newline = self._text.rfind("\n", 0, at)
@@ -224,7 +224,7 @@ class _Window:
 
 
 def _undecodable(error: UnicodeDecodeError, before: int) -> InvalidInput:
-    """The error as Python tells it of the whole; `before` bytes stand before its object."""
+    """Return Python's decoding error with positions in the whole body; `before` bytes precede the error's object."""
     start, last = before + error.start, before + error.end - 1
     one = f"byte 0x{error.object[error.start]:02x} in position {start}"
     place = one if start == last else f"bytes in position {start}-{last}"

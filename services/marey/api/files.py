@@ -1,4 +1,4 @@
-"""Stored files over HTTP: sent from a folder, with ranges, or where a signed URL leads."""
+"""Stored files over HTTP: sent from a folder, with ranges, or by redirect to a signed URL."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FileView(View):
 
 @dataclass(frozen=True)
 class RequestedFile:
-    """How much of a file a request wants."""
+    """Headers and options of a file request."""
 
     request: Request
     byte_range: Annotated[str | None, Header(alias="Range")] = None
@@ -55,7 +55,7 @@ FileRequest = Annotated[RequestedFile, Depends()]
 
 
 def file_response(shared: Context, tenant: str, stem: str, file: FileView, part: RequestedFile) -> Response:
-    """Answer a request for a file. Its ETag is its sha256; HEAD tells the whole file's size.
+    """Answer a request for a file. Its ETag is its SHA-256; HEAD reports the whole file's size.
 
     Args:
         stem: name of the download, without its ending.
@@ -80,7 +80,7 @@ def file_response(shared: Context, tenant: str, stem: str, file: FileView, part:
 
 
 def _valid_for(seconds: int) -> dict[str, str]:
-    """Until when a signed URL works: a cache may send there, too, for a little less long."""
+    """Return the Cache-Control of a signed URL; a cache may use it a little shorter than it is valid."""
     return {
         "Cache-Control": f"private, max-age={seconds - MARGIN_SECONDS}",
         "Expires": format_datetime(datetime.now(UTC) + timedelta(seconds=seconds), usegmt=True),
@@ -101,8 +101,8 @@ def _content(
 
 
 def _sent(opened: Opened, length: int, file: FileView, headers: dict[str, str], status: int = 200) -> Response:
-    """As a stream; at once where it is one chunk, as nearly all motions are: each chunk of a stream changes threads
-    twice, which costs more than the reading."""
+    """Stream the content; send it directly if it is one chunk, as nearly all motions are: each chunk of a stream
+    changes threads twice, which costs more than the read."""
     headers["Content-Length"] = str(length)
     if length <= CHUNK:
         return Response(b"".join(_read(opened)), status, headers, file.media_type)

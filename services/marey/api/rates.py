@@ -29,7 +29,7 @@ log = structlog.get_logger(__name__)
 
 
 class Rates:
-    """Made once a process; connects to nothing before it counts.
+    """Rate limiter, one per process; connects lazily.
 
     While Redis is away requests are served uncounted, and the log says so: a limit keeps a loop of somebody's script
     from crowding others out, and quotas, which hold what costs something, stand in the database.
@@ -76,7 +76,7 @@ class Rates:
             )
 
     def close(self) -> None:
-        """Give the connections back."""
+        """Close the connections."""
         if self._client is not None:
             self._client.close()
 

@@ -26,7 +26,7 @@ log = structlog.get_logger(__name__)
 
 @dataclass(frozen=True)
 class Result:
-    """How a check ended.
+    """Result of a check.
 
     Attributes:
         message: for everybody: what is down, never where or how.
@@ -40,7 +40,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Check:
-    """Something that must work.
+    """A dependency that must work.
 
     Attributes:
         run: raises MareyError when it does not.
@@ -57,7 +57,7 @@ UNCHECKED = Result(False, "not checked yet")
 
 
 class Readiness:
-    """Runs checks again and again, and remembers how each ended last."""
+    """Runs checks periodically, and stores the last result of each."""
 
     def __init__(self, checks: Mapping[str, Check], *, interval: float = INTERVAL_SECONDS) -> None:
         self._checks, self._interval = checks, interval
@@ -65,16 +65,16 @@ class Readiness:
         self._stopping = threading.Event()
 
     def start(self) -> None:
-        """Begin the first round."""
+        """Start the first round."""
         for name, check in self._checks.items():
             threading.Thread(target=self._repeat, args=(name, check), name=f"check-{name}", daemon=True).start()
 
     def stop(self) -> None:
-        """Begin no other round. A check that hangs is left alone: its thread ends with the process."""
+        """Start no other round. A hanging check is left alone: its thread ends with the process."""
         self._stopping.set()
 
     def results(self) -> dict[str, Result]:
-        """How each check stands now. Never waits."""
+        """Return the current result of each check. Never waits."""
         oldest = time.monotonic() - STALE_SECONDS
         found: dict[str, Result] = {}
         for name, check in self._checks.items():

@@ -1,4 +1,4 @@
-"""The OpenAPI document: what FastAPI knows of the routes, bodies that are read by hand, and an example of each body."""
+"""The OpenAPI document: FastAPI's output, bodies that routes parse themselves, and an example of each body."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ EXAMPLES: dict[tuple[str, str], Any] = {
 
 
 def build_reference(app: FastAPI, models: Sequence[type[BaseModel]], public_url: str | None) -> dict[str, Any]:
-    """The OpenAPI 3.1 document of an application; `docs/openapi.json` is a copy of it.
+    """Return the OpenAPI 3.1 document of an application; `docs/openapi.json` is a copy of it.
 
     Args:
         models: schemas of bodies that routes read by hand.
@@ -69,14 +69,14 @@ def _operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _bodies(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Name of the schema, media type and description of each body."""
+    """Return schema name, media type and description of each body."""
     for operation in _operations(document):
         for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
             yield content["schema"]["$ref"].rpartition("/")[2], media_type, content
 
 
 def _answer_problems(document: dict[str, Any]) -> None:
-    """FastAPI documents its own 422; ours is a problem like the others."""
+    """Replace FastAPI's own 422 by a problem like the others."""
     for operation in _operations(document):
         operation["responses"].pop("422", None)
     for name in ("HTTPValidationError", "ValidationError"):

@@ -1,4 +1,4 @@
-"""What the sockets of one process share: the way to Redis, threads to wait in, and how many may be open."""
+"""Shared objects of the sockets of one process: Redis client, threads for blocking reads, and socket slots."""
 
 # pyright: reportMissingTypeStubs=false
 from __future__ import annotations
@@ -21,7 +21,7 @@ CALLS = 16
 
 
 class Hub:
-    """Made once a process, on its event loop; connects to nothing before it is asked.
+    """Created once per process, on its event loop; connects lazily.
 
     Args:
         url: of the Redis that holds the frames.
@@ -36,13 +36,13 @@ class Hub:
         self.slots = SlotCounter("sockets", SlotLimits(SOCKETS, tenant, key), SOCKETS_OPEN)
 
     async def wait(self, read: Callable[[], Answer]) -> Answer:
-        """What a read that waits gives; for one at a time of each socket. Who goes away does not wait for it."""
+        """Run a blocking read in a thread; one at a time per socket. A cancelled caller does not wait for it."""
         return await to_thread.run_sync(read, limiter=self._reads, abandon_on_cancel=True)
 
     async def call(self, function: Callable[[], Answer]) -> Answer:
-        """What a function that answers soon gives: of Redis, or of the database."""
+        """Run a function that returns soon in a thread: of Redis, or of the database."""
         return await to_thread.run_sync(function, limiter=self._calls)
 
     def close(self) -> None:
-        """Give the connections back."""
+        """Close the connections."""
         self.redis.close()

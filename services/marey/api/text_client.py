@@ -44,7 +44,7 @@ class TextService:
         self._http = None if config.text_url is None else _client(config, config.text_url)
 
     async def parse(self, body: ParseBody) -> Response:
-        """The answer of the text service, a problem included.
+        """Return the answer of the text service, or its problem.
 
         Raises:
             Busy: too much is being parsed.
@@ -96,7 +96,7 @@ def _client(config: Settings, url: str) -> httpx2.AsyncClient:
 
 
 async def _passed_on(answer: httpx2.Response) -> Response:
-    """The same answer, if it is one of the text service: what else listens there is not for clients to see.
+    """Return the answer if it is the text service's own; answers of other servers are not passed to clients.
 
     Raises:
         Unreachable: it is another.

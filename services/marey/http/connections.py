@@ -1,4 +1,4 @@
-"""HTTP connections: how long a client may take to send the head of a request."""
+"""HTTP connections with a time limit for the head of a request."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from marey.http.problems import problem_response
 
 
 class PatientProtocol(H11Protocol):
-    """uvicorn's HTTP/1.1 with a limit for the head of a request: its own ends only connections on which an answer was
-    the last thing said. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to
-    begin one.
-    """
+    """uvicorn's HTTP/1.1 with a time limit for the head of a request: uvicorn closes only connections that idle after
+    an answer. A head has `timeout_keep_alive` seconds from its first byte, and so has a new connection to begin one."""
 
     head_timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Open the connection."""
+        """Handle a new connection."""
         super().connection_made(transport)
         self._expect_head()
 
     def data_received(self, data: bytes) -> None:
-        """Take what the client sent."""
+        """Handle incoming data."""
         super().data_received(data)
         if self.conn.their_state is not h11.IDLE or self.transport.is_closing():
             self._forget_head()
@@ -35,7 +33,7 @@ class PatientProtocol(H11Protocol):
             self._expect_head()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """The client is gone."""
+        """Handle a closed connection."""
         self._forget_head()
         super().connection_lost(exc)
 

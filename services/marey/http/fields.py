@@ -1,4 +1,5 @@
-"""JSON Schema of fields that `marey.items.item` checks, from the constants of the check; for the reference alone."""
+"""JSON Schema of fields that `marey.items.item` validates, from the constants of its checks; for the reference
+alone."""
 
 from __future__ import annotations
 

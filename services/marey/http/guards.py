@@ -1,4 +1,4 @@
-"""ASGI middleware: which Host is answered, and what a proxy must pass on."""
+"""ASGI middleware that checks the Host header and the headers of WebSocket upgrades."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marey.http.problems import problem_response
 
 
 class HostGuard:
-    """Answers only requests for hosts it is known by: a web page that rebinds its name to this port gets nothing.
+    """Answers only requests for configured hosts: a web page that rebinds its name to this port gets no access.
 
     A page of any origin may open a socket, unlike a request: browsers leave it to the server to check the page's
     origin. Allowed are pages of this server's own hosts and of the origins that may read its answers. Clients that are
@@ -28,7 +28,7 @@ class HostGuard:
         self.origins = frozenset(origins)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, or refuse."""
+        """Pass the request on, or refuse it."""
         error = self._objection(scope)
         if error is None:
             await self.app(scope, receive, send)
@@ -52,14 +52,13 @@ class HostGuard:
 
 
 class UpgradeGuard:
-    """Refuse WebSocket handshakes that a proxy made ordinary requests: it drops `Upgrade` and `Connection`, which are
-    between it and its client, and passes on the rest."""
+    """Refuses WebSocket handshakes that a proxy forwarded as ordinary requests, without `Upgrade` and `Connection`."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, or refuse."""
+        """Pass the request on, or refuse it."""
         if scope["type"] == "http" and "sec-websocket-key" in Headers(scope=scope):
             error = UpgradeMissing(
                 "the WebSocket arrived as an ordinary request: a proxy does not pass on the upgrade",
@@ -75,7 +74,7 @@ def _without_port(host: str) -> str:
 
 
 def _host_of(origin: str) -> str:
-    """The host of an `Origin`; empty for `null`, which is no host, and for what makes no sense."""
+    """Return the host of an `Origin`; empty for `null` and for invalid origins."""
     try:
         return _without_port(urlsplit(origin).netloc).lower()
     except ValueError:

@@ -1,4 +1,4 @@
-"""Web pages of other origins: which may read answers (CORS), and which may open a socket."""
+"""Web pages of other origins: CORS, and the origins that may open a socket."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAX_AGE = 600
 
 
 class OriginGuard:
-    """Let pages of the configured origins read answers, and send requests with an API key.
+    """Allows pages of the configured origins to read answers, and to send requests with an API key.
 
     The origin is named, never `*`, and cookies play no part: `Access-Control-Allow-Credentials` is not sent. A
     pre-flight is answered here, without a look at the route, its key or its body, always with the same lists.
@@ -38,7 +38,7 @@ class OriginGuard:
         self.origins = frozenset(origins)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a pre-flight, or add what a browser asks for to the answer."""
+        """Answer a pre-flight, or add CORS headers to the answer."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return

@@ -41,7 +41,7 @@ log = structlog.get_logger(__name__)
 
 
 class FieldProblem(BaseModel):
-    """One thing wrong with a request."""
+    """One problem of a request."""
 
     line: int | None = Field(default=None, description="Line of the body, from 1; for `items`, the element's number.")
     field: str | None = Field(default=None, description="The field it is about.")
@@ -49,7 +49,7 @@ class FieldProblem(BaseModel):
 
 
 class QuotaBody(BaseModel):
-    """A quota and what was asked of it; items or bytes."""
+    """A quota and the requested amount; items or bytes."""
 
     name: str
     limit: int
@@ -59,7 +59,7 @@ class QuotaBody(BaseModel):
 
     @classmethod
     def of(cls, found: QuotaHeadroom | QuotaUsedUp) -> QuotaBody:
-        """From what was looked up, or from what was refused."""
+        """Convert a headroom or a refusal."""
         return cls(name=found.quota, limit=found.limit, used=found.used, left=found.left, asked=found.asked)
 
 
@@ -85,7 +85,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 
 
 def public_error(error: MareyError) -> MareyError:
-    """Return what clients are told of an error.
+    """Return the part of an error that clients may see.
 
     Faults of the server's own side may name its hosts, files and settings, and reach callers without a key: these are
     told what is down, never where or how. The log has the error itself.
@@ -102,7 +102,7 @@ def public_error(error: MareyError) -> MareyError:
 
 
 def problem_body(error: MareyError) -> ProblemBody:
-    """The problem an expected error is told as."""
+    """Return the problem document of an expected error."""
     error = public_error(error)
     body = ProblemBody(
         type=TYPE_PREFIX + error.problem_type,
@@ -123,7 +123,7 @@ def problem_body(error: MareyError) -> ProblemBody:
 
 
 def problem_response(error: MareyError) -> JSONResponse:
-    """The answer to a request that failed so."""
+    """Return the answer to a request that failed with this error."""
     body = problem_body(error)
     headers: dict[str, str] = {}
     if isinstance(error, Unauthenticated):
@@ -138,7 +138,7 @@ def problem_response(error: MareyError) -> JSONResponse:
 
 
 def install(app: FastAPI) -> None:
-    """Answer problems for our errors, for requests FastAPI refuses, and for bugs."""
+    """Register handlers that answer problems for Marey's errors, for requests FastAPI refuses, and for bugs."""
 
     @app.exception_handler(MareyError)
     def _expected(_: Request, error: MareyError) -> JSONResponse:
@@ -194,7 +194,7 @@ def _of_status(request: Request, error: HTTPException) -> JSONResponse:
 
 
 def _field_problem(error: Mapping[str, Any]) -> FieldProblem:
-    """One of pydantic's. `("query", "limit")` is called `limit`: the rest says nothing that a client does not see."""
+    """Convert one of pydantic's errors. `("query", "limit")` becomes `limit`: the prefix means nothing to a client."""
     place, *path = error["loc"]
     if error["type"] == "json_invalid":  # its path is a position
         return FieldProblem(field=str(place), message=f"is not JSON: {error['ctx']['error']} (character {path[0]})")
@@ -203,7 +203,7 @@ def _field_problem(error: Mapping[str, Any]) -> FieldProblem:
 
 
 def _sentence(error: Mapping[str, Any]) -> str:
-    """What pydantic says, with the value it says it of, where that is short."""
+    """Return pydantic's message, with the value it concerns, if that is short."""
     kind, message, value = str(error["type"]), str(error["msg"]), error.get("input")
     if kind == "missing":
         return "is missing"
@@ -215,5 +215,5 @@ def _sentence(error: Mapping[str, Any]) -> str:
 
 
 def _clean(text: str | None) -> str | None:
-    """Text that UTF-8 can carry: a lone surrogate of a request must not break the answer about it."""
+    """Return text that UTF-8 can encode: a lone surrogate of a request must not break its error answer."""
     return None if text is None else text.encode("utf-8", "backslashreplace").decode()

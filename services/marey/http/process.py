@@ -19,7 +19,7 @@ turns of threads that read large bodies."""
 
 
 def prepare_process(name: str, config: Settings) -> dict[str, Any]:
-    """Set up memory, signals, logs and traces of this process; returns options of uvicorn."""
+    """Set up memory, signals, logs and traces of this process; return options of uvicorn."""
     one_heap()
     sys.setswitchinterval(SWITCH_SECONDS)
     # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.

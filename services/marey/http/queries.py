@@ -1,4 +1,4 @@
-"""Query parameters that a route does not know are refused: a misspelt filter would otherwise show everything."""
+"""Validation of query parameters: a misspelt filter would otherwise return everything."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ LONGEST_NAME = 60
 
 
 async def known_query(asked: HTTPConnection) -> None:
-    """A dependency of every route: `check_query`, but where a key is wanted, for there that comes first (`auth`)."""
+    """Dependency of every route: `check_query`, except for routes with a key, where authentication comes first
+    (`auth`)."""
     route = asked.scope.get("route")
     if isinstance(route, APIRoute) and not _wants_key(route.dependant):
         check_query(asked)
 
 
 def check_query(asked: HTTPConnection) -> None:
-    """Nothing, if the route knows every query parameter of the request. Sockets look at their own.
+    """Validate that the route knows every query parameter of the request. Sockets check their own.
 
     Raises:
         InvalidInput: it does not know one.

@@ -17,8 +17,8 @@ class ByteRange:
 
 
 def parse_range(header: str | None, size: int) -> ByteRange | None:
-    """One range of a file of `size` bytes; None = send all of it (no header, several ranges, or one that makes no
-    sense, which the RFC lets a server ignore)."""
+    """Parse one range of a file of `size` bytes; None = send the whole file (no header, several ranges, or an invalid
+    one, which the RFC allows to ignore)."""
     match = SINGLE.fullmatch(header.strip()) if header else None
     if match is None or match[0] == "bytes=-":
         return None

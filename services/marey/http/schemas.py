@@ -1,4 +1,4 @@
-"""Envelopes that every noun shares."""
+"""Schemas that all nouns share."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_NAME, MAX_COMMENT, MAX_REASON = 200, 2000, 500
 
 @dataclass(frozen=True)
 class FreeText:
-    """Marks free text of a request in `Annotated`: `marey.core.characters` says what it may hold.
+    """Annotation of free text in a request, for `Annotated`; `marey.core.characters` has the rules.
 
     Attributes:
         lines: it may hold newlines and tabs.

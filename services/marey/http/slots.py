@@ -1,4 +1,4 @@
-"""How many sockets and event streams may be open at one process, with a share for each tenant and key."""
+"""Slots for open sockets and event streams of one process, with a limit per tenant and per key."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RETRY_SECONDS = 5
 
 @dataclass(frozen=True)
 class SlotLimits:
-    """Places of one process, and how many of them one tenant and one key may hold."""
+    """Slots of one process, and the limits of one tenant and one key."""
 
     total: int
     tenant: int
@@ -29,26 +29,26 @@ class SlotLimits:
 
 
 class SlotCounter:
-    """Counts what is open; on the event loop alone.
+    """Counts open connections; on the event loop alone.
 
     Besides its share a tenant may hold no more places than are free. So a tenant that has none always finds one: with
     `n` tenants that take all they can, one in `n + 1` places stays free.
     """
 
     def __init__(self, what: str, shares: SlotLimits, gauge: Gauge | None = None) -> None:
-        """`what` is counted, in the plural, for messages."""
+        """Set the limits; `what` is the plural noun for messages."""
         self._what, self._shares, self._gauge = what, shares, gauge
         self._tenants: Counter[str] = Counter()
         self._keys: Counter[UUID] = Counter()
 
     @property
     def taken(self) -> int:
-        """Places that are taken now."""
+        """Number of occupied slots."""
         return self._tenants.total()
 
     @contextmanager
     def take(self, key: ApiKey) -> Generator[None]:
-        """Hold one place during the block.
+        """Hold one slot during the block.
 
         Raises:
             Busy: the key or its tenant has its share, or no place is free.
@@ -83,7 +83,7 @@ class SlotCounter:
 
 
 def _add(table: Counter[Name], name: Name, by: int) -> None:
-    """Count, and forget what is at 0."""
+    """Add to a counter, and drop entries at 0."""
     table[name] += by
     if not table[name]:
         del table[name]

@@ -1,4 +1,4 @@
-"""Each request is a span: of the trace its caller sent, or of one of its own. Its log lines say which."""
+"""A span per request, in the trace of the caller or a new one; log lines carry its id."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
 
 
 class Trace:
-    """ASGI middleware: a span a request, named by its route once that is known."""
+    """ASGI middleware that opens a span per request, named by its route once that is known."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on within a span."""
+        """Run the request inside a span."""
         if scope["type"] != "http" or scope["path"] in UNTRACED:
             await self.app(scope, receive, send)
             return

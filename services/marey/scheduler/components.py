@@ -1,4 +1,4 @@
-"""The scheduler's threads, and what notices when one of them stalls.
+"""The scheduler's threads, and detection of stalled ones.
 
 A part makes progress with each statement that its thread gets an answer to, and with each end of a round. Rounds may
 take hours (retention, garbage); one statement or one object may not. A part without progress for `STALL_SECONDS` hangs
@@ -45,12 +45,12 @@ class SchedulerComponent(threading.Thread):
         self._in_round = False
 
     def progressed(self, *, in_round: bool = False) -> None:
-        """Note progress; in the middle of a round, no pause between two rounds is due before the next."""
+        """Record progress; within a round, no pause is expected before the next progress."""
         self._ticked = time.monotonic()
         self._in_round = in_round
 
     def silence(self) -> float:
-        """Seconds without progress; below 0 between two rounds."""
+        """Return seconds without progress; below 0 between two rounds."""
         return time.monotonic() - self._ticked - (0.0 if self._in_round else self._between_rounds)
 
     def stalled(self, seconds: float) -> bool:
@@ -59,7 +59,7 @@ class SchedulerComponent(threading.Thread):
 
 
 def note_progress(engine: sa.Engine) -> None:
-    """Let each statement of this engine that was answered count as progress of the part that sent it."""
+    """Count each answered statement of this engine as progress of the component that sent it."""
 
     @event.listens_for(engine, "after_cursor_execute")
     def _answered(*_: Any) -> None:
@@ -75,7 +75,7 @@ def watch(
     seconds: float | None = None,
     look: float | None = None,
 ) -> bool:
-    """Wait until `stopping` is set; return True, after a line in the log, when a part has stalled before that."""
+    """Wait until `stopping` is set; return True, after a line in the log, when a component has stalled before that."""
     seconds, look = seconds or STALL_SECONDS, look or LOOK_SECONDS
     agreed = 0
     while not stopping.wait(look):

@@ -1,5 +1,5 @@
-"""Evaluations go on, and schedules begin them. Every step is a transaction of its own under the lock of one row, which
-another scheduler skips: a second one is harmless, and one that is killed leaves nothing half done."""
+"""Progress of evaluations, and their start by schedules. Every step is a transaction of its own under the lock of one
+row, which another scheduler skips: several schedulers are harmless, and a killed one leaves no partial step."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ FAILED = (ItemState.FAILED, ItemState.DEAD)
 
 
 class Evaluations:
-    """What the scheduler does for evaluations, once a round."""
+    """The scheduler's work on evaluations, once per round."""
 
     def __init__(self, engine: sa.Engine, config: Settings) -> None:
         self._engine = engine
         self._config = config
 
     def round(self) -> None:
-        """Begin what is due, and take every open evaluation as far as it can go now.
+        """Start due evaluations, and advance every open one as far as possible.
 
         Raises:
             Unreachable: the database does not answer.
@@ -59,7 +59,7 @@ class Evaluations:
             self._alone(self._step, evaluation)
 
     def _alone(self, act: Callable[[UUID], None], identifier: UUID) -> None:
-        """Do it; what is wrong with one holds up no other."""
+        """Run an action for one evaluation; its errors do not block the others."""
         try:
             act(identifier)
         except Unreachable:
@@ -86,8 +86,8 @@ class Evaluations:
                 _after_scoring(conn, row)
 
     def _begin(self, conn: sa.Connection, row: EvaluationRow) -> None:
-        """planned → generating; or failed, when what it asks for is not there any more, or is more than its tenant may
-        ever have. It waits for room in a quota."""
+        """planned → generating; or failed, when its inputs no longer exist, or exceed the tenant's quota for good.
+        Waits for free quota."""
         try:
             with conn.begin_nested():  # a submit that is refused half way leaves nothing
                 prompts = None if row.prompts is None else load_prompts(conn, row.tenant, row.prompts)
@@ -114,7 +114,7 @@ class Evaluations:
 
 
 def _after_generation(conn: sa.Connection, row: EvaluationRow) -> None:
-    """generating → scoring, once its job has ended and made enough."""
+    """generating → scoring, once its job has ended with enough motions."""
     job = row.generation
     if job is None:
         _end(conn, row, EvaluationState.FAILED, "the job that made its motions was deleted")
@@ -131,7 +131,8 @@ def _after_generation(conn: sa.Connection, row: EvaluationRow) -> None:
 
 
 def _after_scoring(conn: sa.Connection, row: EvaluationRow) -> None:
-    """scoring → failed, when its job ended without a score; what one ends with takes the evaluation to `done`."""
+    """scoring → failed, when its job ended without a score; a job with a score moves the evaluation to `done`
+    itself."""
     job = row.scoring
     if job is None:
         _end(conn, row, EvaluationState.FAILED, "the job that measured it was deleted")
@@ -154,14 +155,14 @@ def _too_few(conn: sa.Connection, row: EvaluationRow, job: EvaluationJob, missin
 
 
 def _told(error: MareyError) -> str:
-    """An error in a line."""
+    """Return an error as one line."""
     if isinstance(error, InvalidItems):
         return f"{error.total} prompts cannot be made; the first: {error.problems[0]}"
     return f"{error.message}. {error.hint}" if error.hint else error.message
 
 
 def _first_problem(conn: sa.Connection, tenant: str, job: UUID) -> str | None:
-    """Why the first item that failed did."""
+    """Return the reason of the first failed item."""
     failed = list_items(conn, tenant, job, states=FAILED, limit=1).rows
     if not failed:
         return None

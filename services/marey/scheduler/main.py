@@ -1,5 +1,5 @@
-"""`marey scheduler`: relay, sweeper, evaluations, schedules and webhooks in one process. A second one beside it is
-harmless, and so is its death."""
+"""`marey scheduler`: relay, sweeper, evaluations, schedules and webhooks in one process. Several schedulers may run,
+and any may die."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
 
 
 class Presence:
-    """Says in the database that this scheduler works, as long as it does: `marey doctor` and metrics read it."""
+    """Records in the database that this scheduler works; `marey doctor` and metrics read it."""
 
     def __init__(self, engine: sa.Engine, name: str, parts: Sequence[SchedulerComponent]) -> None:
         self._engine = engine
@@ -119,7 +119,7 @@ class Presence:
         self._parts = parts
 
     def tell(self) -> None:
-        """Renew the row, unless a part has made no progress for half of what is allowed.
+        """Renew the row, unless a component has made no progress for half of the allowed time.
 
         Raises:
             Unreachable: the database does not answer.
@@ -139,7 +139,7 @@ def _retire(engine: sa.Engine, name: str) -> None:
 
 
 def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Deliverer]:
-    """None without a key: then the API makes no webhooks."""
+    """Return the webhook deliverer; none without a key: then the API creates no webhooks."""
     sender = Sender(Allowed.of(chosen.webhook_allow), tls=trusting_context(chosen.ca_file))
     if chosen.webhook_key is None:
         log.warning("webhooks_off", reason="MAREY_WEBHOOK_KEY is not set")

@@ -1,4 +1,4 @@
-"""A thread that does one thing every so often, and outlives whatever that does."""
+"""A thread that runs an action periodically, and survives its errors."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Periodic(SchedulerComponent):
             self.progressed()
 
     def once(self) -> None:
-        """One round.
+        """Run one round.
 
         Raises:
             Unreachable: what the action needs is away.

@@ -1,4 +1,4 @@
-"""The relay: tells workers, by hints in Redis, that rows wait in Postgres. Level-triggered: it remembers nothing.
+"""The relay: notifies workers, by hints in Redis, of waiting rows in Postgres. Level-triggered and stateless.
 
 Every half second, and at once on NOTIFY, each queue's list is topped up to min(waiting batches, live workers). A lost
 list (FLUSHALL), a lost hint or a second relay need no special path: the next round looks at the rows again, and a hint
@@ -37,7 +37,7 @@ TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows th
 
 
 class Relay(SchedulerComponent):
-    """One round each `interval` seconds and on each notification, until `stopping`."""
+    """Runs a round each `interval` seconds and on each notification, until `stopping`."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class Relay(SchedulerComponent):
             self._stopping.wait(self._interval)
 
     def round(self) -> dict[str, int]:
-        """Top up every list once; gives how many hints went to which queue.
+        """Top up every list once; return the number of hints by queue.
 
         Raises:
             Unreachable: the database or the queue does not answer.
@@ -117,7 +117,7 @@ class Relay(SchedulerComponent):
 
 
 def publisher(app: Celery) -> Callable[[str], None]:
-    """How to send one hint to a queue, by name: the scheduler imports no worker.
+    """Return a function that sends one hint to a queue, by name: the scheduler imports no worker.
 
     Raises (from what it gives): `Unreachable`, after a bounded number of tries.
     """
@@ -132,7 +132,7 @@ def publisher(app: Celery) -> Callable[[str], None]:
 
 
 def queue_away(error: Exception) -> Unreachable:
-    """The expected error for a broker that does not answer."""
+    """Return the expected error for a broker that does not answer."""
     return Unreachable(
         f"the queue does not answer ({type(error).__name__})",
         where="queue",

@@ -1,4 +1,4 @@
-"""One request to a receiver: to the address that was checked, bounded in time and in bytes, followed nowhere."""
+"""One webhook request: to the validated address, with limits on time and bytes, without redirects."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_ANSWER = 16 * 2**10
 
 
 class Sender:
-    """Sends messages. Nothing is shared between two of them: no connection, no cookie."""
+    """Sends webhook requests. Two requests share nothing: no connection, no cookie."""
 
     def __init__(
         self, allowed: Allowed, *, tls: ssl.SSLContext | None = None, seconds: float = ATTEMPT_SECONDS
@@ -43,7 +43,7 @@ class Sender:
         self._seconds = seconds
 
     async def send(self, url: str, headers: Mapping[str, str], body: bytes) -> Attempt:
-        """POST; how it went. Never raises for what a receiver or the network does."""
+        """POST a message; return the result. Never raises for faults of a receiver or the network."""
         began = time.monotonic()
         status: int | None = None
         wait = 0.0
@@ -59,7 +59,7 @@ class Sender:
         return Attempt(status, time.monotonic() - began, error, wait)
 
     async def _post(self, url: httpx2.URL, headers: Mapping[str, str], body: bytes) -> tuple[int, float]:
-        """The status of the answer, and for how many seconds it asks to be left alone."""
+        """Return the status of the answer, and the delay in seconds that it asks for."""
         client = httpx2.AsyncClient(
             verify=self._tls,
             trust_env=False,  # a proxy would look the name up once more
@@ -76,7 +76,7 @@ class Sender:
     async def _ask(
         self, client: httpx2.AsyncClient, url: httpx2.URL, headers: Mapping[str, str], body: bytes
     ) -> httpx2.Response:
-        """The answer, up to its body. The connection goes to the address that was checked; Host, SNI and certificate
+        """Return the answer, up to its body. The connection goes to the validated address; Host, SNI and certificate
         are those of the name."""
         name = url.raw_host.decode("ascii")
         address = await self._resolve(name, url)
@@ -97,7 +97,7 @@ class Sender:
 
 
 def asked_to_wait(header: str | None, now: datetime | None = None) -> float:
-    """Seconds that a `Retry-After` names, as a number or as a date; 0 for none, and for what makes no sense."""
+    """Return the seconds of a `Retry-After`, a number or a date; 0 for none, and for an invalid one."""
     if header is None:
         return 0.0
     if header.strip().isascii() and header.strip().isdecimal():
@@ -111,7 +111,7 @@ def asked_to_wait(header: str | None, now: datetime | None = None) -> float:
 
 
 async def _drain(response: httpx2.Response) -> None:
-    """Read a short answer, so that the receiver sees an orderly end; leave a long or slow one. Not decompressed."""
+    """Read a short answer, so that the receiver sees an orderly end; abandon a long or slow one. Not decompressed."""
     read = 0
     try:
         async with asyncio.timeout(DRAIN_SECONDS):
@@ -128,7 +128,7 @@ def _refusal(status: int) -> str:
 
 
 def _told(error: Exception) -> str:
-    """A failure in a line, without addresses: the log is the tenant's, the network is not."""
+    """Describe a failure in a line, without addresses: tenants read this log, and the network is internal."""
     what = type(error).__name__
     cause: BaseException | None = error
     while cause is not None:

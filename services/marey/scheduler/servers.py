@@ -1,4 +1,4 @@
-"""Says in the log once when a server behind the scheduler is too old, or the database is not migrated."""
+"""Check that logs once when a server behind the scheduler is too old, or the database is not migrated."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CHECK_SECONDS = 30.0
 
 
 def server_check(engine: sa.Engine, queue_url: str) -> Callable[[], None]:
-    """Make the action of a `Periodic`; it raises `Unreachable` while a server does not answer."""
+    """Return the action of a `Periodic`; it raises `Unreachable` while a server does not answer."""
     known: set[str] = set()
 
     def check() -> None:

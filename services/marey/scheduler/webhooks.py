@@ -1,5 +1,5 @@
-"""Tells webhooks what the outbox holds, in a thread and an event loop of its own: a receiver that is slow, hangs or is
-away keeps a slot, and nothing else, waiting. A second scheduler skips what the first has claimed."""
+"""Webhook delivery from the outbox, in a thread and an event loop of its own: a slow, hanging or unreachable receiver
+blocks one slot only. Several schedulers skip each other's claims."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ Given = TypeVar("Given")
 
 
 class Deliverer(SchedulerComponent):
-    """Looks every `interval` seconds, and whenever a try has ended, until `stopping`."""
+    """Claims deliveries every `interval` seconds, and whenever an attempt has ended, until `stopping`."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class Deliverer(SchedulerComponent):
         await self._end()
 
     async def _pause(self) -> None:
-        """Until a try has ended, or the next look is due."""
+        """Wait until an attempt has ended, or the next claim is due."""
         if self._under_way and not self._away:
             await asyncio.wait(self._under_way, timeout=self._interval, return_when=asyncio.FIRST_COMPLETED)
         else:

@@ -1,4 +1,4 @@
-"""The work of the queue `text`: prompts to graphs and node vectors."""
+"""The handler of the queue `text`: prompts to graphs and node vectors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class TextHandler:
         self._pipeline: TextPipeline | None = None
 
     def load(self, bundle: str) -> None:
-        """Make ready what reads prompts for `bundle`; bundles of one specification share it.
+        """Load the text pipeline of `bundle`; bundles of one specification share it.
 
         Raises:
             NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or not the one it names.
@@ -39,11 +39,11 @@ class TextHandler:
         self._pipeline = self._pipelines[spec]
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
-        """All together: texts are encoded one by one anyway."""
+        """Return one bucket: texts are encoded one by one anyway."""
         return [batch.items]
 
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
-        """The features of each prompt, as soon as they are made."""
+        """Yield the features of each prompt, as soon as they are made."""
         assert self._pipeline is not None  # the loop loads before it runs
         self._pipeline.prefetch([item.prompt for item in batch.items if item.id not in control.dropped()])
         for done, item in enumerate(batch.items, 1):
@@ -54,7 +54,8 @@ class TextHandler:
 
 
 def _outcome(pipeline: TextPipeline, item: ClaimedItem) -> Outcome:
-    """The features of one item under the key it was submitted with, which promises weights: the key is checked."""
+    """Return the features of one item under the key it was submitted with; the key, which promises weights, is
+    checked."""
     try:
         if pipeline.key(item.prompt) != item.text_key:
             raise InvalidBundle(
@@ -68,5 +69,5 @@ def _outcome(pipeline: TextPipeline, item: ClaimedItem) -> Outcome:
 
 
 def create_handler() -> TextHandler:
-    """What a worker's child makes."""
+    """Create the handler in a worker's child."""
     return TextHandler()

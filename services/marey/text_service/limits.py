@@ -1,4 +1,4 @@
-"""Limit on how much text is parsed at once."""
+"""Limit on the amount of text parsed at once."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class WordLimit:
 
     @property
     def in_flight(self) -> int:
-        """Words being parsed now."""
+        """Number of words being parsed now."""
         return self._words
 
     def take(self, prompts: Sequence[str]) -> Ticket:
@@ -62,6 +62,6 @@ class WordLimit:
         return Ticket(self, words)
 
     def give_back(self, words: int) -> None:
-        """Stop counting these."""
+        """Subtract words of a finished request."""
         with self._lock:
             self._words -= words

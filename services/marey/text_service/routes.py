@@ -81,7 +81,7 @@ class GraphView(BaseModel):
 
 
 class GraphsView(BaseModel):
-    """A graph a prompt, in the order given."""
+    """One graph per prompt, in the order given."""
 
     items: list[GraphView]
 
@@ -94,7 +94,7 @@ def parse_prompts(body: ParseBody) -> GraphsView:
 
 
 def text_router(config: Settings) -> APIRouter:
-    """The route of the text service.
+    """Return the route of the text service.
 
     Args:
         config: its `text_key` is the secret that a request must show.
@@ -135,7 +135,7 @@ def text_router(config: Settings) -> APIRouter:
 
 
 class _Work:
-    """One request in a thread. It counts as in flight until the thread is done, also when nobody waits for it."""
+    """One request in a thread. It counts as in flight until the thread is done, even after the client disconnected."""
 
     def __init__(self, body: ParseBody, ticket: Ticket) -> None:
         self._body, self._ticket, self._started = body, ticket, False
@@ -146,19 +146,19 @@ class _Work:
             return parse_prompts(self._body)
 
     def forget(self) -> None:
-        """Give its share back if no thread has it."""
+        """Release its share if no thread has started it."""
         if not self._started:
             self._ticket.release()
 
 
 def too_late(seconds: float) -> Unreachable:
-    """The error of a request that took too long."""
+    """Return the error of a request that took too long."""
     message = f"the prompts were not parsed within {seconds:g} s"
     return Unreachable(message, where="prompts", hint="Send fewer at a time.", public=message)
 
 
 def pipeline_of(model: str) -> TextPipeline:
-    """What reads prompts for a model or bundle.
+    """Return the text pipeline of a model or bundle.
 
     Raises:
         InvalidInput: it reads none.
@@ -172,7 +172,7 @@ def pipeline_of(model: str) -> TextPipeline:
 
 
 def load_pipeline(spec: TextSpec) -> TextPipeline:
-    """The pipeline of a bundle's text specification, loaded once a process."""
+    """Return the pipeline of a bundle's text specification, loaded once per process."""
     from marey.text.pipeline import TextPipeline
 
     served = as_served(spec)

@@ -33,7 +33,7 @@ log = structlog.get_logger(__name__)
 
 
 def create_text_app(config: Settings, *, preload: bool = True) -> FastAPI:
-    """Make the application of the text service.
+    """Create the application of the text service.
 
     Args:
         preload: load what the bundles here need as soon as it starts; `/readyz` answers 503 until then.
@@ -91,7 +91,7 @@ def serve_text(path: Path | None = None) -> None:
 
 @contextlib.contextmanager
 def _unix_socket(path: Path) -> Iterator[socket.socket]:
-    """A listening socket that its owner alone can open."""
+    """Open a listening socket that only its owner can use."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listening:
         path.unlink(missing_ok=True)
         before = os.umask(0o177)
@@ -105,7 +105,7 @@ def _unix_socket(path: Path) -> Iterator[socket.socket]:
 
 
 def _preload(config: Settings, loaded: threading.Event) -> None:
-    """Load the pipeline of each bundle. One that cannot be loaded is told when it is asked for."""
+    """Load the pipeline of each bundle. A broken bundle is reported when it is requested."""
     try:
         for bundle in list_bundles(config=config, kind="generator"):
             if bundle.manifest.text is not None:

@@ -1,4 +1,4 @@
-"""The Celery app: every process that publishes or consumes hints makes it here, with the same settings.
+"""The Celery app: every process that publishes or consumes hints creates it here, with the same settings.
 
 A message is only a hint that a queue has work; the rows in Postgres are the truth. Losing one, or getting one twice,
 must not matter, and each setting below is there because something that did matter went wrong without it.
@@ -40,7 +40,7 @@ PUBLISH_RETRY = {"max_retries": 2, "interval_start": 0.1, "interval_step": 0.2, 
 
 
 def transport_options() -> dict[str, Any]:
-    """Options of the Redis transport, shared by workers and publishers."""
+    """Return options of the Redis transport, shared by workers and publishers."""
     return {
         "visibility_timeout": VISIBILITY_TIMEOUT,
         # The restore sweep runs only every ~100 s by default (kombu #2558).
@@ -56,7 +56,7 @@ def transport_options() -> dict[str, Any]:
 
 
 class QueueConnection(Connection):
-    """A broker connection with pauses between tries that stay short."""
+    """Broker connection with short pauses between retries."""
 
     def ensure_connection(self, *args: Any, **options: Any) -> Any:
         """See `kombu.Connection`. Celery's consumer passes no pauses, and has no setting for them."""
@@ -65,13 +65,13 @@ class QueueConnection(Connection):
 
 
 class QueueAMQP(AMQP):
-    """Celery's way to the broker, by `QueueConnection`."""
+    """Celery's AMQP that uses `QueueConnection`."""
 
     Connection = QueueConnection
 
 
 def create_app(queue_url: str) -> Celery:
-    """The app on `queue_url` (`redis://…`, `rediss://…` or `redis+socket:///path`). Connects to nothing yet."""
+    """Create the app on `queue_url` (`redis://…`, `rediss://…` or `redis+socket:///path`). Does not connect yet."""
     app = Celery("marey", broker=queue_url, amqp=f"{__name__}:{QueueAMQP.__name__}", include=["marey.runtime.tasks"])
     app.conf.update(
         broker_transport_options=transport_options(),

@@ -1,4 +1,4 @@
-"""The one child of a worker: handlers, threads and connections, made after the spawn and kept until the end."""
+"""The one child of a worker: handlers, threads and connections, created after the spawn and kept until the end."""
 
 from __future__ import annotations
 
@@ -95,12 +95,12 @@ class Child:
 
     @classmethod
     def of_environment(cls) -> Child:
-        """The child its parent described."""
+        """Create the child that the parent's environment describes."""
         role = Role(**json.loads(os.environ[ROLE_VARIABLE]))
         return cls(role, os.environ[NAME_VARIABLE], settings())
 
     def start(self) -> None:
-        """Start the threads, load what is to be loaded, and say that this worker is ready.
+        """Start the threads, preload models, and report the worker as ready.
 
         Raises: whatever a handler raises on loading.
         """
@@ -121,12 +121,12 @@ class Child:
         log.info("ready", worker=self._name, queues=list(self._role.handlers))
 
     def drain(self) -> int:
-        """Serve the queues; gives the number of items claimed."""
+        """Serve the queues; return the number of claimed items."""
         self._tick()
         return self._drain.drain(self._settings.drain_seconds)
 
     def stop(self) -> None:
-        """Give everything back and say good-bye."""
+        """Release all leases and remove the worker's row."""
         self._stopping.set()
         self._ready = False
         self._committer.wait_until_idle(5.0)
@@ -162,7 +162,7 @@ class Child:
         write_status(self._settings.home, self._name, WorkerStatus(os.getpid(), self._ready, age, time.time()))
 
     def _present(self) -> None:
-        """Tell the relay (by row) and probes (by file) that this worker lives."""
+        """Report that this worker is alive: to the relay by row, to probes by file."""
         measure_gpu()
         try:
             if self._ready and not self._stopping.is_set():

@@ -1,4 +1,4 @@
-"""The store thread: exports, stores and commits the results of one batch while the next one runs."""
+"""The committer thread: exports, stores and commits the results of one batch while the next one runs."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ WENT = {
 
 @dataclass(frozen=True)
 class _Finish:
-    """The handler is through with this lease; `reason` says why items without an outcome go back."""
+    """The handler is done with this lease; `reason` says why items without an outcome are released."""
 
     reason: str
 
@@ -75,7 +75,7 @@ _Result: TypeAlias = _Exported | TextDone | Scored | Failed
 
 
 class Committer(threading.Thread):
-    """Takes outcomes in, writes them down. Every write is fenced; what is not ours any more is thrown away.
+    """Queues outcomes and writes them. Every write is fenced; lost results are discarded.
 
     A worker told to stop waits for nobody: what it cannot write at the next try goes back.
 
@@ -97,34 +97,34 @@ class Committer(threading.Thread):
     # --- the loop's side ---
 
     def acquire_slot(self) -> None:
-        """Wait until another lease may be taken."""
+        """Wait until another lease may be claimed."""
         self._slots.acquire()
         with self._idle:
             self._pending += 1
 
     def release_slot(self) -> None:
-        """Give back an `acquire_slot` for which there was nothing to claim."""
+        """Release a slot for which there was nothing to claim."""
         with self._idle:
             self._pending -= 1
             self._idle.notify_all()
         self._slots.release()
 
     def put(self, lease: HeldLease, outcome: Outcome) -> None:
-        """Hand over one outcome."""
+        """Queue one outcome."""
         self._inbox.put((lease, outcome))
 
     def finish(self, lease: HeldLease, reason: str) -> None:
-        """No more outcomes of this lease: items without one go back, at no cost, with `reason`."""
+        """End the outcomes of this lease: items without one are released uncounted, with `reason`."""
         lease.hand_over()
         self._inbox.put((lease, _Finish(reason)))
 
     def wait_until_idle(self, timeout: float) -> bool:
-        """Whether everything handed over was written within `timeout` seconds."""
+        """Return True if everything queued was written within `timeout` seconds."""
         with self._idle:
             return self._idle.wait_for(lambda: self._pending == 0, timeout)
 
     def close(self) -> None:
-        """End the thread after what it has."""
+        """End the thread after its queue is empty."""
         self._inbox.put(None)
 
     # --- the thread's side ---
@@ -155,7 +155,7 @@ class Committer(threading.Thread):
         return message if message is not None else self._inbox.get()
 
     def _group(self, lease: HeldLease, first: Outcome) -> list[_Result]:
-        """`first` and what follows of the same lease, exported: as much as is there, within bounds."""
+        """Collect `first` and the queued outcomes of the same lease, exported, within bounds."""
         until = time.monotonic() + GROUP_SECONDS
         group = [self._export(lease, first)]
         while len(group) < GROUP and time.monotonic() < until:
@@ -172,7 +172,7 @@ class Committer(threading.Thread):
         return [outcome for outcome in group if outcome is not None]
 
     def _export(self, lease: HeldLease, outcome: Outcome) -> _Result | None:
-        """Make the files of a `Done`; None when nobody wants it any more."""
+        """Make the files of a `Done`; None if the result is no longer wanted."""
         if outcome.item in lease.lost:
             return None
         if not isinstance(outcome, Done):
@@ -190,7 +190,7 @@ class Committer(threading.Thread):
         return _Exported(outcome.item, export, outcome.elapsed, _digested(export.files))
 
     def _write_or_fail(self, lease: HeldLease, group: Sequence[_Result]) -> None:
-        """Write; a bug in there costs the items an attempt, so that it cannot go round for ever."""
+        """Write a group; a bug costs the items an attempt, so that it cannot repeat for ever."""
         try:
             self._write(lease, group)
         except Unreachable:
@@ -243,7 +243,7 @@ class Committer(threading.Thread):
     def _store_files(
         self, lease: HeldLease, items: Sequence[UUID], files: Sequence[tuple[ExportedFile, AssetDigest]]
     ) -> bool:
-        """Announce and PUT what these items left; False when they are not ours any more, or were given back."""
+        """Announce and upload the files of these items; return False if they were lost or released."""
         digests = list({digest.sha256: digest for _, digest in files}.values())
         token = lease.claim.lease_token
 

@@ -1,4 +1,4 @@
-"""Where a worker or the scheduler tells Prometheus its numbers. The API has a route for that."""
+"""Prometheus endpoint of workers and the scheduler. The API has a route for that."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ log = logger(__name__)
 
 
 def expose(part: str, chosen: Settings) -> None:
-    """Answer at `MAREY_METRICS_HOST` and `MAREY_METRICS_PORT` until the process ends; where no port is set, nowhere.
+    """Serve metrics at `MAREY_METRICS_HOST` and `MAREY_METRICS_PORT` until the process ends; disabled if no port is
+    set.
 
     A worker's child does so, not its parent: the numbers are where the work is, and stand there once.
 
@@ -39,7 +40,7 @@ def expose(part: str, chosen: Settings) -> None:
 
 
 def measure_gpu() -> None:
-    """Note how full the devices are that are used; nothing where torch was not imported, or uses none."""
+    """Record the memory use of the devices; does nothing if torch was not imported or uses none."""
     torch = sys.modules.get("torch")
     if torch is None or not torch.cuda.is_available() or not torch.cuda.is_initialized():
         return

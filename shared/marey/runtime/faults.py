@@ -1,4 +1,4 @@
-"""Telling faults apart: what to retry, what to halve, what a child does not survive."""
+"""Classification of faults: retry the items, halve the batch, or end the child."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.2, 2.0  # seconds between tries, doubling with ji
 
 
 class HandlerError(MareyError):
-    """The handler broke: a bug or a broken machine, not the prompt's fault as far as anyone knows."""
+    """A fault of the handler: a bug or a broken machine, not known to be caused by the prompt."""
 
     problem_type = "handler-error"
 
 
 class OutOfMemory(HandlerError):
-    """Even alone, the item does not fit into the memory of its worker."""
+    """An item that does not fit into the worker's memory even alone."""
 
     problem_type = "out-of-memory"
 
 
 def retry_unreachable(action: Callable[[], T], *, seconds: float, stopping: threading.Event | None = None) -> T:
-    """Call `action` until it does not raise `Unreachable`, for at most `seconds`; then raise the last one.
+    """Call `action` until it does not raise `Unreachable`, for at most `seconds`; then raise the last error.
 
     With `stopping`, a worker told to stop makes one more try and gives up.
     """
@@ -51,7 +51,7 @@ def retry_unreachable(action: Callable[[], T], *, seconds: float, stopping: thre
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Whether a smaller batch may help. Asks torch only where the handler has imported it."""
+    """Return True if a smaller batch may help. Asks torch only if the handler has imported it."""
     if isinstance(error, MemoryError):
         return True
     torch = sys.modules.get("torch")
@@ -62,14 +62,16 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def is_device_lost(error: BaseException) -> bool:
-    """Whether the accelerator's context is gone: every later call in this process fails, so the child must end."""
+    """Return True if the accelerator's context is gone: every later call in this process fails, so the child must
+    end."""
     torch = sys.modules.get("torch")
     accelerator_error = getattr(torch, "AcceleratorError", None)
     return accelerator_error is not None and isinstance(error, accelerator_error)
 
 
 def as_problem(error: Exception) -> MareyError:
-    """What an item's owner is told. The text of an unexpected exception stays in the log: it may quote the prompt."""
+    """Convert an error to the one that the item's owner sees. The text of an unexpected exception stays in the log: it
+    may quote the prompt."""
     if isinstance(error, MareyError):
         return error
     if is_out_of_memory(error):

@@ -1,4 +1,4 @@
-"""What the claim loop knows of the work it does: one protocol and the data that crosses it.
+"""The interface between the claim loop and handlers: one protocol and its data types.
 
 A handler turns claimed items into outcomes. It never sees the database, the queue or the store: the loop claims,
 keeps the lease alive, stores files, commits, releases and retries. The rules a handler may rely on:
@@ -27,7 +27,7 @@ from marey.runtime.scoring import ScoreInput
 
 @dataclass(frozen=True)
 class Batch:
-    """Claimed items to run together, all of one bundle and the same settings, with what they need from the tables."""
+    """Claimed items to run together, all of one bundle and the same settings, with their inputs from the tables."""
 
     claim: Claim
     items: tuple[ClaimedItem, ...]
@@ -51,7 +51,7 @@ class ExportedFile:
 
 @dataclass(frozen=True)
 class Export:
-    """What a finished item leaves behind: its files and the columns of its motion row."""
+    """Result of a finished item: its files and the columns of its motion row."""
 
     files: tuple[ExportedFile, ...]
     frames: int
@@ -102,7 +102,7 @@ class Scored:
 
 @dataclass(frozen=True)
 class Failed:
-    """An item that has no result. `retryable`: it runs again after a pause; else it ends `failed`, now."""
+    """An item without a result. If `retryable`, it runs again after a pause; else it ends as `failed` now."""
 
     item: UUID
     problem: MareyError
@@ -113,20 +113,20 @@ Outcome: TypeAlias = Done | TextDone | Scored | Failed
 
 
 class BatchControl(Protocol):
-    """The loop's side of a running batch; both methods cost microseconds and may be called at every decode step."""
+    """Control of a running batch; both methods cost microseconds and may be called at every decode step."""
 
     def progress(self, done: int, total: int) -> None:
-        """Say that the batch is alive: `done` of `total` steps. A batch silent for 120 s loses its lease."""
+        """Report progress: `done` of `total` steps. A batch silent for 120 s loses its lease."""
         ...
 
     def dropped(self) -> frozenset[UUID]:
-        """Items whose result nobody wants any more: cancelled, or all of them when the lease is lost or the
-        worker is told to stop. Leave their rows out of the next step; return when none is left."""
+        """Return items whose result is no longer wanted: cancelled ones, or all of them when the lease is lost or the
+        worker stops. Leave their rows out of the next step; return when none is left."""
         ...
 
 
 class Handler(Protocol):
-    """The work of one queue. Made in the worker's child; the parent never imports its module."""
+    """The work of one queue. Created in the worker's child; the parent never imports its module."""
 
     queue: str
     """`hgm3`, `text`: which items it claims."""
@@ -134,14 +134,14 @@ class Handler(Protocol):
     """Items of one claim, at most."""
 
     def load(self, bundle: str) -> None:
-        """Make `bundle` ready to run; may take minutes (its lease is kept alive). Called when the bundle changes.
+        """Load `bundle`; may take minutes (its lease is kept alive). Called when the bundle changes.
 
         Raises: `InvalidBundle`, `NotFound`: every claimed item of that bundle fails with the message.
         """
         ...
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
-        """The items of a claim in the order and grouping to run them: one forward a group, every item once."""
+        """Order and group the items of a claim for `run`: one forward pass per group, every item once."""
         ...
 
     def run(self, batch: Batch, control: BatchControl) -> Iterator[Outcome]:
@@ -154,7 +154,7 @@ HandlerFactory: TypeAlias = Callable[[], Handler]
 
 @dataclass(frozen=True)
 class Role:
-    """What one worker process serves: its name and the handlers of its one child, served in turns.
+    """The handlers of one worker process, served in turns by its one child.
 
     `handlers` maps a queue to `module:attribute` of a `HandlerFactory`, a string, so that only the child imports it.
     """

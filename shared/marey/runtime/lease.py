@@ -1,4 +1,4 @@
-"""Leases of this process: a thread renews them and learns what was cancelled or lost."""
+"""Leases of this process: a thread renews them and learns of cancelled and lost items."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Renew = Callable[[UUID, Collection[UUID], bool], HeartbeatReply]
 
 
 class HeldLease:
-    """A claim being worked on: what the handler tells the heartbeat and what the heartbeat tells the handler.
+    """A claim in progress: shared state of the handler and the heartbeat.
 
     It is the `BatchControl` of `marey.runtime.handler`. Its state is a few attributes replaced as a whole, so the
     decode loop pays no lock.
@@ -44,49 +44,49 @@ class HeldLease:
         self._taken_up = False
 
     def progress(self, done: int, total: int) -> None:
-        """`done` of `total` steps: the batch is alive."""
+        """Record progress: `done` of `total` steps."""
         self._moved = True
         self._moved_at = time.monotonic()
         self._exempt = False
 
     def dropped(self) -> frozenset[UUID]:
-        """Items whose result nobody wants; all of them when the worker stops or the lease is lost."""
+        """Return items whose result is no longer wanted; all of them when the worker stops or the lease is lost."""
         return self._everything if self._stopping.is_set() else self._gone
 
     @property
     def lost(self) -> frozenset[UUID]:
-        """Items that are no longer ours: a result for them is thrown away."""
+        """Return items that are no longer under this lease: their results are discarded."""
         return self._gone
 
     @property
     def open(self) -> frozenset[UUID]:
-        """Items neither committed, failed nor released, and still ours as far as we know."""
+        """Return items that are neither committed, failed nor released, and still leased as far as known."""
         return self._open - self._gone
 
     def settle(self, items: Iterable[UUID]) -> None:
-        """These items are written, or known not to be ours: the heartbeat asks no more about them."""
+        """Mark items as written or lost: the heartbeat no longer includes them."""
         self._open = self._open - frozenset(items)
 
     def exempt(self) -> None:
-        """Loading and the first compile may be silent for minutes; ends with the next `progress`."""
+        """Allow silence: loading and the first compile may take minutes. Ends with the next `progress`."""
         self._exempt = True
 
     def stuck(self, seconds: float) -> bool:
-        """Whether nothing is ours any more and the batch has not moved for so long: it will not notice by itself."""
+        """Return True if every item was lost and the batch has stalled: it will not notice by itself."""
         silent = time.monotonic() - self._moved_at
         return self._gone >= self._everything and not self._excused and silent > seconds
 
     def take_progress(self) -> bool:
-        """Whether the batch moved since the last call (or need not)."""
+        """Return True if the batch moved since the last call (or is exempt)."""
         moved, self._moved = self._moved or self._excused, False
         return moved
 
     def hand_over(self) -> None:
-        """The handler is through. Until `take_up` the batch waits for what is stored before it, and may be silent."""
+        """Mark the handler as done. Until `take_up` the batch waits for the results before it, and may be silent."""
         self._handed_over = True
 
     def take_up(self) -> None:
-        """Its results are being written now: from here on silence counts again."""
+        """Mark the start of writing its results: from here on silence counts again."""
         self._taken_up = True
         self.progress(0, 0)
 
@@ -95,13 +95,13 @@ class HeldLease:
         return self._exempt or (self._handed_over and not self._taken_up)
 
     def learn(self, answer: HeartbeatReply) -> None:
-        """Take in what the database said."""
+        """Apply the database's reply."""
         self._gone = self._everything if answer.lost else self._gone | answer.gone
 
 
 class Heartbeat(threading.Thread):
-    """Renews every held lease each `interval` seconds, on its own connection, and looks each second in between whether
-    something was taken away: what is cancelled leaves the batch within two seconds, a step of decoding included.
+    """Renews every held lease each `interval` seconds, on its own connection, and polls each second in between for lost
+    items: cancelled items leave the batch within two seconds, a decode step included.
 
     A batch that is silent for too long is not renewed: the database measures that, by its own clock. While the database
     is away nothing is given up here: the fence decides at the commit.
@@ -141,7 +141,7 @@ class Heartbeat(threading.Thread):
         return lease
 
     def let_go(self, lease: HeldLease) -> None:
-        """Stop renewing; the caller has written every item, or given up on them."""
+        """Stop renewing; the caller has written or given up every item."""
         self._held.pop(lease.claim.lease_token, None)
 
     def run(self) -> None:
@@ -161,7 +161,7 @@ class Heartbeat(threading.Thread):
             due = time.monotonic() + (self._interval if renewed else min(self._interval, AGAIN_SECONDS))
 
     def close(self) -> None:
-        """End the thread; leases still held run out by themselves."""
+        """End the thread; leases still held expire by themselves."""
         self._closed.set()
 
     def _end_stuck(self) -> None:
@@ -172,12 +172,12 @@ class Heartbeat(threading.Thread):
                 self._stuck()
 
     def _pause(self, due: float) -> float:
-        """Seconds until there is something to do."""
+        """Return seconds until the next action."""
         left = max(due - time.monotonic(), 0.0)
         return left if self._held_by is None else min(left, self._look_seconds)
 
     def look(self) -> None:
-        """Learn what was taken away, without renewing anything. Outages are the heartbeat's to tell of."""
+        """Poll for lost items, without renewing anything. Outages are reported by renewals."""
         if self._held_by is None:
             return
         for token, lease in list(self._held.items()):

@@ -37,8 +37,8 @@ def _add_service(service: str) -> Processor:
 
 
 def _brief_traceback(exc_info: ExcInfo) -> str:
-    """The calls, and the first line of each message: no local variables, no DETAIL of a database error, which quotes
-    the row, prompt and all."""
+    """Return the calls, and the first line of each message: no local variables, no DETAIL of a database error, which
+    quotes the row with its prompt."""
     parts: list[str] = []
     error: BaseException | None = exc_info[1]
     while error is not None:
@@ -53,7 +53,7 @@ def _write_traceback(stream: TextIO, exc_info: ExcInfo) -> None:
 
 
 def _escape_values(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
-    """Values as a terminal may show them; the renderer writes texts as they are, and everything else by `repr`."""
+    """Escape values for a terminal; the renderer writes strings as they are, and everything else by `repr`."""
     return {name: escape(value, lines=False) if isinstance(value, str) else value for name, value in event.items()}
 
 
@@ -102,5 +102,5 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
 
 
 def logger(name: str) -> BoundLogger:
-    """A logger of `name`; call it with an event and keywords: `log.info("claimed", items=32)`."""
+    """Return a logger of `name`; call it with an event and keywords: `log.info("claimed", items=32)`."""
     return structlog.stdlib.get_logger(name)

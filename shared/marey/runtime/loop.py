@@ -1,4 +1,4 @@
-"""The claim loop: claim, split into buckets, run, hand over; until nothing is left, the time is up or a stop comes."""
+"""The claim loop: claim, split into buckets, run, hand over; until no work is left, the time is up or a stop comes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CLAIM_PATIENCE = 30.0  # seconds without a database until a drain gives up; the 
 
 @dataclass(frozen=True)
 class Loaded:
-    """What a handler has ready: the bundle and the lane it last served."""
+    """State of a handler: loaded bundle and last served lane."""
 
     bundle: str
     batch_key: str
@@ -86,7 +86,7 @@ class Drain:
         self.loaded: dict[str, Loaded] = {}
 
     def drain(self, seconds: float) -> int:
-        """Work until no queue has anything, `seconds` are over or a stop comes; every result is written at the end.
+        """Work until all queues are empty, `seconds` are over or a stop comes; every result is written at the end.
 
         Returns: how many items were claimed.
 
@@ -106,7 +106,7 @@ class Drain:
         return claimed
 
     def load(self, queue: str, bundle: str, batch_key: str = "") -> None:
-        """Make `bundle` ready on the handler of `queue`, if it is not.
+        """Load `bundle` on the handler of `queue`, if it is not loaded.
 
         Raises: whatever the handler raises.
         """
@@ -163,7 +163,7 @@ class Drain:
         return None
 
     def _run_claim(self, lease: HeldLease) -> str:
-        """Run every bucket of a claim; gives the reason for which items without an outcome go back."""
+        """Run every bucket of a claim; return the reason for which items without an outcome are released."""
         taken = lease.claim
         handler = self._handlers[taken.queue]
         try:
@@ -194,7 +194,7 @@ class Drain:
         return error.message
 
     def _batch(self, lease: HeldLease) -> Batch:
-        """The claim with its text features, or what it scores; items that lack features fail, retryably."""
+        """Return the claim with its text features, or its scoring input; items that lack features fail, retryably."""
         taken = lease.claim
         if taken.stage is Stage.TEXT:
             return Batch(taken, taken.items, {})
@@ -216,7 +216,7 @@ class Drain:
         return Batch(taken, tuple(item for item in taken.items if item.text_key in features), features)
 
     def _run_bucket(self, lease: HeldLease, handler: Handler, batch: Batch) -> None:
-        """Run items together; when that fails, halve, so that one of them cannot fail the others."""
+        """Run items together; on failure halve the bucket, so that one item cannot fail the others."""
         dropped = lease.dropped()
         batch = replace(batch, items=tuple(item for item in batch.items if item.id not in dropped))
         if not batch.items:

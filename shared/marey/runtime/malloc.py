@@ -1,4 +1,4 @@
-"""How glibc's `malloc` shares memory among the threads of a process."""
+"""Settings of glibc's `malloc` for processes with many threads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SAID = ("MALLOC_ARENA_MAX", "GLIBC_TUNABLES")
 
 
 def one_heap() -> None:
-    """Let all threads take memory from one heap; for a server of many threads, before it starts them.
+    """Share one heap among all threads; for a server of many threads, before it starts them.
 
     glibc gives threads heaps of their own, eight for each core. What one thread made and another let go of leaves holes
     there, and each heap keeps what its largest request once took: a server with forty threads that come and go grows

@@ -1,4 +1,4 @@
-"""The one place that makes Redis clients: each has a deadline for every call, and drops what fell silent."""
+"""The only place that creates Redis clients: each call has a deadline, and silent connections are dropped."""
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 from __future__ import annotations
@@ -20,7 +20,7 @@ SOCKET_SCHEME = "redis+socket://"
 
 
 class _OneRetry(Retry):
-    """One more try, at once, on a fresh connection; after a missed deadline every idle connection is closed too.
+    """One retry, at once, on a fresh connection; after a missed deadline every idle connection is closed too.
 
     Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
     cost its next user a deadline. A longer wait is the caller's to make: it knows whom to tell meanwhile.
@@ -58,7 +58,8 @@ def redis_client(
     connect_timeout: float = CONNECT_TIMEOUT,
     max_connections: int | None = None,
 ) -> redis.Redis:
-    """Make a client of `redis://…`, `rediss://…` or `redis+socket:///path` (kombu's spelling; redis-py says `unix://`).
+    """Create a client of `redis://…`, `rediss://…` or `redis+socket:///path` (kombu's spelling; redis-py says
+    `unix://`).
 
     A call on a connection that fell silent is answered after one deadline, by a new connection; where that is silent
     too, redis-py raises its TimeoutError after two. Options in the URL override those given here.

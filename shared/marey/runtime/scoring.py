@@ -1,4 +1,4 @@
-"""What a score item is measured on: a port to the motions that an evaluation made, without database or store."""
+"""Input of a score item: the motions of an evaluation, independent of database and store."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ class ScoreInput:
 
     @property
     def previous(self) -> EarlierRun | None:
-        """The last of `history`."""
+        """Last run of `history`."""
         return self.history[-1] if self.history else None
 
     def npz(self, item: MadeItem) -> bytes:
-        """The npz of an item's motion, read now; safe to call from several threads.
+        """Read the npz of an item's motion; safe to call from several threads.
 
         Raises:
             NotFound: it has none, or the store has lost it.
@@ -58,7 +58,7 @@ class ScoreInput:
 
 
 def score_input(engine: sa.Engine, store: AssetStore, job: UUID) -> ScoreInput:
-    """What the score item of this job is measured on.
+    """Return the input of a job's score item.
 
     Raises:
         NotFound, Conflict: as `load_score`.

@@ -1,4 +1,4 @@
-"""How a process without Celery is told to stop."""
+"""Stop signals of processes without Celery."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What a worker says of itself to probes: `home/run/worker-NAME.json`, written by its child every few seconds. Live
-workers and the scheduler say the same, each by a `StatusReporter`.
+"""Status files for probes: `home/run/worker-NAME.json`, written every few seconds by a worker's child, by live workers
+and by the scheduler.
 
 `marey probe` reads them: the liveness probe of a machine's workers, with `ready` the readiness probe.
 """
@@ -27,7 +27,7 @@ TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the 
 
 @dataclass(frozen=True)
 class WorkerStatus:
-    """State of one child."""
+    """Status of one process."""
 
     pid: int
     ready: bool
@@ -41,17 +41,17 @@ class WorkerStatus:
     """Why the child could not start; its parent ends then."""
 
     def alive(self, now: float) -> bool:
-        """Whether a liveness probe should pass: its threads beat, and hints reach it."""
+        """Return True if a liveness probe should pass: its threads beat, and hints reach it."""
         return now - self.written < FRESH and (not self.ready or self.tick_age < TICK_LIMIT)
 
 
 def status_file(home: Path, name: str) -> Path:
-    """Where the worker `name` keeps its status."""
+    """Return the status file of the worker `name`."""
     return home / "run" / f"worker-{name}.json"
 
 
 def read_status(home: Path, name: str) -> WorkerStatus | None:
-    """The status of the worker `name`; None where there is none (yet)."""
+    """Return the status of the worker `name`; None if there is none (yet)."""
     return _read(status_file(home, name))
 
 
@@ -66,7 +66,7 @@ def write_status(home: Path, name: str, status: WorkerStatus) -> None:
 
 
 def check_health(home: Path, *, ready: bool = False, now: float | None = None) -> None:
-    """Check the processes of this machine that keep a status: at least one is there, and none is stuck.
+    """Check the processes of this machine that keep a status: at least one exists, and none is stuck.
 
     Args:
         ready: their models are loaded too.
@@ -87,7 +87,7 @@ def check_health(home: Path, *, ready: bool = False, now: float | None = None) -
 
 
 def forget_dead(home: Path) -> None:
-    """Remove what killed workers of this machine left behind."""
+    """Remove status files of killed workers of this machine."""
     for path, status in _of_this_host(home):
         if not psutil.pid_exists(status.pid):
             path.unlink(missing_ok=True)
@@ -117,7 +117,7 @@ class StatusReporter(threading.Thread):
 
 
 def _of_this_host(home: Path) -> Iterator[tuple[Path, WorkerStatus]]:
-    """Containers may share a home; each looks after its own."""
+    """Return the statuses of this host. Containers may share a home; each checks its own."""
     host = socket.gethostname()
     for path in (home / "run").glob("worker-*.json"):
         status = _read(path)

@@ -1,4 +1,4 @@
-"""The notification protocol of systemd: a service says when it serves, and that it still lives.
+"""The notification protocol of systemd: readiness and watchdog messages of a service.
 
 `Type=notify` and `WatchdogSec=` of a unit set `NOTIFY_SOCKET` and `WATCHDOG_USEC`; without them nothing is sent.
 """
@@ -33,7 +33,7 @@ def notify(message: str) -> bool:
 
 
 def watchdog_seconds() -> float | None:
-    """Return after how many seconds of silence the manager ends this process; None = never."""
+    """Return the seconds of silence after which the manager ends this process; None = never."""
     given = os.environ.get("WATCHDOG_USEC", "")
     for_us = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(given) / 1e6 if given.isdecimal() and int(given) > 0 and for_us else None
@@ -41,7 +41,7 @@ def watchdog_seconds() -> float | None:
 
 @contextlib.asynccontextmanager
 async def notified() -> AsyncGenerator[None]:
-    """Tell the manager that this event loop serves, and that it still turns, until the end of the block."""
+    """Notify the manager that this event loop is ready, and then that it is alive, until the end of the block."""
     notify(READY)
     seconds = watchdog_seconds()
     task = None if seconds is None else asyncio.create_task(_feed(seconds / 3), name="watchdog")

@@ -1,4 +1,4 @@
-"""What Celery imports in a worker: the one task, and the child behind it."""
+"""The Celery task of a worker, and the child behind it."""
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUntypedFunctionDecorator=false
 # pyright: reportUnknownVariableType=false
 
@@ -25,7 +25,7 @@ _child: Child | None = None
 
 @worker_process_init.connect
 def _start(**_: object) -> None:
-    """Make the child, or end it and its parent: a worker that cannot load its model must not take hints."""
+    """Start the child, or end it and its parent: a worker that cannot load its model must not take hints."""
     global _child
     try:
         _child = Child.of_environment()
@@ -47,7 +47,7 @@ def _stop(**_: object) -> None:
 
 @shared_task(name=DRAIN, ignore_result=True)
 def drain(queue: str) -> None:
-    """A hint that `queue` has work. The child serves all its queues, in its own order."""
+    """Handle a hint that `queue` has work. The child serves all its queues, in its own order."""
     if _child is None:
         raise RuntimeError("drain outside of a worker child")
     try:

@@ -1,4 +1,4 @@
-"""A claim as those see it who watch: its span in the trace of its job, its numbers, the names in its log lines."""
+"""Telemetry of a claim: its span in the trace of its job, its metrics, and the ids in its log lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_IDS = 64
 
 
 class ClaimTelemetry:
-    """What is done for one claim, from `claimed` to the last write; on the loop's thread and the committer's."""
+    """Telemetry of one claim, from `claimed` to the last write; used by the loop's thread and the committer's."""
 
     def __init__(self, claim: Claim) -> None:
         self.claim = claim
@@ -36,14 +36,14 @@ class ClaimTelemetry:
 
     @contextmanager
     def bound(self) -> Generator[None]:
-        """What happens inside is done for this claim: log lines and spans say so, whoever writes them."""
+        """Bind log lines and spans of a block to this claim."""
         names = {"job": str(self.claim.job), "lease": str(self.claim.lease_token), "queue": self.claim.queue}
         with bound_contextvars(**names), tracing.under(self.span.traceparent):
             yield
 
     @contextmanager
     def stage(self, name: str, *, item: UUID | None = None, items: Iterable[UUID] = ()) -> Generator[Span]:
-        """A stage of it, timed however it ends; for one item, or for some."""
+        """Time a stage of the claim, however it ends; for one item, or for some."""
         began = time.perf_counter()
         ids = ids_of(items) if item is None else [str(item)]
         try:
@@ -55,24 +55,24 @@ class ClaimTelemetry:
             self._observe(name, time.perf_counter() - began)
 
     def claimed(self, seconds: float) -> None:
-        """The claim itself, which is over before anybody knows whose it is."""
+        """Record the claim itself, which ends before its job is known."""
         tracing.begin("claim", parent=self.span.traceparent, ago=seconds, job=str(self.claim.job)).end()
         self._observe("claim", seconds)
         metrics.BATCH_ITEMS.labels(self.claim.queue).observe(len(self.claim.items))
 
     def wrote(self, states: Iterable[str], *, lost: int = 0) -> None:
-        """Items went to these states; `lost` results nobody wanted."""
+        """Count items by their new states, and `lost` discarded results."""
         for state in states:
             metrics.ITEMS.labels(self.claim.queue, state).inc()
         if lost:
             metrics.THROWN_AWAY.labels(self.claim.queue).inc(lost)
 
     def outage(self) -> None:
-        """Something that it needs is away; its items go back uncounted."""
+        """Record an outage of a dependency; the claim's items are released uncounted."""
         metrics.OUTAGES.labels(self.claim.queue).inc()
 
     def end(self) -> None:
-        """Every item of it is written, or was given up."""
+        """End the span: every item is written or given up."""
         self.span.end()
 
     def _observe(self, stage: str, seconds: float) -> None:
@@ -80,5 +80,5 @@ class ClaimTelemetry:
 
 
 def ids_of(items: Iterable[UUID]) -> list[str]:
-    """Identifiers for a log line."""
+    """Return identifiers for a log line."""
     return [str(item) for item in items][:MOST_IDS]

@@ -36,7 +36,7 @@ WATCH_SECONDS, WATCH_LOOKS = 30.0, 3
 
 
 def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int:
-    """Run a worker until SIGTERM or SIGINT; gives the exit code.
+    """Run a worker until SIGTERM or SIGINT; return the exit code.
 
     SIGTERM lets the child write what is finished and release the rest, uncounted; after 25 s it is killed.
 
@@ -91,11 +91,11 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
 
 
 def _keep_logging(**_: Any) -> None:
-    """Being connected is enough: Celery then leaves logging alone."""
+    """Connect to Celery's logging signal: Celery then leaves logging unchanged."""
 
 
 def _watch(home: Path, name: str) -> None:
-    """End this worker when its child is stuck, or no hint reaches it: whoever started it starts it again.
+    """End this worker when its child is stuck, or no hint reaches it: its supervisor restarts it.
 
     Three looks must agree: after a suspended laptop wakes up, the first status it finds is old.
     """
@@ -108,8 +108,8 @@ def _watch(home: Path, name: str) -> None:
 
 
 def _is_stuck(status: WorkerStatus | None, now: float) -> bool:
-    """Whether the child that said so hangs. The last word of one that was killed says nothing of its successor, which
-    may still be importing; Celery's pool waits for that."""
+    """Return True if the child that wrote the status hangs. The last status of a killed child says nothing about its
+    successor, which may still be importing; Celery's pool waits for that."""
     return status is not None and psutil.pid_exists(status.pid) and not status.alive(now)
 
 
@@ -137,7 +137,8 @@ def _kill_straggler(child: psutil.Process) -> None:
 
 
 def _ends_within(child: psutil.Process, seconds: float) -> bool:
-    """Whether it ends in time. Only looks: `wait` would reap it, and Celery's pool would wait for ever to do so."""
+    """Return True if the child ends in time. Only polls: `wait` would reap it, and Celery's pool would wait for
+    ever."""
     until = time.monotonic() + seconds
     while _runs(child):
         if time.monotonic() > until:

@@ -1,1 +1,1 @@
-"""Docs: the API's reference as a page, from files of this package alone."""
+"""The API reference as a page, from files of this package alone."""

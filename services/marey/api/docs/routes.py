@@ -1,4 +1,4 @@
-"""`GET /docs` and `/openapi.json`: every route of the API, to read and to try, by Swagger UI."""
+"""`GET /docs` and `/openapi.json`: Swagger UI for every route of the API."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def _answer(request: Request, name: str) -> Response:
 
 @router.get("/docs", include_in_schema=False)
 def docs(request: Request) -> Response:
-    """The page. It wants no key; what is tried on it does."""
+    """The API reference. The page needs no key; requests made from it do."""
     return _answer(request, "docs.html")
 
 
 @router.get("/openapi.json", include_in_schema=False)
 def openapi(request: Request) -> JSONResponse:
-    """The same as JSON."""
+    """The API reference as JSON."""
     return JSONResponse(request.app.openapi())
 
 

@@ -1,4 +1,4 @@
-"""Two evaluations, one against the other: from the scores in their stored reports."""
+"""Comparison of two evaluations, from the scores in their stored reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marey.measures.scores import MotionScore, read_scores
 
 
 class ComparedView(View):
-    """One of the two."""
+    """One of the two evaluations."""
 
     id: UUID
     name: str | None
@@ -25,7 +25,7 @@ class ComparedView(View):
 
 
 class MetricChangeView(View):
-    """What became of a metric that each motion has: in per cent, over the motions that both runs have."""
+    """Change of a metric that each motion has: in per cent, over the motions of both runs."""
 
     metric: str
     before: float
@@ -38,7 +38,7 @@ class MetricChangeView(View):
 
 
 class MetricPairView(View):
-    """A metric that no motion has by itself: both numbers as the runs reported them, and no verdict."""
+    """A metric of the whole run: both reported numbers, without a verdict."""
 
     metric: str
     before: float
@@ -46,7 +46,7 @@ class MetricPairView(View):
 
 
 class ComparisonView(View):
-    """What changed from one evaluation to another."""
+    """Changes from one evaluation to another."""
 
     before: ComparedView
     after: ComparedView
@@ -56,7 +56,7 @@ class ComparisonView(View):
 
 
 def compare_runs(shared: Context, tenant: str, before: UUID, after: UUID) -> ComparisonView:
-    """What changed from `before` to `after`.
+    """Compare `before` with `after`.
 
     Raises:
         NotFound: there is no such evaluation, or the report of one is gone.

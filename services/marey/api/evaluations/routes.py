@@ -24,7 +24,7 @@ router = APIRouter(prefix="/v1/evaluations", tags=["evaluations"], responses=RES
 
 
 def body_of(name: str) -> dict[str, Any]:
-    """For the document: a body that is read by hand."""
+    """Return the OpenAPI schema of a body that the route parses itself."""
     schema = {"$ref": f"#/components/schemas/{name}"}
     return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
 
@@ -37,7 +37,8 @@ async def begin_evaluation(
     key: Submitter,
     idempotency_key: IdempotencyKey = None,
 ) -> EvaluationDetailView:
-    """Plan an evaluation: its motions are made in the background, then measured. All bad prompts are told at once."""
+    """Plan an evaluation: its motions are made in the background, then measured. All invalid prompts are reported at
+    once."""
     async with kept_body(request, shared, key.tenant) as body:
         view, replayed = await body.run(service.create, shared, key, body.file, idempotency_key)
     response.headers["Location"] = f"/v1/evaluations/{view.id}"
@@ -55,21 +56,21 @@ def list_evaluations(
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[EvaluationView]:
-    """Evaluations, newest first."""
+    """List evaluations, newest first."""
     page = evaluations.list_evaluations(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
     return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{evaluation}")
 def get_evaluation(evaluation: UUID, conn: Connection, key: Reader) -> EvaluationDetailView:
-    """One evaluation, with its history."""
+    """Get one evaluation, with its history."""
     return service.detail(conn, evaluations.get_evaluation(conn, key.tenant, evaluation))
 
 
 @router.delete("/{evaluation}", status_code=202)
 @deadline(db.BULK)
 def cancel_evaluation(evaluation: UUID, conn: Connection, key: Operator) -> EvaluationDetailView:
-    """Cancel an evaluation and the job that runs for it. One that is over stays as it is."""
+    """Cancel an evaluation and its running job. One that has ended stays as it is."""
     note(conn, key, "evaluation.cancel", evaluation)
     return service.detail(conn, evaluations.cancel_evaluation(conn, key.tenant, evaluation))
 
@@ -84,7 +85,7 @@ def get_report(
     key: Reader,
     part: FileRequest,
 ) -> Response:
-    """The report of an evaluation that is done; its ETag is its sha256."""
+    """Get the report of an evaluation that is done; its ETag is its SHA-256."""
     row = evaluations.get_evaluation(conn, key.tenant, evaluation)
     file = next((f for f in EvaluationView.of(row).reports if f.format == format), None)
     if file is None:
@@ -100,7 +101,7 @@ def get_comparison(
     shared: Shared,
     key: Reader,
 ) -> ComparisonView:
-    """What changed from another evaluation to this one, motion against motion, by paired bootstrap."""
+    """Compare another evaluation with this one, motion by motion, by paired bootstrap."""
     return compare_runs(shared, key.tenant, before, evaluation)
 
 

@@ -1,4 +1,4 @@
-"""What the routes of evaluations take and give."""
+"""Bodies and answers of the evaluation routes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class EvaluationPromptBody(BaseModel):
 
 
 class EvaluationFields(BaseModel):
-    """What is measured, and how."""
+    """Subject and parameters of an evaluation."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -60,7 +60,7 @@ class EvaluationFields(BaseModel):
 
 
 class AskedFields(EvaluationFields):
-    """What is measured, with the prompts."""
+    """Subject and parameters of an evaluation, with its prompts."""
 
     prompts: list[EvaluationPromptBody] | None = Field(None, min_length=MIN_PROMPTS, max_length=MAX_PROMPTS)
 
@@ -85,12 +85,12 @@ class EvaluationJobView(View):
 
     @classmethod
     def of(cls, job: EvaluationJob) -> EvaluationJobView:
-        """From a row."""
+        """Convert a row."""
         return cls(**{name: getattr(job, name) for name in cls.model_fields})
 
 
 class RequestView(View):
-    """What is measured."""
+    """Subject and parameters of an evaluation."""
 
     bundle: str = Field(description="Exact since its motions were asked for; in a schedule, the name that was given.")
     model: str | None
@@ -103,7 +103,7 @@ class RequestView(View):
 
     @classmethod
     def of(cls, request: EvaluationRequest) -> RequestView:
-        """From a row."""
+        """Convert a row."""
         values = {name: getattr(request, name) for name in cls.model_fields}
         return cls(**{**values, "settings": dict(request.settings)})
 
@@ -132,7 +132,7 @@ class EvaluationView(View):
 
     @classmethod
     def of(cls, row: EvaluationRow) -> EvaluationView:
-        """From a row."""
+        """Convert a row."""
         return cls(**_fields(row))
 
 
@@ -154,7 +154,7 @@ class EvaluationDetailView(EvaluationView):
     def detail(
         cls, row: EvaluationRow, events: Sequence[EvaluationEvent], waits_for: str | None
     ) -> EvaluationDetailView:
-        """From a row, its events, and what it waits for."""
+        """Convert a row, its events, and the name of the queue it waits for."""
         told = [EvaluationEventView(state=event.state, reason=event.reason, at=event.at) for event in events]
         return cls(events=told, waits_for=waits_for, **_fields(row))
 

@@ -1,4 +1,4 @@
-"""What a request for an evaluation means, checked before anything is written."""
+"""Validation of evaluation requests, before anything is written."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ HINT = 'Write {"bundle": "hgm3", "split": "test"}, or "prompts": [{"prompt": "â€
 
 @dataclass(frozen=True)
 class Asked:
-    """What is to be measured, as it was asked for."""
+    """A parsed evaluation request."""
 
     request: evaluations.EvaluationRequest
     prompts: tuple[EvaluationPrompt, ...] | None
     """None = those of the evaluator's bundle."""
 
     def planned(self, config: Settings) -> Plan:
-        """What would run now.
+        """Return the plan that would run now.
 
         Raises:
             InvalidItems, InvalidInput, InvalidBundle, Refused: it cannot.
@@ -46,12 +46,12 @@ class Asked:
 
 
 def prompts_document(body: BinaryIO, *, at: tuple[str, ...] = ("prompts",), hint: str = HINT) -> Document:
-    """A body whose prompts stand at a path."""
+    """Return the document of a body whose prompts are at a path."""
     return Document(body, at, hint=hint, limit=MAX_PROMPTS)
 
 
 def read_asked(model: type[Fields], values: Mapping[str, Any], document: Document) -> tuple[Fields, Asked]:
-    """The fields of a body, which are those of an evaluation and more, and what they ask for.
+    """Parse the fields of a body, which include those of an evaluation, and its prompts.
 
     Args:
         values: what stands beside the prompts in `document`; and at their place, if that is no list.
@@ -74,7 +74,8 @@ def read_asked(model: type[Fields], values: Mapping[str, Any], document: Documen
 def create(
     shared: Context, key: tenants.ApiKey, body: BinaryIO, idempotency_key: str | None
 ) -> tuple[EvaluationDetailView, bool]:
-    """Plan an evaluation, or answer the one that an earlier request with this key and body has planned; whether so.
+    """Plan an evaluation, or return the one that an earlier request with this key and body has planned; the flag says
+    which.
 
     Raises:
         InvalidItems, InvalidInput, InvalidBundle, Refused: see `read_asked` and `Asked.planned`.
@@ -103,7 +104,7 @@ def create(
 
 
 def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
-    """Keep the prompts of a plan; their digest. The baseline is looked at, too.
+    """Store the prompts of a plan and return their digest. Validates the baseline, too.
 
     Raises:
         InvalidInput: it cannot be compared with that baseline.
@@ -114,7 +115,7 @@ def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
 
 
 def detail(conn: sa.Connection, row: evaluations.EvaluationRow) -> EvaluationDetailView:
-    """An evaluation with its history."""
+    """Return an evaluation with its history."""
     return EvaluationDetailView.detail(
         row, evaluations.evaluation_events(conn, row.id), evaluations.evaluation_waits_for(conn, row)
     )
@@ -141,7 +142,7 @@ def _asked(fields: EvaluationFields, document: Document) -> Asked:
 
 
 def _settings(given: Mapping[str, Any] | None) -> Any:
-    """Settings, checked as those of an item."""
+    """Validate settings as those of an item."""
     if given is None:
         return {}
     try:

@@ -35,7 +35,7 @@ class ModelCheck:
         self._seen = False
 
     def __call__(self) -> None:
-        """Check it.
+        """Run the check.
 
         Raises:
             Unreachable: no such worker has been seen yet.
@@ -57,7 +57,7 @@ def _check_queue(config: Settings) -> None:
 
 
 def _check_scheduler(engine: sa.Engine) -> None:
-    """Require recent progress of a known scheduler. An API that never saw one passes: it may come later."""
+    """Require recent progress of a known scheduler. Passes if none was ever seen: it may start later."""
     with transaction(engine) as conn:
         known = list_schedulers(conn)
     if known and not known[0].live:

@@ -1,4 +1,4 @@
-"""What Prometheus reads of the API: its own requests, and the queues as they stand in the tables."""
+"""Prometheus metrics of the API: its own requests, and the queues in the database."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _rendering = threading.Lock()
 
 
 def render(engine: sa.Engine) -> bytes:
-    """The text exposition, with the queues as they stand.
+    """Return the text exposition, with current queue figures.
 
     Raises:
         Unreachable: the database does not answer.
@@ -49,7 +49,7 @@ def render(engine: sa.Engine) -> bytes:
 
 
 def bounded(depths: Iterable[QueueDepth], limit: int = MAX_TENANTS) -> list[QueueDepth]:
-    """The same with at most `limit` tenants by name, those with the most items; the others are summed up, by queue."""
+    """Limit depths to `limit` tenants by name, those with the most items; the others are summed up by queue."""
     rows = list(depths)
     sizes: defaultdict[str, int] = defaultdict(int)
     for row in rows:
@@ -93,7 +93,7 @@ def _show_outbox(outbox: Outbox) -> None:
 
 
 class Measure:
-    """ASGI middleware: counts and times requests by route, not by path."""
+    """ASGI middleware that counts and times requests by route, not by path."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

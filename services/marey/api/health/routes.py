@@ -15,14 +15,14 @@ router = APIRouter(tags=["health"])
 
 
 class Check(View):
-    """One thing that must work."""
+    """One readiness check."""
 
     ok: bool
     message: str | None = None
 
 
 class ReadyView(View):
-    """Whether requests will be answered, and why not."""
+    """Readiness, and the failed checks."""
 
     ready: bool
     checks: dict[str, Check]
@@ -30,14 +30,14 @@ class ReadyView(View):
 
 @router.get("/livez", response_class=PlainTextResponse)
 async def livez() -> str:
-    """The process answers."""
+    """Return 200 while the process answers."""
     return "ok"
 
 
 @router.get("/readyz", response_model=ReadyView, responses={503: {"model": ReadyView, "description": "Not yet"}})
 async def readyz(shared: Shared) -> JSONResponse:
-    """Database, queue and store answered within seconds, and a worker has had its model loaded. A scheduler that
-    stalls is told too, and leaves the API ready.
+    """Check that database, queue and store answered within seconds, and that a worker has loaded its model. A stalled
+    scheduler is reported too, and leaves the API ready.
 
     The checks run in the background, so the answer comes at once whatever is down. It says what is down, to everybody;
     the server's log says why.
@@ -51,5 +51,5 @@ async def readyz(shared: Shared) -> JSONResponse:
 
 @router.get("/metrics", response_class=PlainTextResponse)
 def metrics(shared: Shared, key: Watcher) -> Response:
-    """For Prometheus; wants a key with the scope `metrics`: it tells of all tenants."""
+    """Prometheus metrics; the key needs the scope `metrics`: they include all tenants."""
     return Response(render(shared.engine), media_type=CONTENT_TYPE_LATEST)

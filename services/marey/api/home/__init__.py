@@ -1,1 +1,1 @@
-"""`/`: what is here."""
+"""The page at `/`."""

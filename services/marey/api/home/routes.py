@@ -1,4 +1,4 @@
-"""`GET /`: a page that says what is here, for a person who opened the address of the API."""
+"""`GET /`: an overview page for people who open the address of the API."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ on the server's machine. A request sends it as <code>Authorization: Bearer KEY</
 
 @cache
 def home_page() -> tuple[str, dict[str, str]]:
-    """The page, and the headers it is sent with."""
+    """Return the page and its headers."""
     page = whole_page(BODY, title="Marey", styles=[STYLE], sealed=False)
     rules = ("default-src 'none'", *code_hashes(page), "img-src data:", "base-uri 'none'", "frame-ancestors 'none'")
     return page, {
@@ -43,6 +43,6 @@ def home_page() -> tuple[str, dict[str, str]]:
 
 @router.get("/", include_in_schema=False)
 def home() -> Response:
-    """Nothing here is anybody's."""
+    """The overview page; it holds no data of a tenant."""
     page, headers = home_page()
     return Response(page, headers=headers, media_type="text/html")

@@ -1,1 +1,1 @@
-"""Jobs: submit, list, follow, steer."""
+"""Jobs: submit, list, follow, operate."""

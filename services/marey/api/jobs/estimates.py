@@ -1,4 +1,4 @@
-"""How long things take, as the API tells it: each number with where it comes from."""
+"""Time estimates of the API: each number with its basis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from marey.jobs import Estimate, JobState, QueuePlace, Speed
 
 
 class SpeedView(View):
-    """What was measured of a bundle on this platform."""
+    """Measured speed of a bundle on this platform."""
 
     bundle: str
     motions: int = Field(description="How many it was measured on, of the last 2,000 that were made.")
@@ -21,12 +21,12 @@ class SpeedView(View):
 
     @classmethod
     def of(cls, row: Speed) -> SpeedView:
-        """From a row."""
+        """Convert a row."""
         return cls(**vars(row))
 
 
 class EstimateView(View):
-    """How long motions take once it is their turn."""
+    """Expected duration of motions, excluding time in the queue."""
 
     items: int
     seconds: float | None = Field(description="Null = there is no measure of some bundle.")
@@ -37,7 +37,7 @@ class EstimateView(View):
 
     @classmethod
     def of(cls, row: Estimate) -> EstimateView:
-        """From a row."""
+        """Convert a row."""
         return cls(
             items=row.items,
             seconds=row.seconds,
@@ -49,7 +49,7 @@ class EstimateView(View):
 
 
 class QueueView(View):
-    """Where a job stands in the queue."""
+    """Position of a job in the queue."""
 
     state: JobState
     jobs_ahead: int = Field(description="Of the same tenant, with items that wait: of higher priority, or older.")
@@ -60,13 +60,13 @@ class QueueView(View):
 
     @classmethod
     def of(cls, row: QueuePlace) -> QueueView:
-        """From a row."""
+        """Convert a row."""
         own = {name: value for name, value in vars(row).items() if name != "estimate"}
         return cls(estimate=EstimateView.of(row.estimate), **own)
 
 
 def basis_of(row: Estimate) -> str:
-    """Where an estimate comes from, or why there is none."""
+    """Describe the basis of an estimate, or why there is none."""
     if row.unmeasured:
         names = ", ".join(row.unmeasured)
         return f"no estimate: none of the last motions made here was made with {names}"

@@ -24,7 +24,7 @@ MAX_SEQ = 2**63 - 1
 
 
 def last_event_id(header: str | None, after: int) -> int:
-    """Where the client stands: `Last-Event-ID`, else the query's `after`.
+    """Return the client's position: `Last-Event-ID`, else the query's `after`.
 
     Raises:
         InvalidInput: the header is not a number.
@@ -37,7 +37,7 @@ def last_event_id(header: str | None, after: int) -> int:
 
 
 class EventStream(EventSourceResponse):
-    """A stream that holds one of the places of its key while it is sent, however it ends.
+    """A stream that occupies one slot of its key while it is sent, however it ends.
 
     The place is taken when the answer begins, so that a request that is dropped before never holds one; where there is
     none, the answer is a problem.
@@ -48,7 +48,7 @@ class EventStream(EventSourceResponse):
         self._slots, self._key = places, key
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer."""
+        """Send the response."""
         with ExitStack() as stack:
             try:
                 stack.enter_context(self._slots.take(self._key))
@@ -59,7 +59,8 @@ class EventStream(EventSourceResponse):
 
 
 async def stream_events(broadcaster: EventBroadcaster, key: ApiKey, job: UUID, seq: int) -> AsyncIterator[bytes]:
-    """The events after `seq` as they happen, until the job has ended or is deleted, or the key is no longer valid."""
+    """Yield the events after `seq` as they happen, until the job has ended or is deleted, or the key is no longer
+    valid."""
     yield format_sse_event(retry=RETRY_MILLISECONDS)
     async with broadcaster.follow(key, job, seq) as subscription:
         while True:
@@ -77,5 +78,5 @@ async def stream_events(broadcaster: EventBroadcaster, key: ApiKey, job: UUID, s
 
 
 def message(event: EventRow) -> bytes:
-    """One event on the wire; its data holds the job's state and counters as of then."""
+    """Encode one event as a server-sent event; its data holds the job's state and counters at that time."""
     return format_sse_event(data_str=EventView.of(event).model_dump_json(), event=event.kind, id=str(event.seq))

@@ -165,28 +165,28 @@ def list_jobs(
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[JobView]:
-    """Jobs, newest first."""
+    """List jobs, newest first."""
     page = jobs.list_jobs(conn, key.tenant, states=state or (), cursor=cursor, limit=limit)
     return PageView[JobView](items=[JobView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{job}")
 def get_job(job: UUID, conn: Connection, key: Reader) -> JobView:
-    """One job."""
+    """Get one job."""
     return JobView.of(jobs.get_job(conn, key.tenant, job))
 
 
 @router.get("/{job}/queue")
 @deadline(db.SEARCH)
 def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
-    """What comes before the job's items, and when it may be done: from what was measured here, or no number."""
+    """Get the queue position of the job's items, and when it may be done: from measurements here, or no number."""
     return QueueView.of(jobs.place_of(conn, key.tenant, job))
 
 
 @router.patch("/{job}")
 @deadline(db.BULK)
 def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
-    """Change the priority, the comment or the share of failed items that ends the job early.
+    """Change the priority, the comment or the failure ratio that ends the job early.
 
     Where more than that share has failed already, the rest is cancelled at once.
     """
@@ -215,7 +215,7 @@ def delete_job(job: UUID, conn: Connection, key: Operator) -> None:
 @router.post("/{job}/pause")
 @deadline(db.BULK)
 def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
-    """Give out no more items; those being made are finished."""
+    """Stop starting items of a job; items in progress are finished."""
     note(conn, key, "job.pause", job, reason=reason)
     return JobView.of(jobs.pause(conn, key.tenant, job, reason or f"paused by {key.name}"))
 
@@ -223,7 +223,7 @@ def pause_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None)
 @router.post("/{job}/resume")
 @deadline(db.BULK)
 def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
-    """Go on with a paused job."""
+    """Resume a paused job."""
     note(conn, key, "job.resume", job, reason=reason)
     return JobView.of(jobs.resume(conn, key.tenant, job, reason or f"resumed by {key.name}"))
 
@@ -231,7 +231,7 @@ def resume_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None
 @router.post("/{job}/cancel")
 @deadline(db.BULK)
 def cancel_job(job: UUID, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
-    """Cancel what is not done yet."""
+    """Cancel all open items of a job."""
     before = jobs.get_job(conn, key.tenant, job).cancelled
     note(conn, key, "job.cancel", job, reason=reason)
     row = jobs.cancel(conn, key.tenant, job, reason or f"cancelled by {key.name}")
@@ -248,7 +248,7 @@ def retry_job(
     failed_only: Annotated[bool, Query(description="Leave cancelled items as they are.")] = False,
     reason: Reason = None,
 ) -> JobView:
-    """Try failed, dead and cancelled items again."""
+    """Retry failed, dead and cancelled items."""
     note(conn, key, "job.retry", job, failed_only=failed_only, reason=reason)
     why = reason or f"retried by {key.name}"
     return JobView.of(jobs.retry(conn, key.tenant, job, failed_only=failed_only, reason=why))
@@ -257,7 +257,7 @@ def retry_job(
 @router.post("/{job}/erase")
 @deadline(db.BULK)
 def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
-    """Forget the prompts of a job that has ended; motions, names and tags stay.
+    """Erase the prompts of a job that has ended; motions, names and tags stay.
 
     What the database holds of them goes at once. Files that hold them are given to nobody any more, and written anew
     within minutes: `files_left` says how many are still to be. There is no way back.
@@ -278,7 +278,7 @@ def list_items(
     cursor: Cursor = None,
     limit: Limit = 100,
 ) -> PageView[ItemView]:
-    """Items with their motions, in input order, variants within prompt; re-rolls come last."""
+    """List items with their motions, in input order, variants within prompt; re-rolls come last."""
     page = jobs.list_items(conn, key.tenant, job, states=state or (), reviews=review or (), cursor=cursor, limit=limit)
     return PageView[ItemView](items=[ItemView.of(row) for row in page.rows], next=page.cursor)
 
@@ -288,7 +288,7 @@ def list_items(
 def list_job_motions(
     job: UUID, conn: Connection, key: Reader, found: Found, cursor: Cursor = None, limit: Limit = 100
 ) -> PageView[MotionView]:
-    """Motions of a job that fit everything given, in the order they were made."""
+    """List motions of a job that match all filters, in creation order."""
     page = takes.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
 
@@ -311,7 +311,7 @@ def list_events(
     limit: Limit = 500,
     last: Annotated[str | None, Header(alias="Last-Event-ID", description="Wins over `after`; for streams.")] = None,
 ) -> Response:
-    """Events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
+    """List events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
 
     A stream sends at most two progress messages a second, and ends when the job has, or within seconds of the key's
     end; then a new request says why.

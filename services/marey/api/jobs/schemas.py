@@ -1,4 +1,4 @@
-"""What the routes of jobs take and give."""
+"""Bodies and answers of the job routes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class NewItemBody(BaseModel):
 
 
 class JobFields(BaseModel):
-    """What concerns the job as a whole."""
+    """Fields of the job as a whole."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -63,7 +63,7 @@ class NewJobBody(JobFields):
 
 
 class JobPatch(BaseModel):
-    """Changes to a job; what is not given stays."""
+    """Changes to a job; omitted fields stay as they are."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -87,7 +87,7 @@ class CheckedView(View):
 
 
 class CountersView(View):
-    """How many items are in each state."""
+    """Number of items by state."""
 
     ready: int
     leased: int
@@ -119,7 +119,7 @@ class JobView(View):
 
     @classmethod
     def of(cls, row: JobRow) -> JobView:
-        """From a row."""
+        """Convert a row."""
         counters = CountersView(**{name: getattr(row, name) for name in CountersView.model_fields})
         own = {name: getattr(row, name) for name in cls.model_fields if name != "counters"}
         return cls(counters=counters, **own)
@@ -134,7 +134,7 @@ class ErasureView(View):
 
 
 class ErrorView(View):
-    """Why an item has no result."""
+    """Reason why an item has no result."""
 
     type: str
     message: str
@@ -143,7 +143,7 @@ class ErrorView(View):
 
     @classmethod
     def of(cls, problem: Problem) -> ErrorView:
-        """From a row's problem."""
+        """Convert a row's problem."""
         return cls(type=problem.type, message=problem.message, where=problem.where, hint=problem.hint)
 
 
@@ -175,7 +175,7 @@ class ItemView(View):
 
     @classmethod
     def of(cls, row: ItemRow) -> ItemView:
-        """From a row."""
+        """Convert a row."""
         apart = {"settings", "tags", "error", "motion"}
         return cls(
             settings=dict(row.settings),
@@ -199,7 +199,7 @@ class EventView(View):
 
     @classmethod
     def of(cls, row: EventRow) -> EventView:
-        """From a row."""
+        """Convert a row."""
         return cls(data=dict(row.data), **{n: getattr(row, n) for n in cls.model_fields if n != "data"})
 
 

@@ -1,4 +1,4 @@
-"""What a submit does before the database sees it: read the body, fix bundles and seeds, hash."""
+"""Preparation of a submit before the database: parse the body, fix bundles and seeds, hash."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ class Submission:
 
     @property
     def bundles(self) -> list[str]:
-        """Exact bundles, each once."""
+        """Exact bundles, without duplicates."""
         return sorted({reference for _, reference in self.by_bundle})
 
     def new_items(self) -> Iterator[NewItem]:
-        """One row a motion: the body is read a second time, so that it is never in memory as a whole."""
+        """Yield one row per motion: the body is read a second time, so that it is never in memory as a whole."""
         items = read_items(self._raws())
         return new_items((item, self._offers[item.model]) for item in items)
 
 
 def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Submission:
-    """A job of one item a line; `fields` stood in the query. The body stays in use.
+    """Parse a job with one item per line; `fields` come from the query. The body stays in use.
 
     Raises:
         InvalidItems: with the problems of all lines.
@@ -77,7 +77,7 @@ def _lines(body: BinaryIO) -> Iterator[tuple[int, object]]:
 
 
 def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
-    """A job as one JSON object with `items`. The body stays in use.
+    """Parse a job as one JSON object with `items`. The body stays in use.
 
     Raises:
         InvalidItems: with the problems of all items.
@@ -108,7 +108,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             raise InvalidInput("there is no prompt in it", where="body", hint='Write {"prompt": "…"}, one a line.')
 
     def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
-        """List what the model of an item cannot do."""
+        """Yield problems of an item that its model cannot handle."""
         model = values.get("model")
         if model not in failed:
             if model not in offers and len(offers) + len(failed) == MAX_MODELS:
@@ -147,7 +147,7 @@ def _problem(error: MareyError, line: int | None, field: str) -> Problem:
 
 
 def job_fields(values: Mapping[str, Any]) -> JobFields:
-    """What concerns the job as a whole.
+    """Validate the fields of the job as a whole.
 
     Raises:
         InvalidItems: with the problems of each field.
@@ -156,7 +156,7 @@ def job_fields(values: Mapping[str, Any]) -> JobFields:
 
 
 def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
-    """Fields of a body that is read by hand.
+    """Validate fields of a body that the route parses itself.
 
     Raises:
         InvalidItems: with the problems of each field.
@@ -169,7 +169,7 @@ def read_fields(model: type[Fields], values: Mapping[str, Any]) -> Fields:
 
 
 def request_sha256(query: str, body: BinaryIO) -> str:
-    """What makes two submits the same request."""
+    """Return the digest that identifies equal submits."""
     digest = hashlib.sha256(query.encode() + b"\n")
     body.seek(0)
     while part := body.read(2**16):

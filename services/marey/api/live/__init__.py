@@ -1,1 +1,1 @@
-"""The page that shows a live stream."""
+"""The page that displays a live stream."""

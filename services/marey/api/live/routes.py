@@ -1,4 +1,4 @@
-"""`GET /live`: the page on which a person starts, watches and steers live streams."""
+"""`GET /live`: a page to start, watch and steer live streams."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def _measured() -> dict[str, list[dict[str, Any]]]:
 
 
 def examples(catalogue: Catalogue) -> tuple[str, ...]:
-    """Prompts that this server's model was measured to obey while it streams; none for a bundle without measurements.
+    """Return prompts that this server's model performed correctly while streaming; none for a bundle without
+    measurements.
 
     `python -m marey.models.mogo.examples` measures them.
     """
@@ -39,7 +40,7 @@ def examples(catalogue: Catalogue) -> tuple[str, ...]:
 
 @router.get("/live", include_in_schema=False)
 def live(request: Request) -> Response:
-    """The page itself holds nothing that is anybody's: it asks for a key, and the API asks for that."""
+    """The live page. It holds no data of a tenant: it asks for a key, and its API calls need that."""
     page = live_page(examples(request.app.state.catalogue))
     policy = page.policy(request.headers.get("host", ""))
     return page_response(request, page.content, "text/html", etag=page.etag, policy=policy)

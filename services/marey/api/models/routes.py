@@ -18,7 +18,7 @@ router = APIRouter(prefix="/v1/models", tags=["models"], responses=RESPONSES)
 
 @router.get("")
 def list_models(shared: Shared, key: Reader) -> ModelsView:
-    """Bundles that this server can make motions with."""
+    """List the bundles that this server can make motions with."""
     return ModelsView.of(offers(shared.config))
 
 
@@ -26,6 +26,6 @@ def list_models(shared: Shared, key: Reader) -> ModelsView:
 def get_model(
     name: Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9._@-]{0,180}$")], shared: Shared, key: Reader
 ) -> ModelView:
-    """The bundle that a model's or bundle's name means."""
+    """Get the bundle of a model's or bundle's name."""
     with named_by("name"):
         return ModelView.of(shared.catalogue.offer(name))

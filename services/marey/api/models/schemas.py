@@ -1,4 +1,4 @@
-"""What the routes of models give."""
+"""Answers of the model routes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marey.jobs.generators import GeneratorCapabilities, GeneratorList
 
 
 class DataView(View):
-    """What weights were trained on."""
+    """Training data of the weights."""
 
     name: str
     licence: str
@@ -38,7 +38,7 @@ class ModelView(View):
 
     @classmethod
     def of(cls, offer: GeneratorCapabilities) -> ModelView:
-        """From an offer."""
+        """Convert capabilities."""
         manifest = offer.bundle.manifest
         own = ("name", "model", "version", "config", "random", "licence", "commercial", "skeleton", "fps", "metrics")
         return cls(
@@ -52,7 +52,7 @@ class ModelView(View):
 
 
 class BrokenView(View):
-    """A bundle that is there and cannot be used."""
+    """A bundle that exists and cannot be used."""
 
     name: str
     """Of its folder."""
@@ -60,7 +60,7 @@ class BrokenView(View):
 
     @classmethod
     def of(cls, broken: BrokenBundle) -> BrokenView:
-        """From what was found."""
+        """Convert a broken bundle."""
         return cls(name=broken.name, reason=broken.reason)
 
 
@@ -73,7 +73,7 @@ class ModelsView(View):
 
     @classmethod
     def of(cls, offers: GeneratorList) -> ModelsView:
-        """From what this machine offers."""
+        """Convert the bundles of this machine."""
         return cls(
             items=[ModelView.of(offer) for offer in offers.found],
             broken=[BrokenView.of(broken) for broken in offers.broken],

@@ -48,7 +48,7 @@ def motion_filter(
     ] = None,
     review: Annotated[list[ReviewFilter] | None, Query(description="One of these was said of it.")] = None,
 ) -> takes_store.MotionFilter:
-    """Which motions a listing shows: those that fit everything given."""
+    """Filters of a motion listing; all given ones must match."""
     said = review or []
     return takes_store.MotionFilter(
         tags=tag or (),
@@ -72,14 +72,14 @@ def list_motions(
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[MotionView]:
-    """Motions that fit everything given, newest first."""
+    """List motions that match all filters, newest first."""
     page = takes_store.list_motions(conn, key.tenant, job=job, found=found, cursor=cursor, limit=limit)
     return PageView[MotionView](items=[MotionView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.post("/review")
 def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> list[MotionView]:
-    """Keep or reject motions, all or none; said again, nothing changes. Answers them in the order given."""
+    """Keep or reject motions, all or none; idempotent. Returns them in the order given."""
     verdict = None if body.verdict is None else jobs.Review(body.verdict)
     rows = takes_store.review(conn, key.tenant, body.motions, verdict, by=key.name, comment=body.comment)
     note(conn, key, "motion.review", rows[0].id, verdict=verdict, motions=len(rows))
@@ -89,7 +89,7 @@ def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> lis
 @router.post("/reroll", status_code=202)
 @deadline(db.BULK)
 def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: Submitter) -> RerollsView:
-    """Make motions again with the next seeds, all or none: new items in their jobs, linked to what they replace.
+    """Make motions again with the next seeds, all or none: new items in their jobs, linked to the motions they replace.
 
     A motion has one take after it; asked again, the same one is answered. To go on, re-roll that take.
     """
@@ -107,7 +107,7 @@ def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: S
 
 @router.get("/{motion}")
 def get_motion(motion: UUID, conn: Connection, key: Reader) -> MotionDetailView:
-    """One motion, with the graph and settings it was made from."""
+    """Get one motion, with the graph and settings it was made from."""
     return MotionDetailView.of(jobs.get_motion(conn, key.tenant, motion))
 
 
@@ -121,7 +121,7 @@ def get_file(
     key: Reader,
     part: FileRequest,
 ) -> Response:
-    """A file of a motion; its ETag is its sha256."""
+    """Get a file of a motion; its ETag is its SHA-256."""
     row = jobs.get_motion(conn, key.tenant, motion)
     file = next((f for f in MotionView.of(row).files if f.format == format), None)
     if file is None:

@@ -1,4 +1,4 @@
-"""What the routes of motions give."""
+"""Bodies and answers of the motion routes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marey.takes import MAX_REVIEWED, Reroll
 
 
 class ReviewFilter(StrEnum):
-    """What was said of a motion; `new` = nothing yet."""
+    """Review state of a motion; `new` = not reviewed."""
 
     NEW = "new"
     KEPT = "kept"
@@ -25,7 +25,7 @@ class ReviewFilter(StrEnum):
 
 
 class Verdict(StrEnum):
-    """What may be said of a motion."""
+    """Possible verdicts on a motion."""
 
     KEPT = "kept"
     REJECTED = "rejected"
@@ -65,7 +65,7 @@ class RerollView(View):
 
     @classmethod
     def of(cls, row: Reroll) -> RerollView:
-        """From a row."""
+        """Convert a row."""
         return cls(**vars(row))
 
 
@@ -76,7 +76,7 @@ class RerollsView(View):
 
 
 class ReviewView(View):
-    """What a person said of a motion."""
+    """Review of a motion."""
 
     verdict: Review
     at: datetime
@@ -110,7 +110,7 @@ class MotionView(View):
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionView:
-        """From a row."""
+        """Convert a row."""
         files = [FileView(format=f.format, sha256=f.sha256, size=f.size, media_type=f.media_type) for f in row.files]
         apart = {"files", "tags", "review"}
         own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
@@ -124,11 +124,11 @@ def _review(row: MotionRow) -> ReviewView | None:
 
 
 class MotionDetailView(MotionView):
-    """A motion with what its npz says of it: rewritten prompt, graph, settings, software."""
+    """A motion with the metadata of its npz: rewritten prompt, graph, settings, software."""
 
     metadata: dict[str, Any]
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionDetailView:
-        """From a row."""
+        """Convert a row."""
         return cls(metadata=dict(row.metadata), **MotionView.of(row).model_dump())

@@ -1,4 +1,4 @@
-"""Motions beyond their rows: names of their files, and for a re-roll the bundle, which must still be here."""
+"""Download names of motions, and the bundle of a re-roll, which must still exist."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WORDS = 48
 
 
 def file_stem(row: MotionRow) -> str:
-    """The name of a motion's downloads: its number in the job, its name or the prompt's first words, its seed."""
+    """Return the download name of a motion: its number in the job, its name or the prompt's first words, its seed."""
     words = "-".join(re.findall(r"\w+", row.prompt.lower()))
     if len(words) > WORDS:
         words = words[: WORDS + 1].rpartition("-")[0] or words[:WORDS]
@@ -23,7 +23,7 @@ def file_stem(row: MotionRow) -> str:
 
 
 def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
-    """The item as a new one, by the same exact bundle with the same settings.
+    """Return the item as a new one, by the same exact bundle with the same settings.
 
     Raises:
         Conflict: this server no longer has the bundle, or it no longer takes what the item asks for.

@@ -1,1 +1,1 @@
-"""Resolve short references, as a person types them, to ids."""
+"""Resolution of short references to ids."""

@@ -23,7 +23,7 @@ AskedKind = Literal["job", "motion", "stream", "evaluation", "schedule", "webhoo
 
 
 class MatchView(View):
-    """Something that a reference may stand for."""
+    """A candidate of a reference."""
 
     kind: ReferenceKind
     id: UUID
@@ -37,7 +37,7 @@ class MatchView(View):
 
     @classmethod
     def of(cls, match: ReferenceMatch) -> MatchView:
-        """The view of a match."""
+        """Convert a match."""
         return cls(**vars(match))
 
 
@@ -64,6 +64,6 @@ def resolve(
     ],
     webhook: Annotated[UUID | None, Query(description="Whose delivery.")] = None,
 ) -> ResolutionView:
-    """Resolve a reference that a person typed, within the key's tenant."""
+    """Resolve a short reference within the key's tenant."""
     found = takes.resolve_reference(conn, key.tenant, ReferenceKind(kind), reference, webhook=webhook)
     return ResolutionView(matches=[MatchView.of(match) for match in found])

@@ -1,1 +1,1 @@
-"""Schedules: evaluations that come again."""
+"""Schedules: recurring evaluations."""

@@ -24,7 +24,7 @@ router = APIRouter(prefix="/v1/schedules", tags=["schedules"], responses=RESPONS
 
 @router.post("", status_code=201, openapi_extra=body_of("NewScheduleBody"))
 async def create_schedule(request: Request, response: Response, shared: Shared, key: Submitter) -> ScheduleView:
-    """Plan evaluations that come again. Each run looks up the bundles by the names given here, exact or not."""
+    """Create a schedule of recurring evaluations. Each run resolves the bundle names given here, exact or not."""
     async with kept_body(request, shared, key.tenant) as body:
         view = await body.run(service.create, shared, key, body.file)
     response.headers["Location"] = f"/v1/schedules/{view.id}"
@@ -33,34 +33,34 @@ async def create_schedule(request: Request, response: Response, shared: Shared, 
 
 @router.get("")
 def list_schedules(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[ScheduleView]:
-    """Schedules, newest first."""
+    """List schedules, newest first."""
     page = evaluations.list_schedules(conn, key.tenant, cursor=cursor, limit=limit)
     return PageView[ScheduleView](items=[ScheduleView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{schedule}")
 def get_schedule(schedule: UUID, conn: Connection, key: Reader) -> ScheduleView:
-    """One schedule."""
+    """Get one schedule."""
     return ScheduleView.of(evaluations.get_schedule(conn, key.tenant, schedule))
 
 
 @router.patch("/{schedule}", openapi_extra=body_of("SchedulePatch"))
 async def change_schedule(schedule: UUID, request: Request, shared: Shared, key: Operator) -> ScheduleView:
-    """Change what is given. After a pause, and with new times, it is next due at its next time from now."""
+    """Change the given fields. After a pause, and with new times, it is next due at its next time from now."""
     async with kept_body(request, shared, key.tenant) as body:
         return await body.run(service.change, shared, key, schedule, body.file)
 
 
 @router.delete("/{schedule}", status_code=204)
 def delete_schedule(schedule: UUID, conn: Connection, key: Operator) -> None:
-    """Remove a schedule. Its evaluations stay, and one that runs goes on."""
+    """Delete a schedule. Its evaluations stay, and running ones continue."""
     evaluations.delete_schedule(conn, key.tenant, schedule)
     note(conn, key, "schedule.delete", schedule)
 
 
 @router.post("/{schedule}/run", status_code=202)
 def run_schedule(schedule: UUID, response: Response, conn: Connection, key: Submitter) -> EvaluationDetailView:
-    """Plan an evaluation now, beside its times; also while it is paused."""
+    """Plan an evaluation now, outside the schedule's times; also while it is paused."""
     made = evaluations.run_schedule(conn, key.tenant, schedule)
     note(conn, key, "schedule.run", schedule, evaluation=str(made))
     response.headers["Location"] = f"/v1/evaluations/{made}"
@@ -71,7 +71,7 @@ def run_schedule(schedule: UUID, response: Response, conn: Connection, key: Subm
 def list_runs(
     schedule: UUID, conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50
 ) -> PageView[EvaluationView]:
-    """The evaluations of a schedule, newest first."""
+    """List the evaluations of a schedule, newest first."""
     evaluations.get_schedule(conn, key.tenant, schedule)
     page = evaluations.list_evaluations(conn, key.tenant, schedule=schedule, cursor=cursor, limit=limit)
     return PageView[EvaluationView](items=[EvaluationView.of(row) for row in page.rows], next=page.cursor)

@@ -1,4 +1,4 @@
-"""What the routes of schedules take and give."""
+"""Bodies and answers of the schedule routes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Zone = Annotated[str, Field(min_length=1, max_length=100), FreeText()]
 
 
 class NewScheduleBody(AskedFields):
-    """A schedule as JSON: what is measured, and when."""
+    """A schedule as JSON: the evaluation, and its times."""
 
     name: Name | None = None
     cron: CronLine = Field(description=CRON)
@@ -27,7 +27,7 @@ class NewScheduleBody(AskedFields):
 
 
 class ScheduleFields(BaseModel):
-    """Changes to the times of a schedule; what is not given stays."""
+    """Changes to the times of a schedule; omitted fields stay as they are."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -38,7 +38,7 @@ class ScheduleFields(BaseModel):
 
 
 class SchedulePatch(ScheduleFields):
-    """Changes to a schedule; what is not given stays."""
+    """Changes to a schedule; omitted fields stay as they are."""
 
     request: AskedFields | None = Field(None, description="What is measured, all of it.")
 
@@ -62,7 +62,7 @@ class ScheduleView(View):
 
     @classmethod
     def of(cls, row: ScheduleRow) -> ScheduleView:
-        """From a row."""
+        """Convert a row."""
         apart = {"request", "prompts", "prompts_sha256"}
         own = {name: getattr(row, name) for name in cls.model_fields if name not in apart}
         return cls(request=RequestView.of(row.request), prompts=row.prompt_count, prompts_sha256=row.prompts, **own)

@@ -1,4 +1,4 @@
-"""What a request for a schedule means. Its bundles are looked up to see that it can run; it keeps the names."""
+"""Validation of schedule requests. Bundles are resolved to check that it can run; the schedule keeps the names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HINT = 'Write {"cron": "0 3 * * 1", "bundle": "hgm3", "split": "test"}.'
 
 
 def create(shared: Context, key: tenants.ApiKey, body: BinaryIO) -> ScheduleView:
-    """A new schedule.
+    """Create a schedule.
 
     Raises:
         InvalidItems, InvalidInput, InvalidBundle, Refused: of its times, or as for an evaluation that could not run.

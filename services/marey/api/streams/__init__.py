@@ -1,1 +1,1 @@
-"""Live streams and the sockets that show them."""
+"""Live streams and their sockets."""

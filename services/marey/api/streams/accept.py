@@ -1,4 +1,4 @@
-"""Who may open a socket, on what, and what those who may not are told."""
+"""Acceptance of WebSocket connections: key, stream and options."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ log = structlog.get_logger(__name__)
 
 
 async def accept_connection(websocket: WebSocket, stream: str, shared: Context) -> None:
-    """Show a stream to a client until it is over or the client goes; who may not see it is told why by a close code.
+    """Serve a stream to a client until it ends or the client disconnects; refusals are reported by close code.
 
     The handshake is always answered: a browser does not show what stands in one that is refused.
     """
@@ -55,7 +55,7 @@ async def accept_connection(websocket: WebSocket, stream: str, shared: Context) 
 
 
 def key_of(header: str | None, offered: list[str]) -> str | None:
-    """The secret of the API key that a client shows: `Authorization: Bearer …`, else a subprotocol."""
+    """Return the API key of a client: `Authorization: Bearer …`, else a subprotocol."""
     scheme, _, secret = (header or "").partition(" ")
     if scheme.lower() == "bearer":
         return secret.strip()
@@ -63,7 +63,7 @@ def key_of(header: str | None, offered: list[str]) -> str | None:
 
 
 def _authorize(shared: Context, secret: str | None, stream: str, query: QueryParams) -> SessionRequest:
-    """What the client may see.
+    """Return the validated request of a client.
 
     Raises:
         Unauthenticated, Refused, InvalidInput, NotFound: by what is wrong.
@@ -86,14 +86,15 @@ def _authorize(shared: Context, secret: str | None, stream: str, query: QueryPar
 
 
 def _check_names(query: QueryParams) -> None:
-    """As `queries.check_query` for routes: a misspelt `from` would show the stream from its beginning."""
+    """Validate query parameters, as `queries.check_query` does for routes: a misspelt `from` would start the stream
+    from its beginning."""
     for name in query:
         if name not in QUERY:
             raise InvalidInput(f"{name[:40]!r} is no parameter of a socket; {' and '.join(QUERY)} are", where="query")
 
 
 def first_frame(given: str | None) -> int:
-    """The number of the first frame that the client wants.
+    """Parse the number of the first requested frame.
 
     Raises:
         InvalidInput: it is none.

@@ -1,4 +1,4 @@
-"""Clients that cannot keep up: how it shows, and the brake that one of them may pull."""
+"""Backpressure for slow clients: detection, and the pause of a stream."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ BLOCKED_SECONDS = 0.05
 
 
 class LagTracker:
-    """How far a client is behind. One that comes late, or comes back, is far behind and not slow: it catches up."""
+    """Tracks how far a client is behind. A client that connects late is far behind and not slow: it catches up."""
 
     def __init__(self) -> None:
         self._best: float = math.inf
 
     def is_falling_behind(self, behind: int) -> bool:
-        """Whether it is two seconds further behind than it was at best.
+        """Return True if the client is two seconds further behind than it was at best.
 
         Args:
             behind: frames that are there and that it has not.
@@ -29,19 +29,19 @@ class LagTracker:
         return behind > self._best + BEHIND_FRAMES
 
     def caught_up(self) -> None:
-        """It has the newest frame."""
+        """Record that the client has the newest frame."""
         self._best = 0
 
 
 class BackpressurePause:
-    """Pauses a stream, and lets it go on if it was this that paused it."""
+    """Pauses a stream, and resumes it if this paused it."""
 
     def __init__(self, hub: Hub, control: ControlQueue) -> None:
         self._hub, self._control = hub, control
         self._pulled = False
 
     async def engage(self) -> None:
-        """Pause, once.
+        """Pause the stream, once.
 
         Raises:
             Unreachable: Redis does not answer.
@@ -51,7 +51,7 @@ class BackpressurePause:
             self._pulled = True
 
     async def release(self) -> None:
-        """Go on, if it is pulled; raises as `pull`."""
+        """Resume the stream, if it was paused here; raises as `engage`."""
         if self._pulled:
             await self._hub.call(lambda: self._control.send(Control("resume")))
             self._pulled = False

@@ -1,4 +1,4 @@
-"""What a client asks of the stream it watches."""
+"""Control messages from a client to the stream it watches."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ A_SECOND = 20
 
 
 class Rate:
-    """So many in a second; after a quiet time as many at once."""
+    """Token bucket of messages per second."""
 
     def __init__(self, a_second: int) -> None:
         self._a_second = a_second
@@ -31,7 +31,7 @@ class Rate:
         self._at = time.monotonic()
 
     def allows(self, now: float) -> bool:
-        """Whether one more may be, which counts if it may."""
+        """Return True if one more message is allowed, and count it."""
         self._left = min(self._left + (now - self._at) * self._a_second, self._a_second)
         self._at = now
         if self._left < 1:
@@ -41,14 +41,14 @@ class Rate:
 
 
 class Messages:
-    """Reads what one client sends and passes it on, one message after the other."""
+    """Receives the control messages of one client and forwards them, one after the other."""
 
     def __init__(self, writer: SocketWriter, hub: Hub, shared: Context, key: ApiKey, stream: UUID) -> None:
         self._writer, self._hub, self._shared, self._key, self._stream = writer, hub, shared, key, stream
         self._rate = Rate(A_SECOND)
 
     async def obey(self) -> None:
-        """Until the client, or the server, goes away."""
+        """Forward messages until the client disconnects or the server stops."""
         while (message := await self._writer.receive()) is not None:
             try:
                 control = self._control(message)
@@ -58,7 +58,7 @@ class Messages:
                 await self._writer.send_error(error)
 
     def _control(self, message: bytes) -> Control:
-        """What a message asks for.
+        """Parse and validate a message.
 
         Raises:
             Refused, Busy, TooLarge, InvalidInput: by what is wrong with it.

@@ -1,4 +1,4 @@
-"""The WebSocket protocol class of uvicorn, with small buffers and connections that are cut in time."""
+"""uvicorn's WebSocket protocol class with small buffers and bounded closing."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ class StreamProtocol(WebSocketsSansIOProtocol):
         self.conn.debug = False  # it would write headers to the log, and with them the key
 
     def keepalive_timeout(self) -> None:
-        """A ping was not answered."""
+        """Handle an unanswered ping."""
         super().keepalive_timeout()
         self._cut_after(FLUSH_SECONDS)
 
     def shutdown(self) -> None:
-        """The server stops."""
+        """Handle a server stop."""
         super().shutdown()
         self._cut_after(FLUSH_SECONDS)
 
     async def send(self, message: Any) -> None:
-        """Send what the application says."""
+        """Send a message of the application."""
         await super().send(message)
         if message["type"] == "websocket.close":
             self._cut_after(self.close_timeout + FLUSH_SECONDS)

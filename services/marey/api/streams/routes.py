@@ -21,7 +21,7 @@ router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)
 
 @router.post("", status_code=201)
 def begin_stream(body: NewStreamBody, response: Response, shared: Shared, key: Submitter) -> StreamDetailView:
-    """Begin a live stream; its frames come over the WebSocket at its path.
+    """Create a live stream; its frames come over the WebSocket at its path.
 
     It waits while every slot of every worker is taken. 429 when the key has as many open ones as it may.
     """
@@ -39,7 +39,7 @@ def list_streams(
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[StreamView]:
-    """Live streams, newest first."""
+    """List live streams, newest first."""
     page = streams.list_streams(conn, key.tenant, is_open=is_open, cursor=cursor, limit=limit)
     made = service.made_by_each(shared, page.rows)
     items = [StreamView.of(row, by) for row, by in zip(page.rows, made, strict=True)]
@@ -48,13 +48,13 @@ def list_streams(
 
 @router.get("/{stream}")
 def get_stream(stream: UUID, shared: Shared, conn: Connection, key: Reader) -> StreamDetailView:
-    """One live stream, with its prompts on record and its skeleton."""
+    """Get one live stream, with its recorded prompts and its skeleton."""
     return service.detail(conn, shared, streams.get_stream(conn, key.tenant, stream))
 
 
 @router.delete("/{stream}", status_code=202)
 def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailView:
-    """Ask a live stream to end; one that still waits is over at once, and one that is over stays as it is."""
+    """Ask a live stream to end; a waiting one ends at once, and one that has ended stays as it is."""
     service.hub_of(shared)
     row = service.stop(shared, key, stream)
     with db.transaction(shared.engine) as conn:
@@ -63,5 +63,5 @@ def stop_stream(stream: UUID, shared: Shared, key: Submitter) -> StreamDetailVie
 
 @router.websocket("/{stream}")
 async def watch_stream(websocket: WebSocket, stream: str, shared: Shared) -> None:
-    """Frames from `from` on, and control."""
+    """Stream frames from `from` on, and accept control messages."""
     await accept_connection(websocket, stream, shared)

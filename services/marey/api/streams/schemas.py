@@ -1,4 +1,4 @@
-"""What the routes and sockets of live streams take and give."""
+"""Bodies, answers and messages of live streams."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GONE = "null when the bundle is no longer here."
 
 
 class NewStreamBody(BaseModel):
-    """A live stream to begin; what an item has too is checked as there."""
+    """A live stream to create; fields shared with items have the same rules."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -52,7 +52,7 @@ class NewStreamBody(BaseModel):
 
 
 class SkeletonView(View):
-    """The joints that frames turn."""
+    """The joints that frames rotate."""
 
     names: list[str]
     parents: list[int] = Field(description="Index of each joint's parent, which comes before it; -1 for the root.")
@@ -62,7 +62,7 @@ class SkeletonView(View):
 
     @classmethod
     def of(cls, skeleton: Skeleton) -> SkeletonView:
-        """From the skeleton of a layout."""
+        """Convert the skeleton of a layout."""
         places = np.round(skeleton.offsets.astype(np.float64), DIGITS) + 0.0  # no -0.0
         offsets = [(x, y, z) for x, y, z in places.tolist()]
         return cls(names=list(skeleton.joint_names), parents=list(skeleton.parents), offsets=offsets)
@@ -70,7 +70,7 @@ class SkeletonView(View):
 
 @dataclass(frozen=True)
 class Made:
-    """What a stream's bundle says of it; nothing where the bundle is no longer here."""
+    """Data of a stream's bundle; empty if the bundle no longer exists here."""
 
     licence: str | None = None
     fps: float | None = None
@@ -78,14 +78,14 @@ class Made:
 
     @classmethod
     def by(cls, bundle: Bundle) -> Made:
-        """From a bundle."""
+        """Read a bundle."""
         manifest = bundle.manifest
         skeleton = None if manifest.layout is None else SkeletonView.of(layout(manifest.layout).skeleton)
         return cls(licence=manifest.licence, fps=manifest.fps, skeleton=skeleton)
 
 
 class PromptView(View):
-    """A prompt, and since which frame it is in force."""
+    """A prompt, and the frame from which it is in force."""
 
     number: int = Field(description="As in frames: from 0; each steer counts one on.")
     frame: int
@@ -95,7 +95,7 @@ class PromptView(View):
 
     @classmethod
     def of(cls, number: int, told: StreamPrompt) -> PromptView:
-        """From what is on record."""
+        """Convert a recorded prompt."""
         rewritten, reason = (None, None) if told.read is None else told.read
         return cls(number=number, frame=told.frame, prompt=told.prompt, rewritten=rewritten, not_rewritten=reason)
 
@@ -124,25 +124,25 @@ class StreamView(View):
 
     @classmethod
     def of(cls, row: StreamRow, made: Made) -> StreamView:
-        """From a row."""
+        """Convert a row."""
         return cls(**_fields(row, made))
 
 
 class StreamDetailView(StreamView):
-    """A live stream with its prompts on record and its skeleton."""
+    """A live stream with its recorded prompts and its skeleton."""
 
     prompts: list[PromptView]
     skeleton: SkeletonView | None = Field(description=f"What the frames drive; {GONE}")
 
     @classmethod
     def detail(cls, row: StreamRow, made: Made, prompts: Sequence[StreamPrompt]) -> StreamDetailView:
-        """From a row, and its prompts with the frame each is in force from."""
+        """Convert a row, and its prompts with the frame each is in force from."""
         told = [PromptView.of(number, prompt) for number, prompt in enumerate(prompts)]
         return cls(prompts=told, skeleton=made.skeleton, **_fields(row, made))
 
 
 class StreamMessage(View):
-    """How the stream stands: first on every socket, and whenever its state, position or prompts changed."""
+    """Current state of the stream: sent first on every socket, and whenever state, position or prompts changed."""
 
     type: Literal["stream"] = "stream"
     stream: StreamDetailView
@@ -157,14 +157,14 @@ class GapMessage(View):
 
 
 class ErrorMessage(View):
-    """A message of the client cannot be used, or what the socket needs is away for now; the socket stays."""
+    """A message of the client cannot be used, or a dependency is unavailable for now; the socket stays open."""
 
     type: Literal["error"] = "error"
     problem: ProblemBody
 
 
 class EndMessage(View):
-    """The stream is over, and so is the socket."""
+    """The stream has ended, and the socket closes."""
 
     type: Literal["end"] = "end"
     stream: StreamDetailView

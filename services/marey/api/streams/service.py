@@ -1,4 +1,4 @@
-"""What routes and sockets do with streams: begin one, look at it, ask something of it."""
+"""Operations of routes and sockets on streams: create, read, command."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ NEVER_TAKEN = 0
 
 
 def hub_of(shared: Context) -> Hub:
-    """The way to the Redis of the frames.
+    """Return the hub of the frames' Redis.
 
     Raises:
         Unreachable: none is named.
@@ -49,7 +49,7 @@ def hub_of(shared: Context) -> Hub:
 
 
 def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView:
-    """A new stream, waiting for a worker.
+    """Create a stream that waits for a worker.
 
     Raises:
         InvalidInput: of a prompt, name, seed or setting that cannot be used, or a model that cannot stream.
@@ -69,12 +69,12 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
 
 
 def detail(conn: sa.Connection, shared: Context, row: StreamRow) -> StreamDetailView:
-    """A stream with its prompts and skeleton."""
+    """Return a stream with its prompts and skeleton."""
     return StreamDetailView.detail(row, made_by(shared, row), prompts_with_rewrites(conn, row.id))
 
 
 def made_by(shared: Context, row: StreamRow) -> Made:
-    """What the bundle of a stream says, as far as it is still here: a stream that is over outlives its bundle."""
+    """Return the data of a stream's bundle, if it still exists: an ended stream outlives its bundle."""
     try:
         return Made.by(shared.catalogue.offer(row.bundle).bundle)
     except (NotFound, InvalidBundle, Refused):
@@ -82,19 +82,19 @@ def made_by(shared: Context, row: StreamRow) -> Made:
 
 
 def made_by_each(shared: Context, rows: Sequence[StreamRow]) -> list[Made]:
-    """`made_by` of each row, each bundle looked at once."""
+    """Return `made_by` of each row; each bundle is read once."""
     found = {row.bundle: row for row in rows}
     views = {name: made_by(shared, row) for name, row in found.items()}
     return [views[row.bundle] for row in rows]
 
 
 def is_over(row: StreamRow) -> bool:
-    """Whether nothing more comes of it."""
+    """Return True if the stream produces no more frames."""
     return row.state not in OPEN_STREAMS
 
 
 def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> None:
-    """Ask something of a stream that is not over. Steers are many, and are on record with the stream itself.
+    """Send a control message to an open stream. Steers are frequent, and are recorded with the stream itself.
 
     Raises:
         NotFound: the tenant has no such stream.
@@ -114,7 +114,7 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> Non
 
 
 def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
-    """Ask a stream to end, and see how it stands then. One that waits is over at once; one that is over stays so.
+    """Ask a stream to end, and return its new state. A waiting one ends at once; one that has ended stays so.
 
     A worker may take the stream at this very moment. Both lock its row, and look again once they have it: if we come
     first, the worker finds it over and takes nothing; if it comes first, the row has the number of its lease,
@@ -152,7 +152,7 @@ def _new_stream(key: ApiKey, body: NewStreamBody, catalogue: Catalogue) -> NewSt
 
 
 def _checked(body: NewStreamBody) -> Item:
-    """What a stream shares with an item, checked as there."""
+    """Validate the fields that a stream shares with an item."""
     item, problems = read_item(body.model_dump(exclude={"seconds"}))
     if item is None or problems:
         message = "; ".join(str(problem) for problem in problems)
@@ -161,7 +161,7 @@ def _checked(body: NewStreamBody) -> Item:
 
 
 def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
-    """What the stream is made with."""
+    """Return the capabilities of the stream's bundle."""
     try:
         with named_by("model"):
             offer = catalogue.offer(item.model)

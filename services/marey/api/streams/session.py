@@ -1,4 +1,4 @@
-"""One client that watches a stream: the frames as they come, and how the stream stands.
+"""One WebSocket client of a stream: frames as they are made, and changes of the stream's state.
 
 What stands here of frames is one number, that of the next to send: every send is awaited, and what a client does not
 take stays in Redis, or is skipped.
@@ -47,7 +47,7 @@ AGAIN_SECONDS = 0.5
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """What a client came for.
+    """A validated request to watch a stream.
 
     Attributes:
         row, prompts, made: how the stream stood when it came.
@@ -64,7 +64,7 @@ class SessionRequest:
 
 
 class Session:
-    """Shows one stream to one client.
+    """Streams frames and messages to one client.
 
     Args:
         writer: to the client; the handshake is done.
@@ -90,7 +90,7 @@ class Session:
         self._away: float | None = None  # Redis or Postgres, since when
 
     async def run(self) -> None:
-        """Until the stream is over, the client is gone or the server stops."""
+        """Run until the stream ends, the client disconnects or the server stops."""
         tasks = [self._show, self._messages.obey, self._renew]
         if self._request.pauses:
             tasks.append(self._hold)
@@ -117,7 +117,8 @@ class Session:
                 return
 
     async def _turn(self) -> bool:
-        """Wait for frames and send them, or see how the stream stands; whether it is over, and everything told."""
+        """Wait for frames and send them, or refresh the state; return True when the stream has ended and everything is
+        sent."""
         if is_over(self._row):
             await self._finish()
             return True
@@ -133,7 +134,7 @@ class Session:
         return self._frames.reader(self._at).read(count=BATCH, block_ms=round(1000 * seconds))
 
     async def _pass_on(self, found: Sequence[StoredFrame | Gap]) -> bool:
-        """Send these; False when the rest of them was skipped."""
+        """Send these frames and gaps; return False if the rest was skipped."""
         for each in found:
             if isinstance(each, Gap):
                 await self._tell_gap(each)
@@ -147,7 +148,7 @@ class Session:
         return True
 
     async def _send(self, frame: StoredFrame) -> bool:
-        """Send a frame; whether that had to wait."""
+        """Send a frame; return True if that had to wait."""
         self._sending = time.monotonic()
         try:
             await self._writer.send(frame.data)
@@ -156,7 +157,7 @@ class Session:
             self._sending = None
 
     async def _skip(self) -> bool:
-        """Go on with the newest frame, if the client falls behind."""
+        """Skip to the newest frame, if the client falls behind."""
         if time.monotonic() - self._measured < MEASURE_SECONDS:
             return False
         self._measured = time.monotonic()
@@ -174,18 +175,19 @@ class Session:
         self._at = gap.first + gap.count
 
     async def _behind(self) -> int:
-        """Frames that are there and that the client has not."""
+        """Return the number of available frames that the client lacks."""
         return (await self._hub.call(self._frames.bounds))[1] - self._at
 
     def _patience(self, flowing: bool) -> float:
-        """Seconds from one look at the row to the next; a little less than a read waits, for its clock is another."""
+        """Return the seconds between two reads of the row; a little less than a read waits, since its clock is
+        another."""
         if self._last:
             return 0.0
         settled = self._row.state is StreamState.LIVE and self._prompt < len(self._prompts)
         return FLOW_SECONDS if flowing and settled else 0.9 * IDLE_SECONDS
 
     async def _look(self) -> None:
-        """See how the stream stands, and tell it if that is news."""
+        """Read the stream's state, and send it if it changed."""
         self._row, self._prompts = await self._hub.call(self._stand)
         self._looked = time.monotonic()
         if self._standing() != self._told and not is_over(self._row):
@@ -193,7 +195,7 @@ class Session:
             self._told = self._standing()
 
     def _stand(self) -> tuple[StreamRow, Sequence[StreamPrompt]]:
-        """The row, and the prompts where there may be new ones: frames carry a number that is not on record here."""
+        """Read the row, and the prompts if there may be new ones: frames carry a number that is not known here."""
         with transaction(self._shared.engine) as conn:
             check_key(conn, self._request.key.id)  # revoked, expired or suspended since
             row = get_stream(conn, self._row.tenant, self._row.id)
@@ -201,7 +203,7 @@ class Session:
             return row, self._prompts if known else prompts_with_rewrites(conn, row.id)
 
     async def _finish(self) -> None:
-        """What is left of a stream that is over."""
+        """Send the rest of an ended stream."""
         while found := await self._hub.wait(lambda: self._read(0)):
             await self._pass_on(found)
         if self._at < self._row.frames:  # an hour after its end it has none
@@ -210,7 +212,7 @@ class Session:
         await self._writer.close(1000)
 
     async def _give_up(self, error: Unreachable) -> bool:
-        """Tell of an outage once, and wait a little; True, and the socket closed, when it lasts too long."""
+        """Report an outage once, and wait a little; return True, with the socket closed, when it lasts too long."""
         now = time.monotonic()
         if self._away is None:
             self._away = now
@@ -222,14 +224,14 @@ class Session:
         return False
 
     async def _renew(self) -> None:
-        """Say that somebody watches, as long as this runs."""
+        """Refresh the viewer's presence while this runs."""
         while True:
             with suppress(Unreachable):  # told by `_show`
                 await self._hub.call(self._presence.refresh)
             await anyio.sleep(REFRESH_SECONDS)
 
     async def _hold(self) -> None:
-        """Pause the stream while the client blocks our sends and falls behind; `_turn` lets it go on."""
+        """Pause the stream while the client blocks sends and falls behind; `_turn` resumes it."""
         while True:
             await anyio.sleep(HOLD_SECONDS)
             since = self._sending
@@ -240,7 +242,7 @@ class Session:
                     await self._pause.engage()
 
     def _standing(self) -> tuple[object, ...]:
-        """What the client is told of when it changes."""
+        """Return the state whose changes the client receives."""
         return self._row.state, self._row.position, tuple(self._prompts)
 
     def _detail(self) -> StreamDetailView:
@@ -248,7 +250,7 @@ class Session:
 
 
 async def _and_then_none(task: Callable[[], Awaitable[None]], group: TaskGroup) -> None:
-    """Where one task of a session ends, all do: the client is gone, or everything is told."""
+    """Run a task and then cancel its group: the session ends with any of its tasks."""
     with suppress(WebSocketDisconnect):
         await task()
     group.cancel_scope.cancel()

@@ -1,4 +1,4 @@
-"""One open socket: what is sent, in which order, and how it is closed."""
+"""Writer of one open socket: ordered messages, and closing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ REASON_BYTES = 123  # RFC 6455
 
 class SocketWriter:
     """Sends whole messages, one after the other, until it is closed. Each send waits until the one before is on its
-    way: what a slow client does not take is never kept here."""
+    way: nothing is buffered here for a slow client."""
 
     def __init__(self, websocket: WebSocket) -> None:
         self._websocket = websocket
@@ -29,7 +29,7 @@ class SocketWriter:
         self._closed = False
 
     async def receive(self) -> bytes | None:
-        """The next message of the client; None when it, or the server, goes away."""
+        """Return the next message of the client; None on disconnect or server stop."""
         message = await self._websocket.receive()
         if message["type"] == "websocket.disconnect":
             return None
@@ -37,7 +37,7 @@ class SocketWriter:
         return message["bytes"] if text is None else text.encode()
 
     async def send(self, data: bytes) -> None:
-        """A binary message.
+        """Send a binary message.
 
         Raises:
             WebSocketDisconnect: the client is gone.
@@ -47,7 +47,7 @@ class SocketWriter:
                 await self._websocket.send_bytes(data)
 
     async def send_message(self, message: SocketMessage) -> None:
-        """A text message; raises as `send`."""
+        """Send a text message; raises as `send`."""
         # As over HTTP: a problem leaves out what it has not, everything else says null.
         text = message.model_dump_json(exclude_none=isinstance(message, ErrorMessage))
         async with self._lock:
@@ -55,17 +55,17 @@ class SocketWriter:
                 await self._websocket.send_text(text)
 
     async def send_error(self, error: MareyError) -> None:
-        """Tell what is wrong, and stay; raises as `send`."""
+        """Send an error, and keep the socket open; raises as `send`."""
         await self.send_message(ErrorMessage(problem=problem_body(error)))
 
     async def refuse(self, error: MareyError) -> None:
-        """Close for an error, and tell what clients may know of it; raises as `send`."""
+        """Close for an error, with the part of its message that clients may see; raises as `send`."""
         if error.status >= 500:
             log.warning("stream_socket_closed", error=str(error))
         await self.close(close_code(error), public_error(error).message)
 
     async def close(self, code: int, reason: str = "") -> None:
-        """The last thing that is sent; raises as `send`."""
+        """Close the socket; raises as `send`."""
         async with self._lock:
             if not self._closed:
                 self._closed = True
@@ -73,5 +73,5 @@ class SocketWriter:
 
 
 def close_code(error: MareyError) -> int:
-    """With which code a socket is closed for this error."""
+    """Return the close code of an error."""
     return 4000 + error.status if error.status in TOLD else AWAY

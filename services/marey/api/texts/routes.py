@@ -15,5 +15,5 @@ router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
 
 @router.post("/parse", response_model=GraphsView)
 async def parse_texts(body: ParseBody, shared: Shared, key: Parser) -> Response:
-    """The semantic graph of each prompt; 429 while too much is being parsed, 503 after 10 s."""
+    """Parse prompts into semantic graphs; 429 while too much is being parsed, 503 after 10 s."""
     return await shared.texts.parse(body)

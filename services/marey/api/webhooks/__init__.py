@@ -1,1 +1,1 @@
-"""Webhooks: who is told what happens."""
+"""Webhooks: subscriptions to events."""

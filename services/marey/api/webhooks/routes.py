@@ -32,7 +32,7 @@ router = APIRouter(prefix="/v1/webhooks", tags=["webhooks"], responses=RESPONSES
 def create_webhook(
     body: NewWebhookBody, response: Response, shared: Shared, conn: Connection, key: Operator
 ) -> MadeWebhookView:
-    """Be told of what happens from now on. The answer has the signing secret, which is shown only here."""
+    """Create a webhook for future events. The answer has the signing secret, which is shown only here."""
     url = check_url(body.url, Allowed.of(shared.config.webhook_allow))
     secret = new_signing_secret()
     sealed = Vault.of(shared.config).encrypt(secret)
@@ -44,20 +44,20 @@ def create_webhook(
 
 @router.get("")
 def list_webhooks(conn: Connection, key: Reader, cursor: Cursor = None, limit: Limit = 50) -> PageView[WebhookView]:
-    """Webhooks, newest first."""
+    """List webhooks, newest first."""
     page = webhooks.list_webhooks(conn, key.tenant, cursor=cursor, limit=limit)
     return PageView[WebhookView](items=[WebhookView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{webhook}")
 def get_webhook(webhook: UUID, conn: Connection, key: Reader) -> WebhookView:
-    """One webhook."""
+    """Get one webhook."""
     return WebhookView.of(webhooks.get_webhook(conn, key.tenant, webhook))
 
 
 @router.patch("/{webhook}")
 def change_webhook(webhook: UUID, patch: WebhookPatch, shared: Shared, conn: Connection, key: Operator) -> WebhookView:
-    """Change what is given. While it is paused its messages wait; then they go to the address it has then."""
+    """Change the given fields. While a webhook is paused its messages wait; then they go to its current URL."""
     fields = patch.model_dump()
     if patch.url is not None:
         fields["url"] = check_url(patch.url, Allowed.of(shared.config.webhook_allow))
@@ -75,7 +75,8 @@ def rotate_webhook(
         float, Query(ge=0, le=720, description="The secret in force now signs as well for so long; 0 = no more.")
     ] = 24,
 ) -> MadeWebhookView:
-    """Sign with another secret. The answer has it, and only this one; meanwhile messages carry two signatures."""
+    """Sign with a new secret. The answer has it, and only this one; until the overlap ends messages carry two
+    signatures."""
     secret = new_signing_secret()
     sealed = Vault.of(shared.config).encrypt(secret)
     row = webhooks.rotate_secret(conn, key.tenant, webhook, sealed, overlap=3600 * overlap_hours)
@@ -85,14 +86,14 @@ def rotate_webhook(
 
 @router.delete("/{webhook}", status_code=204, response_class=Response)
 def delete_webhook(webhook: UUID, conn: Connection, key: Operator) -> None:
-    """Remove a webhook, with its deliveries and their log."""
+    """Delete a webhook, with its deliveries and their log."""
     webhooks.delete_webhook(conn, key.tenant, webhook)
     note(conn, key, "webhook.delete", webhook)
 
 
 @router.post("/{webhook}/test", status_code=202)
 def send_test(webhook: UUID, conn: Connection, key: Operator) -> DeliveryView:
-    """Send it a message of the type `webhook.test`, which is tried once."""
+    """Send a message of the type `webhook.test`, which is attempted once."""
     note(conn, key, "webhook.test", webhook)
     return DeliveryView.of(webhooks.send_test(conn, key.tenant, webhook))
 
@@ -106,20 +107,20 @@ def list_deliveries(
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[DeliveryView]:
-    """What it was told in the last 30 days, newest first."""
+    """List deliveries of the last 30 days, newest first."""
     page = webhooks.list_deliveries(conn, key.tenant, webhook, states=state or (), cursor=cursor, limit=limit)
     return PageView[DeliveryView](items=[DeliveryView.of(row) for row in page.rows], next=page.cursor)
 
 
 @router.get("/{webhook}/deliveries/{event}")
 def get_delivery(webhook: UUID, event: UUID, conn: Connection, key: Reader) -> DeliveryDetailView:
-    """One delivery with its tries."""
+    """Get one delivery with its attempts."""
     row = webhooks.get_delivery(conn, key.tenant, webhook, event)
     return DeliveryDetailView.detail(row, webhooks.delivery_attempts(conn, webhook, event))
 
 
 @router.post("/{webhook}/deliveries/{event}/replay", status_code=202)
 def replay_delivery(webhook: UUID, event: UUID, conn: Connection, key: Operator) -> DeliveryView:
-    """Deliver it once more, now, under the same id and with all tries; also one that waits for its next try."""
+    """Deliver again, now, under the same id and with all attempts; also a pending one."""
     note(conn, key, "webhook.replay", webhook, event=str(event))
     return DeliveryView.of(webhooks.replay_delivery(conn, key.tenant, webhook, event))

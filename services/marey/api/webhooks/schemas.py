@@ -1,4 +1,4 @@
-"""What the routes of webhooks take and give."""
+"""Bodies and answers of the webhook routes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Url = Annotated[str, Field(min_length=1, max_length=MAX_URL), FreeText()]
 
 
 class NewWebhookBody(BaseModel):
-    """A webhook to make."""
+    """A webhook to create."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -30,7 +30,7 @@ class NewWebhookBody(BaseModel):
 
 
 class WebhookPatch(BaseModel):
-    """Changes to a webhook; what is not given stays."""
+    """Changes to a webhook; omitted fields stay as they are."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -54,23 +54,23 @@ class WebhookView(View):
 
     @classmethod
     def of(cls, row: WebhookRow) -> WebhookView:
-        """From a row."""
+        """Convert a row."""
         return cls(**_fields(row, WebhookView))
 
 
 class MadeWebhookView(WebhookView):
-    """A webhook that was just made, with its signing secret: it is shown only now."""
+    """A new webhook, with its signing secret: it is shown only now."""
 
     secret: str = Field(description="`whsec_…`, for the library of Standard Webhooks on the receiver's side.")
 
     @classmethod
     def made(cls, row: WebhookRow, secret: str) -> MadeWebhookView:
-        """From a row and its secret."""
+        """Convert a row and its secret."""
         return cls(secret=secret, **_fields(row, WebhookView))
 
 
 class DeliveryView(View):
-    """A message on its way to a webhook, or at the end of it."""
+    """The delivery of a message to a webhook."""
 
     webhook: UUID
     event: UUID = Field(description="The message's id, which the receiver finds in `webhook-id`.")
@@ -86,12 +86,12 @@ class DeliveryView(View):
 
     @classmethod
     def of(cls, row: DeliveryRow) -> DeliveryView:
-        """From a row."""
+        """Convert a row."""
         return cls(**_fields(row, DeliveryView))
 
 
 class AttemptView(View):
-    """One try."""
+    """One attempt."""
 
     number: int
     at: datetime
@@ -101,18 +101,18 @@ class AttemptView(View):
 
     @classmethod
     def of(cls, row: AttemptRow) -> AttemptView:
-        """From a row."""
+        """Convert a row."""
         return cls(**_fields(row, AttemptView))
 
 
 class DeliveryDetailView(DeliveryView):
-    """A delivery with its tries."""
+    """A delivery with its attempts."""
 
     log: list[AttemptView]
 
     @classmethod
     def detail(cls, row: DeliveryRow, log: list[AttemptRow]) -> DeliveryDetailView:
-        """From rows."""
+        """Convert rows."""
         return cls(log=[AttemptView.of(each) for each in log], **_fields(row, DeliveryView))
 
 

@@ -1,4 +1,4 @@
-"""A stream under this worker's lease: what the loop adds to and the supervisor writes down."""
+"""A stream under this worker's lease: the loop adds to it and the supervisor records it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from marey.text.features import TextFeatures
 
 @dataclass(eq=False)
 class LeasedStream:
-    """One stream.
+    """State of one stream.
 
     Attributes:
         text: of the prompt in force.
@@ -85,30 +85,30 @@ class LeasedStream:
 
     @property
     def behind(self) -> bool:
-        """Whether it plays frames once more that another worker has shown."""
+        """True while it replays frames that another worker has shown."""
         return self.state is StreamState.LIVE and len(self.tokens) < self.lease.next_frame
 
     @property
     def playing(self) -> ActionStart | None:
-        """The act of the prompt in force that plays; None before the first frame of that prompt."""
+        """Start of the current action of the prompt in force; None before the first frame of that prompt."""
         return self.acts[-1] if self.acts and self.acts[-1].frame >= self.prompts[-1][0] else None
 
     def add(self, made: LiveFrame) -> None:
-        """A frame was made."""
+        """Append a frame."""
         with self.lock:
             if self.playing is None or self.playing.act != made.act:
                 self.acts.append(ActionStart(len(self.tokens), made.act))
             self.tokens.append(made.tokens)
 
     def steered(self, prompt: str, text: TextFeatures, control: str) -> None:
-        """A prompt is in force from the next frame on."""
+        """Set the prompt in force from the next frame on."""
         with self.lock:
             self.prompts.append((len(self.tokens), prompt))
             self.reads.append(PromptRewrite(text.rewritten, text.not_rewritten))
             self.text, self.obeyed = text, control
 
     def chunk(self) -> StreamChunk | None:
-        """What is not written down yet and was shown; None if nothing is new."""
+        """Return shown but unrecorded frames and changes; None if there are none."""
         with self.lock:
             stop = min(self.shown, len(self.tokens))
             tokens = self.tokens[self.recorded : stop]
@@ -126,7 +126,7 @@ class LeasedStream:
             return StreamChunk(self.recorded, len(tokens), content, prompts, control, state, acts, reads)
 
     def wrote(self, chunk: StreamChunk) -> None:
-        """A chunk is written down."""
+        """Mark a chunk as recorded."""
         with self.lock:
             self.recorded_control = chunk.control
             self.recorded += chunk.frames

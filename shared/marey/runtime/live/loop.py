@@ -1,4 +1,4 @@
-"""The thread that makes frames: a step of the pool each tick, its frames to Redis, messages obeyed in between."""
+"""The thread that makes frames: one step of the session pool per tick, frames to Redis, messages applied in between."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MOST_UNWRITTEN = 1200
 
 @dataclass(frozen=True)
 class StreamFinished:
-    """A stream that the loop is through with, for the supervisor to close; `problem`: it failed."""
+    """A stream that the loop has ended, for the supervisor to close; `problem`: it failed."""
 
     leased: LeasedStream
     reason: str
@@ -82,7 +82,7 @@ class LiveLoop:
             self.finished.set()
 
     def tick(self) -> None:
-        """Obey what was asked, then make one frame of every stream that plays."""
+        """Apply queued calls, then make one frame of every playing stream."""
         self.ticked = self._clock()
         self._away = None
         while not self._calls.empty():
@@ -103,11 +103,11 @@ class LiveLoop:
     # --- what is asked of it, from other threads ---
 
     def join(self, leased: LeasedStream) -> None:
-        """A stream to show."""
+        """Start a stream."""
         self._calls.put(lambda: self._guarded(leased, lambda: self._join(leased)))
 
     def steer(self, leased: LeasedStream, prompt: str, text: TextFeatures, control: str) -> None:
-        """Another prompt."""
+        """Set another prompt."""
         self._calls.put(
             lambda: self._guarded(
                 leased, lambda: self._in_turn(leased, lambda: self._steer(leased, prompt, text, control))
@@ -115,7 +115,7 @@ class LiveLoop:
         )
 
     def switch(self, leased: LeasedStream, state: StreamState, control: str) -> None:
-        """Pause, or go on."""
+        """Pause or resume a stream."""
         self._calls.put(
             lambda: self._guarded(leased, lambda: self._in_turn(leased, lambda: self._switch(leased, state, control)))
         )
@@ -125,13 +125,13 @@ class LiveLoop:
         self._calls.put(lambda: self._guarded(leased, lambda: self._end(leased, reason)))
 
     def leave(self, leased: LeasedStream) -> None:
-        """Forget a stream that is no longer ours."""
+        """Drop a stream whose lease is lost."""
         self._calls.put(lambda: self._forget(leased))
 
     # --- on its own thread ---
 
     def _guarded(self, leased: LeasedStream, action: Callable[[], None]) -> None:
-        """An error of one stream ends that stream alone."""
+        """Run an action; an error ends this stream alone."""
         if leased.lost or (leased.session is None and leased.ending is not None):
             return
         try:
@@ -143,8 +143,8 @@ class LiveLoop:
             self._close(leased, "it could not go on", problem)
 
     def _in_turn(self, leased: LeasedStream, message: Callable[[], None]) -> None:
-        """Obey behind the frames that were shown already: what another worker showed under one prompt is not put on
-        record under another."""
+        """Apply a message after replayed frames: frames that another worker showed under one prompt are not recorded
+        under another."""
         if leased.behind or leased.delayed:
             leased.delayed.append(message)
         else:
@@ -236,8 +236,8 @@ class LiveLoop:
             self.pool.stop(session)
 
     def _rebuild(self, error: Exception) -> None:
-        """A pool that broke is left with all that is in it. Which stream broke it shows in a pool of its own; that one
-        has failed, the others go on.
+        """Replace a failed session pool. Each stream is tried in an empty pool: the one that breaks it fails, the
+        others continue.
 
         Raises: the error, where no stream did it.
         """
@@ -257,7 +257,7 @@ class LiveLoop:
             self._join(leased)
 
     def _sound(self, leased: LeasedStream, pool: SessionPool) -> bool:
-        """Whether a stream can make its next frame in an empty pool, which is empty again where it can."""
+        """Return True if a stream can make its next frame in an empty pool, which is empty again afterwards."""
         try:
             session = _entered(pool, leased)
             encode_frame(pool.catch_up(session, 1)[0].frame)
@@ -269,7 +269,7 @@ class LiveLoop:
 
 
 def _entered(pool: SessionPool, leased: LeasedStream) -> int:
-    """The stream's session in a pool, new or where it was."""
+    """Start or resume the stream's session in a pool; return it."""
     prompt = len(leased.prompts) - 1
     return pool.start(leased.text, leased.row.seed, past=leased.past, prompt=prompt, began=leased.playing)
 

@@ -1,4 +1,4 @@
-"""What the live loop knows of the model it shows."""
+"""The interface between the live loop and its model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Tokens: TypeAlias = NDArray[np.int16]
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """What a step gives for a session."""
+    """Result of a step for one session."""
 
     frame: Frame
     tokens: Tokens
@@ -28,19 +28,19 @@ class LiveFrame:
 
 
 class SessionPool(Protocol):
-    """Sessions of one loaded bundle; all that are not paused move on together, one frame a step. One thread at a time.
+    """Sessions of one loaded bundle; all that are not paused advance together, one frame per step. Not thread-safe.
 
     Every method raises `InvalidInput` for a session that is not there or not in the right state.
     """
 
     @property
     def capacity(self) -> int:
-        """Sessions at most."""
+        """Maximum number of sessions."""
         ...
 
     @property
     def fps(self) -> float:
-        """Frames of a second."""
+        """Frames per second."""
         ...
 
     @property
@@ -55,12 +55,12 @@ class SessionPool(Protocol):
 
     @property
     def levels(self) -> int:
-        """V, codes of a frame."""
+        """V, codes per frame."""
         ...
 
     @property
     def min_frames(self) -> int:
-        """The shortest clip."""
+        """Length of the shortest clip, in frames."""
         ...
 
     def start(
@@ -72,32 +72,32 @@ class SessionPool(Protocol):
         prompt: int = 0,
         began: ActionStart | None = None,
     ) -> int:
-        """A new session, or one to go on behind `past` (n, V) with prompt number `prompt` in force, of which the act
-        `began` plays (None: the first begins); its name."""
+        """Start a session, or resume one behind `past` (n, V) with prompt number `prompt` in force and its action
+        `began` playing (None: the first action starts); return its id."""
         ...
 
     def steer(self, session: int, text: TextFeatures) -> None:
-        """Another prompt, in force from the next frame on."""
+        """Set another prompt, in force from the next frame on."""
         ...
 
     def pause(self, session: int) -> None:
-        """Leave a session out of the steps."""
+        """Exclude a session from steps."""
         ...
 
     def resume(self, session: int) -> None:
-        """Let it go on with the frames that it would have shown."""
+        """Resume a session with the frames that it would have shown."""
         ...
 
     def stop(self, session: int) -> None:
-        """Forget a session."""
+        """Remove a session."""
         ...
 
     def catch_up(self, session: int, frames: int) -> list[LiveFrame]:
-        """The next frames of one session alone, at once."""
+        """Return the next frames of one session alone, at once."""
         ...
 
     def step(self) -> dict[int, LiveFrame]:
-        """The next frame of every session that is not paused."""
+        """Return the next frame of every session that is not paused."""
         ...
 
 
@@ -107,7 +107,7 @@ Parse: TypeAlias = Callable[[str], TextFeatures]
 
 @dataclass(frozen=True)
 class LiveModel:
-    """What a live worker serves.
+    """A model that a live worker serves.
 
     Attributes:
         open_pool: an empty pool; called again when one broke.

@@ -1,4 +1,4 @@
-"""Prompts, read aside: a rewriter may take its time, and the supervisor has other streams to look after."""
+"""Parsing of prompts in the background: a rewriter may be slow, and the supervisor has other streams to manage."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ log = logger(__name__)
 
 
 class Reading:
-    """The features of some prompts, from a thread of its own that dies with the process.
+    """Features of some prompts, computed on a daemon thread.
 
     Args:
         parse: reads one prompt; may be called on several threads at once.
@@ -33,11 +33,11 @@ class Reading:
         threading.Thread(target=self._read, name="reader", daemon=True).start()
 
     def is_done(self, seconds: float = 0.0) -> bool:
-        """Whether there is an answer, now or within so many seconds."""
+        """Return True if the result is there, now or within `seconds`."""
         return self._done.wait(seconds)
 
     def features(self) -> list[TextFeatures]:
-        """Of each prompt, once it is done.
+        """Return the features of each prompt, after `is_done`.
 
         Raises:
             MareyError: one of them cannot be read.
@@ -60,7 +60,7 @@ class Reading:
 
 @dataclass(eq=False)
 class Opening:
-    """A stream that this worker has taken and whose prompts are being read; its lease is renewed like any other.
+    """A taken stream whose prompts are being parsed; its lease is renewed like any other.
 
     Attributes:
         reading: of the first prompt, and of the one in force where that is another.
@@ -75,7 +75,7 @@ class Opening:
 
     @property
     def row(self) -> StreamRow:
-        """As it was taken."""
+        """The row at the time of taking."""
         return self.past.row
 
     @property

@@ -1,4 +1,4 @@
-"""The thread beside the frames: takes streams, renews what it holds, reads messages, writes tokens down, closes."""
+"""The thread beside the loop: takes streams, renews leases, reads messages, records tokens, closes streams."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ QUEUE = "live"
 
 
 class StreamSupervisor(threading.Thread):
-    """Holds the streams of one live loop.
+    """Manages the streams of one live loop.
 
     Args:
         engine, client: Postgres and Redis.
@@ -84,14 +84,14 @@ class StreamSupervisor(threading.Thread):
         self.renewer = threading.Thread(target=self._renew_all, name="renewer", daemon=True)
 
     def serve(self, loop: LiveLoop) -> None:
-        """Start, for this loop."""
+        """Start the threads for this loop."""
         self._loop = loop
         self._pool: SessionPool = loop.pool
         self.renewer.start()
         self.start()
 
     def over(self, what: StreamFinished) -> None:
-        """The loop is through with a stream."""
+        """Queue a finished stream for closing."""
         self._over.put(what)
 
     def run(self) -> None:
@@ -114,7 +114,7 @@ class StreamSupervisor(threading.Thread):
     # --- leases ---
 
     def _renew_all(self) -> None:
-        """On a thread of its own: a database that hangs must not cost a lease."""
+        """Renew leases, on a thread of its own: a database that hangs must not cost a lease."""
         while not self._stopping.wait(RENEW_SECONDS):
             if time.monotonic() - self._loop.ticked > STALL_SECONDS:
                 continue  # the loop hangs: let another worker have its streams
@@ -186,7 +186,7 @@ class StreamSupervisor(threading.Thread):
                 self._join(opening)
 
     def _join(self, opening: Opening) -> None:
-        """Its prompts are read: it goes on."""
+        """Pass a stream on to the loop once its prompts are parsed."""
         past, row, frames, lease = opening.past, opening.row, opening.frames, opening.lease
         self._openings.pop(str(row.id), None)
         if opening.lost:
@@ -238,7 +238,7 @@ class StreamSupervisor(threading.Thread):
                 leased.heard.popleft()
 
     def _obey(self, leased: LeasedStream, identity: str, message: Control) -> bool:
-        """Pass a message on to the loop; False while its prompt is being read, and all behind it wait."""
+        """Pass a message on to the loop; return False while its prompt is being parsed, and later messages wait."""
         if message.prompt is None:
             state = StreamState.PAUSED if message.kind == "pause" else StreamState.LIVE
             self._loop.switch(leased, state, identity)
@@ -271,7 +271,7 @@ class StreamSupervisor(threading.Thread):
             self._write(leased)
 
     def _idles(self, leased: LeasedStream, now: float) -> str:
-        """Why a stream should give its slot to another; empty where it should not."""
+        """Return the reason why a stream should release its slot; empty if it should not."""
         if leased.presence.is_active():
             leased.seen = now
         if leased.state is not StreamState.PAUSED:
@@ -328,7 +328,7 @@ class StreamSupervisor(threading.Thread):
         log.info("stream_ended", stream=str(row.id), reason=reason, failed=problem is not None, clip=clip is not None)
 
     def _give_back(self) -> None:
-        """This worker stops: another goes on at once, behind the last frame that was shown."""
+        """Release all streams when this worker stops: another one resumes at once, behind the last shown frame."""
         self._loop.finished.wait(STALL_SECONDS)
         for opening in list(self._openings.values()):
             self._guarded(lambda opening=opening: _released(opening))
@@ -343,7 +343,7 @@ class StreamSupervisor(threading.Thread):
 
 
 class _Round:
-    """Something to do every so often."""
+    """A periodic action."""
 
     def __init__(self, action: Callable[[], None], seconds: float) -> None:
         self.action = action
@@ -351,7 +351,7 @@ class _Round:
         self._due = 0.0
 
     def due(self) -> bool:
-        """Whether it is time; then the next time is set."""
+        """Return True if the action is due, and schedule the next time."""
         now = time.monotonic()
         if now < self._due:
             return False
@@ -360,7 +360,7 @@ class _Round:
 
 
 def clip_of(leased: LeasedStream, pool: SessionPool) -> tuple[NewItem, bytes] | None:
-    """The item that makes the clip of a stream, and its recording; None for one that is too short."""
+    """Return the item that makes the clip of a stream, and its recording; None for a stream that is too short."""
     row = leased.row
     if leased.recorded < max(1, pool.min_frames):
         return None
