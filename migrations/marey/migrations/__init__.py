@@ -1,1 +1,1 @@
-"""Database migrations (Alembic). `marey.jobs.upgrade` runs them; `marey admin migrate` calls that."""
+"""Database migrations (Alembic). `marey.db.upgrade` runs them; `marey admin migrate` calls that."""

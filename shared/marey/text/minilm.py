@@ -1,7 +1,7 @@
 """The forward pass of MiniLM (Wang et al. 2020, arXiv 2002.10957; BERT's layers), written for short sentences.
 
 `transformers`' BertModel gives the same numbers, but takes twice as long at batch 1 (11 ms against 5.4 ms for 12
-words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`marey.text.compiled`).
+words on one core) and two seconds to import. The int8 copy takes a third of that, compiled (`marey.nn.compiled`).
 It is the labeller's; node features come from the float32 one, since "left hand" and "right hand" lie closer together
 (cosine .9) than int8 is exact (cosine .98).
 

@@ -51,7 +51,7 @@ class Reconstruction(BaseModel):
     generator: str
     evaluator: str
     clips: Mapping[str, int]
-    """By source of prompts (`marey.jobs.BUNDLE_SOURCES`)."""
+    """By source of prompts (`marey.evaluations.BUNDLE_SOURCES`)."""
     error_mm: Mapping[str, float]
     """Mean joint error with the pelvis laid over the true one, by source."""
     values: Mapping[str, Mapping[str, Value]]
