@@ -20,7 +20,7 @@ def settings_here() -> Settings:
     Raises:
         InvalidInput: the extra `server` is not installed.
     """
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.core.settings import settings

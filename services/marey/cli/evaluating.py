@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,24 +16,19 @@ from marey.cli import console
 from marey.cli.options import ExtraColumns
 from marey.cli.references import FORMS
 from marey.core.characters import escape
-from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed, TimedOut, Unreachable
+from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed
 from marey.items.evaluation_prompts import PromptCheck
 from marey.items.item import InvalidItems, Problem, outside_range
 
 if TYPE_CHECKING:
     from marey.client.transport import Transport
 
-OPEN = frozenset({"planned", "generating", "scoring"})
 TEST = "test"
 SPLITS = (TEST, "compositional", "test+compositional")
 ANEW = 20
 """Repeats that a report's intervals are over: with as many motions of a prompt, each of them generates anew."""
 RUN_COLUMNS = ("id", "name", "state", "regressed", "bundle", "source", "created")
 COMPARISON = ("metric", "before", "after", "change", "95 % interval", "verdict")
-POLL = 1.0
-"""Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
-PATIENCE = 180.0
-"""Seconds without a reachable server after which waiting gives up."""
 
 Bundle = Annotated[str, typer.Option("--bundle", "--model", help="Model, bundle or exact bundle that generates.")]
 Evaluator = Annotated[
@@ -181,23 +175,18 @@ def watch_evaluation(
         TimedOut: `timeout` passed; the evaluation goes on.
         Unreachable: the server was away for longer than `PATIENCE`.
     """
-    deadline = None if timeout is None else time.monotonic() + timeout
-    with console.goes_on(f"evaluation {evaluation}", _wait_hint(evaluation)), console.bar() as bar:
+    from marey.client.watching import follow_evaluation
+
+    hint = _wait_hint(evaluation)
+    with console.goes_on(f"evaluation {evaluation}", hint), console.bar() as bar:
         bar.disable = quiet
         task = bar.add_task("", total=None)
-        reachable = time.monotonic()
-        while True:
-            try:
-                found = client.get(f"/v1/evaluations/{evaluation}")
-                reachable = time.monotonic()
-                job = found["scoring"] or found["generation"] or {"ended": 0, "total": None}
-                bar.update(task, description=_caption(found), completed=job["ended"], total=job["total"])
-                if found["state"] not in OPEN:
-                    return found
-            except Unreachable:
-                if time.monotonic() - reachable > PATIENCE:
-                    raise
-            _sleep(deadline, evaluation)
+
+        def look(found: dict[str, Any]) -> None:
+            job = found["scoring"] or found["generation"] or {"ended": 0, "total": None}
+            bar.update(task, description=_caption(found), completed=job["ended"], total=job["total"])
+
+        return follow_evaluation(client, evaluation, timeout=timeout, hint=hint, look=look)
 
 
 def check_evaluation(found: dict[str, Any], *, fail_on_regression: bool) -> None:
@@ -274,17 +263,6 @@ def _settings(given: Sequence[str]) -> dict[str, float]:
 
 def _caption(found: dict[str, Any]) -> str:
     return f"{found['name'] or found['id']} {found['state']}"
-
-
-def _sleep(deadline: float | None, evaluation: str) -> None:
-    left = POLL if deadline is None else deadline - time.monotonic()
-    if left <= 0:
-        raise TimedOut(
-            "the time allowed has passed; the evaluation goes on",
-            where=f"evaluation {evaluation}",
-            hint=_wait_hint(evaluation),
-        )
-    time.sleep(min(POLL, left))
 
 
 def _wait_hint(evaluation: str) -> str:

@@ -1,18 +1,16 @@
-"""Following a job until it ends."""
+"""Following a job until it ends, with a progress bar."""
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from marey.cli import console
-from marey.client.transport import PATIENCE, Transport
-from marey.core.errors import Busy, ItemsFailed, TimedOut, Unreachable
+from marey.client.transport import Transport
+from marey.client.watching import ended_items, follow_job, items_without_result
+from marey.core.errors import ItemsFailed
 
-ENDED = frozenset({"succeeded", "partial", "failed", "cancelled"})
 
-
-def watch_job(client: Transport, job: str, *, timeout: float | None = None, quiet: bool = False) -> dict[str, Any]:
+def watch_job(transport: Transport, job: str, *, timeout: float | None = None, quiet: bool = False) -> dict[str, Any]:
     """Follow the job's events until it has ended; a lost connection is taken up where it broke.
 
     Args:
@@ -26,33 +24,24 @@ def watch_job(client: Transport, job: str, *, timeout: float | None = None, quie
         TimedOut: `timeout` passed; the job goes on.
         Unreachable: the server was away for longer than `PATIENCE`.
     """
-    deadline = None if timeout is None else time.monotonic() + timeout
-    with console.goes_on(f"job {job}", _watch_hint(job)), console.bar() as bar:
+    hint = _watch_hint(job)
+    with console.goes_on(f"job {job}", hint), console.bar() as bar:
         bar.disable = quiet
-        state = client.get(f"/v1/jobs/{job}")
-        task = bar.add_task(_caption(state, state), total=state["total"], completed=_ended(state))
-        seen, reachable = 0, time.monotonic()
-        while state["state"] not in ENDED:
+        task = None
+        following = follow_job(transport, job, timeout=timeout, hint=hint)
+        while True:
             try:
-                for event in client.events(job, after=seen, patience=_patience(deadline, job)):
-                    seen = event["seq"]
-                    if event["kind"] != "progress":
-                        _tell(bar, event, quiet)
-                    reachable = time.monotonic()
-                    _patience(deadline, job)
-                    bar.update(task, completed=_ended(event["data"]), description=_caption(state, event["data"]))
-                state = client.get(f"/v1/jobs/{job}")
-                reachable = time.monotonic()
-            except Busy as error:  # its key has all the streams it may have: look now and then instead
-                time.sleep(min(error.seconds, _patience(deadline, job)))
-                state = client.get(f"/v1/jobs/{job}")
-                reachable = time.monotonic()
-            except Unreachable:
-                if time.monotonic() - reachable > PATIENCE:
-                    raise
-                time.sleep(0.5)
-            bar.update(task, completed=_ended(state), description=_caption(state, state))
-        return state
+                state, event = next(following)
+            except StopIteration as ended:
+                return ended.value
+            if task is None:
+                task = bar.add_task("", total=state["total"])
+            now = state
+            if event is not None:
+                now = event["data"]
+                if event["kind"] != "progress":
+                    _tell(bar, event, quiet)
+            bar.update(task, completed=ended_items(now), description=_caption(state, now))
 
 
 def check_ended(job: dict[str, Any]) -> None:
@@ -71,26 +60,12 @@ def check_ended(job: dict[str, Any]) -> None:
     )
 
 
-def _patience(deadline: float | None, job: str) -> float:
-    """Seconds an open connection may stay silent: the server pings every 15 s."""
-    if deadline is None:
-        return 30.0
-    left = deadline - time.monotonic()
-    if left <= 0:
-        raise TimedOut("the time allowed has passed; the job goes on", where=f"job {job}", hint=_watch_hint(job))
-    return min(30.0, left)
-
-
 def _watch_hint(job: str) -> str:
     return f"`marey jobs watch {job}` watches it again; `marey jobs cancel {job}` ends it."
 
 
-def _ended(now: dict[str, Any]) -> int:
-    return sum(now["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
-
-
 def _caption(job: dict[str, Any], now: dict[str, Any]) -> str:
-    bad = sum(now["counters"][name] for name in ("failed", "dead", "cancelled"))
+    bad = items_without_result(now)
     return f"{job['name'] or job['id']} {now['state']}" + (f", {bad} without result" if bad else "")
 
 

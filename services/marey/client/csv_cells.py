@@ -34,7 +34,7 @@ def join_tags(tags: Sequence[str]) -> str:
 
 def split_tags(cell: str) -> list[str]:
     """The tags of a cell that `join_tags` gave."""
-    return next(csv.reader([cell], delimiter=TAG_SEPARATOR, skipinitialspace=True), [])
+    return next(csv.reader([cell], delimiter=TAG_SEPARATOR, skipinitialspace=True), list[str]())
 
 
 def write_csv(columns: Sequence[str], rows: Iterable[Mapping[str, str]], *, numbers: Collection[str]) -> bytes:

@@ -1,4 +1,4 @@
-"""Fetching the files of motions: eight at a time, into `.part` files, resumed, checked by sha256."""
+"""Fetching the files of motions, eight at a time: into `.part` files, resumed, checked by sha256; with a manifest."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from marey.client.manifest import check_manifest, remove_left, row_of, write_manifest
 from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.transport import Transport
-from marey.core.errors import Conflict, InvalidFile, InvalidInput, Unreachable
+from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
 
 PARALLEL = 8
@@ -33,6 +35,93 @@ class Download:
     sha256: str
     size: int
     path: Path
+
+
+Planned = list[tuple[dict[str, Any], list[Download]]]
+"""Items of the API, in input order, each with its files."""
+
+
+class FetchObserver:
+    """What a caller of `fetch_job` is told; each method does nothing by itself."""
+
+    def planned(self, total: int) -> None:
+        """The number of files is known."""
+
+    def fetched(self, download: Download) -> None:
+        """A file is there; called by the thread that fetched it."""
+
+    def interrupted(self, done: int, total: int) -> None:
+        """The fetch broke off; `done` of `total` files are there and in the manifest."""
+
+
+def fetch_job(
+    transport: Transport,
+    job: str,
+    folder: Path,
+    formats: Sequence[str] | None = None,
+    *,
+    template: str = DEFAULT_TEMPLATE,
+    review: str | None = None,
+    prune: bool = False,
+    overwrite: bool = False,
+    observer: FetchObserver | None = None,
+) -> tuple[Planned, list[Path]]:
+    """Fetch what a job has made so far, and write the manifest.
+
+    Args:
+        formats: of files; None = all there are.
+        review: fetch only motions with this verdict.
+        prune: remove files that earlier manifests named for the job and this one does not.
+        overwrite: replace files that hold something else.
+
+    Returns:
+        The items with their files, and the files of earlier fetches of the job that are not among these.
+
+    Raises:
+        Conflict: a file is there and holds something else, or a wanted format was not made; before anything is fetched.
+        InvalidInput, InvalidFile, Unreachable: as `check_folder`, `plan` and `download_all`.
+    """
+    observer = observer or FetchObserver()
+    planned = plan(transport.pages(f"/v1/jobs/{job}/items", review=review, limit=1000), folder, formats, template)
+    check_folder(folder, hint="Choose another folder with -o.")
+    check_manifest(folder, overwrite=overwrite)
+    make_folders(folder, (file.path for _, files in planned for file in files))
+    wanted = [file for _, files in planned for file in files]
+    done: set[Path] = set()
+
+    def note(download: Download) -> None:
+        done.add(download.path)
+        observer.fetched(download)
+
+    observer.planned(len(wanted))
+    try:
+        download_all(transport, wanted, overwrite=overwrite, done=note)
+    except Conflict:
+        raise  # before anything was touched
+    except BaseException:
+        _write_part(folder, job, planned, done, observer, overwrite=overwrite)
+        raise
+    left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
+    if prune:
+        remove_left(folder, left)
+    return planned, left
+
+
+def _write_part(
+    folder: Path, job: str, planned: Planned, done: set[Path], observer: FetchObserver, *, overwrite: bool
+) -> None:
+    """Write the manifest of a fetch that broke off. The error that ended it is raised; one of this is not."""
+    whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
+    with suppress(MareyError):
+        write_manifest(folder, job, _rows(folder, whole), overwrite=overwrite, whole=False)
+        observer.interrupted(len(done), sum(len(files) for _, files in planned))
+
+
+def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
+    return [
+        row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})
+        for item, files in planned
+    ]
 
 
 def check_folder(folder: Path, hint: str = "Choose another folder.") -> Path:
@@ -69,8 +158,9 @@ def make_folders(folder: Path, paths: Iterable[Path]) -> None:
             raise InvalidInput(f"cannot be made: {error.strerror}", where=str(parent)) from error
 
 
-def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
-) -> list[tuple[dict[str, Any], list[Download]]]:  # fmt: skip
+def plan(
+    items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] | None, template: str = DEFAULT_TEMPLATE
+) -> Planned:
     """Which files of which items go where.
 
     Args:
@@ -82,7 +172,7 @@ def plan(items: Iterable[dict[str, Any]], folder: Path, formats: Sequence[str] |
         InvalidFile: the server names a format that is none.
         Conflict: a wanted format was not made.
     """
-    planned: list[tuple[dict[str, Any], list[Download]]] = []
+    planned: Planned = []
     names = FileNames(template)
     for item in items:
         downloads: list[Download] = []
@@ -131,9 +221,13 @@ def download_all(
             done(download)
         else:
             missing.append(download)
+
+    def fetch(download: Download) -> None:
+        done(_download(client, download))
+
     with ThreadPoolExecutor(PARALLEL) as pool:
         try:
-            for _ in pool.map(lambda download: done(_download(client, download)), missing):
+            for _ in pool.map(fetch, missing):
                 pass
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -6,7 +6,7 @@ import json
 import random
 import time
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import urlencode
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidUpgrade, InvalidURI, WebSocketException
@@ -211,8 +211,10 @@ def _problem(text: str) -> str | None:
         found = json.loads(text)
     except ValueError:
         return None
-    is_problem = isinstance(found, dict) and str(found.get("type")).startswith(TYPE_PREFIX)
-    return str(found.get("detail")) if is_problem else None
+    if not isinstance(found, dict):
+        return None
+    problem = cast("dict[str, Any]", found)
+    return str(problem.get("detail")) if str(problem.get("type")).startswith(TYPE_PREFIX) else None
 
 
 def _read(message: str | bytes) -> Message:
@@ -222,7 +224,8 @@ def _read(message: str | bytes) -> Message:
         found = json.loads(message)
     except ValueError:
         found = None
-    if not isinstance(found, dict) or not isinstance(found.get("type"), str):
+    read = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+    if not isinstance(read.get("type"), str):
         hint = "client and server are of different releases: update the older one"
         raise InvalidInput(f"the server says {message[:60]!r}, which is no message", where="stream", hint=hint)
-    return found
+    return read

@@ -7,7 +7,7 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -44,9 +44,9 @@ def check_manifest(folder: Path, *, overwrite: bool) -> None:
 
 def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     """The line of one item of the API; `files` are file names by format."""
-    motion = item["motion"] or {}
-    review = motion.get("review") or {}
-    values = {
+    motion: Mapping[str, Any] = item["motion"] or {}
+    review: Mapping[str, Any] = motion.get("review") or {}
+    values: dict[str, Any] = {
         **{name: item[name] for name in ("index", "name", "prompt", "seed", "state", "variant", "model", "bundle")},
         "seconds": item.get("seconds"),
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
@@ -54,7 +54,7 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         "tags": join_tags(item["tags"]),
         "review": review.get("verdict"),
         "comment": review.get("comment"),
-        "error": (item["error"] or {}).get("message"),
+        "error": item["error"] and item["error"].get("message"),
         "replaces": item["replaces"],
         "motion": motion.get("id"),
         "item": item["id"],

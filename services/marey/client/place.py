@@ -47,11 +47,22 @@ def find_server() -> Server:
         Unauthenticated: one is named, but no key.
     """
     url = os.environ.get("MAREY_SERVER")
-    if not url:
-        return _local_server()
+    return server_at(url) if url else _local_server()
+
+
+def server_at(url: str, key: str | None = None) -> Server:
+    """The server at a URL.
+
+    Args:
+        key: None = that of `MAREY_KEY` or `MAREY_KEY_FILE`.
+
+    Raises:
+        InvalidInput: that is no URL.
+        Unauthenticated: there is no key.
+    """
     if not url.startswith(("http://", "https://")):
         raise InvalidInput(f"MAREY_SERVER is {url!r}, not a URL", hint="Write it as https://marey.example.com")
-    return Server(url.rstrip("/"), _key())
+    return Server(url.rstrip("/"), _key() if key is None else key)
 
 
 def write_server(server: Server, folder: Path) -> None:

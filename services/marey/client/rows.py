@@ -167,6 +167,11 @@ def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_D
     return PromptReader(((i, {"prompt": p, **defaults}) for i, p in enumerate(prompts, 1)), "PROMPT")
 
 
+def read_rows(raws: Iterable[object], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:
+    """Items of the rows of a program; a problem names the number of the row, from 1."""
+    return PromptReader(((number, _completed(raw, defaults)) for number, raw in enumerate(raws, 1)), "rows")
+
+
 def read_file(
     path: str,
     file_format: Format | None = None,
@@ -303,7 +308,7 @@ def _guess(lines: Lines) -> tuple[Format, list[tuple[int, str]]]:
     first = read[0][1].strip()[:1000] if read else ""  # a header, or it is none
     if first.startswith("{"):
         return "jsonl", read
-    names = next(csv.reader([first], delimiter=delimiter_of(first, COLUMNS)), [])
+    names = next(csv.reader([first], delimiter=delimiter_of(first, COLUMNS)), list[str]())
     return ("csv" if "prompt" in [name.strip() for name in names] else "txt"), read
 
 

@@ -93,7 +93,7 @@ def delimiter_of(header: str, columns: Sequence[str]) -> str:
 
     def known(delimiter: str) -> int:
         try:
-            names = next(csv.reader([header], delimiter=delimiter), [])
+            names = next(csv.reader([header], delimiter=delimiter), list[str]())
         except csv.Error:
             return 0
         return sum(name.strip(BLANK) in columns for name in names)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import random
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, cast
 from uuid import uuid4
@@ -92,6 +92,10 @@ class Transport:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
         self._http.close()
 
     def get(self, path: str, **params: Any) -> Any:
@@ -119,23 +123,33 @@ class Transport:
         """DELETE."""
         self._send("DELETE", path)
 
-    def submit(self, items: Lines | Iterable[Mapping[str, Any]], *, validate_only: bool = False, **params: Any) -> Any:
+    def submit(
+        self,
+        items: Lines | Iterable[Mapping[str, Any]],
+        *,
+        validate_only: bool = False,
+        idempotency_key: str | None = None,
+        **params: Any,
+    ) -> Any:
         """Submit items as NDJSON; the job, or with `validate_only` what it would be.
+
+        Args:
+            idempotency_key: of every attempt; None = one is drawn.
 
         Raises:
             InvalidItems: with the problems of every line.
         """
         if not isinstance(items, Lines):
             with Lines(items) as lines:
-                return self.submit(lines, validate_only=validate_only, **params)
+                return self.submit(lines, validate_only=validate_only, idempotency_key=idempotency_key, **params)
         headers = {
             "Content-Type": "application/x-ndjson",
             "Content-Length": str(len(items)),
-            "Idempotency-Key": str(uuid4()),
+            "Idempotency-Key": idempotency_key or str(uuid4()),
         }
         query = _given({**params, "validate_only": validate_only or None})
         timeout = httpx2.Timeout(SUBMIT_TIMEOUT, connect=5.0)
-        sent = {"params": query, "content": items, "headers": headers, "timeout": timeout}
+        sent: dict[str, Any] = {"params": query, "content": items, "headers": headers, "timeout": timeout}
         return _json(self._send("POST", "/v1/jobs", patience=SUBMIT_BUSY_SECONDS, **sent))
 
     def pages(self, path: str, **params: Any) -> Iterator[dict[str, Any]]:
@@ -151,7 +165,7 @@ class Transport:
     @contextmanager
     def stream(
         self, path: str, headers: Mapping[str, str] | None = None, *, patience: float = 30.0
-    ) -> Iterator[httpx2.Response]:
+    ) -> Generator[httpx2.Response]:
         """An open answer, to be read in pieces; redirects (to the object store) are followed without the key.
 
         Args:
@@ -221,11 +235,11 @@ class Transport:
     def _request(self, method: str, path: str, request: Mapping[str, Any]) -> httpx2.Response:
         """One attempt, as a span where traces are on; the server goes on from it."""
         with tracing.span(f"{method} {path.partition('?')[0]}", kind="client") as span:
-            headers = dict(request.get("headers") or {})
+            headers: dict[str, str] = dict(request.get("headers") or {})
             if span.traceparent is not None:
                 headers[tracing.HEADER] = span.traceparent
             try:
-                response = self._http.request(method, path, **{**request, "headers": headers})
+                response = self._http.request(method, path, **cast("dict[str, Any]", {**request, "headers": headers}))
             except httpx2.InvalidURL as error:
                 raise InvalidInput(
                     f"cannot be asked for: {error}", where=f"{method} {path}", hint="Correct the name or the address."
@@ -263,19 +277,34 @@ class _UntilQuiet:
 def error_of(response: httpx2.Response) -> MareyError:
     """The error that an RFC 9457 problem tells, as the exception that was raised on the server."""
     try:
-        problem = response.json()
-        kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
-        message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
-        if kind == InvalidItems.problem_type:
-            found = [_problem(each) for each in problem.get("problems", [])]
-            return InvalidItems(found, total=problem.get("total"))
+        return error_of_problem(response.json(), response.status_code, _retry_after(response))
     except NOT_OURS:
         return _foreign(response)
+
+
+def error_of_problem(problem: Mapping[str, Any], status: int, retry_after: float = 0.0) -> MareyError:
+    """The error that a problem of the API tells.
+
+    Args:
+        retry_after: seconds.
+
+    Raises:
+        ValueError, KeyError, TypeError, AttributeError: it is no problem of the API.
+    """
+    kind = str(problem["type"]).removeprefix(TYPE_PREFIX)
+    message, where, hint = str(problem["detail"]), problem.get("where"), problem.get("hint")
+    if kind == InvalidItems.problem_type:
+        found = [_problem(each) for each in problem.get("problems", [])]
+        return InvalidItems(found, total=problem.get("total"))
     if kind == Overloaded.problem_type:
-        return Overloaded(message, where=where, hint=hint, seconds=round(_retry_after(response)))
+        return Overloaded(message, where=where, hint=hint, seconds=round(retry_after))
+    if kind == QUOTA and (quota := problem.get("quota")) is not None:
+        sizes = {name: int(quota[name]) for name in ("limit", "used", "asked")}
+        seconds = round(retry_after)
+        return QuotaUsedUp(message, where=where, hint=hint, seconds=seconds, quota=str(quota["name"]), **sizes)
     if kind in (Busy.problem_type, QUOTA):
-        return Busy(message, where=where, hint=hint, seconds=round(_retry_after(response)))
-    error = _ERRORS.get(kind) or (InvalidInput if response.status_code < 500 else MareyError)
+        return Busy(message, where=where, hint=hint, seconds=round(retry_after))
+    error = _ERRORS.get(kind) or (InvalidInput if status < 500 else MareyError)
     return error(message, where=where, hint=hint)
 
 
@@ -338,7 +367,7 @@ def _foreign(response: httpx2.Response) -> MareyError:
 
 
 @contextmanager
-def _as_unreachable(server: Server) -> Iterator[None]:
+def _as_unreachable(server: Server) -> Generator[None]:
     try:
         yield
     except httpx2.TransportError as error:

@@ -9,10 +9,10 @@ import time
 import numpy as np
 import pytest
 
-from marey.cli.live.frames import Head, head_of
 from marey.cli.live.pace import Pace
 from marey.cli.live.steering import message_of
 from marey.client import link as link_module
+from marey.client.frames import Head, head_of
 from marey.client.link import Link
 from marey.client.place import Server
 from marey.core.errors import InvalidInput, MareyError, NotFound, Refused, Unauthenticated, Unreachable

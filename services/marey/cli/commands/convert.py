@@ -48,7 +48,7 @@ def convert(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Convert a motion between BVH and npz, with another rate, unit or axis if wanted."""
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.motion.io.convert import convert as convert_file
@@ -79,7 +79,7 @@ def render(
     from_up: FromUp = Up.Y,
 ) -> None:
     """Draw motions: a contact sheet as PNG, or a page with a 3D player."""
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.viz.player import html_player

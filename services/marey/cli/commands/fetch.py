@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,15 +12,12 @@ import typer
 from marey.cli import console, options
 from marey.cli.references import FORMS, find_all
 from marey.client.names import check_template
-from marey.core.errors import Conflict, MareyError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from marey.client.fetching import Download
     from marey.client.transport import Transport
-
-    Planned = list[tuple[dict[str, Any], list[Download]]]
 
 
 class Review(StrEnum):
@@ -104,66 +101,35 @@ def fetch_job(
         only: items with a motion of which this was said.
         prune: remove files that earlier manifests named for the job and this one does not.
     """
-    from marey.client.fetching import check_folder, make_folders, plan
-    from marey.client.manifest import check_manifest, remove_left, write_manifest
+    from marey.client.fetching import FetchObserver
+    from marey.client.fetching import fetch_job as fetch
 
-    wanted = [f.value for f in formats] if formats else None
-    said = None if only is None else only.value
-    planned = plan(client.pages(f"/v1/jobs/{job}/items", review=said, limit=1000), folder, wanted, template)
-    check_folder(folder, hint="Choose another folder with -o.")
-    check_manifest(folder, overwrite=overwrite)
-    make_folders(folder, (file.path for _, files in planned for file in files))
-    done: set[Path] = set()
-    try:
-        _download(client, [file for _, files in planned for file in files], done, overwrite=overwrite)
-    except Conflict:
-        raise  # before anything was touched
-    except BaseException:
-        _write_part(folder, job, planned, done, overwrite=overwrite)
-        raise
-    left = write_manifest(folder, job, _rows(folder, planned), overwrite=overwrite)
-    if prune:
-        remove_left(folder, left)
+    shown = console.home_relative(folder)
+    with ExitStack() as stack:
+
+        class Observer(FetchObserver):
+            def planned(self, total: int) -> None:
+                self.bar = stack.enter_context(console.bar())
+                self.task = self.bar.add_task("fetching", total=total)
+
+            def fetched(self, download: Download) -> None:
+                self.bar.advance(self.task)
+
+            def interrupted(self, done: int, total: int) -> None:
+                self.bar.stop()
+                console.say(
+                    f"{shown}: {done} of {total} files are there, and in manifest.csv; the same command goes on."
+                )
+
+        planned, left = fetch(
+            client, job, folder, [f.value for f in formats] if formats else None,
+            template=template, review=None if only is None else only.value, prune=prune, overwrite=overwrite,
+            observer=Observer(),
+        )  # fmt: skip
     if left:
         told = "were removed." if prune else "lie there, of takes that are not among these: --prune removes them."
-        console.say(f"{console.home_relative(folder)}: {len(left)} files of earlier fetches of job {job} {told}")
+        console.say(f"{shown}: {len(left)} files of earlier fetches of job {job} {told}")
     return [output_line(item, files) for item, files in planned]
-
-
-def _download(client: Transport, downloads: Sequence[Download], done: set[Path], *, overwrite: bool) -> None:
-    from marey.client.fetching import download_all
-
-    with console.bar() as bar:
-        task = bar.add_task("fetching", total=len(downloads))
-
-        def tell(download: Download) -> None:
-            done.add(download.path)
-            bar.advance(task)
-
-        download_all(client, downloads, overwrite=overwrite, done=tell)
-
-
-def _write_part(folder: Path, job: str, planned: Planned, done: set[Path], *, overwrite: bool) -> None:
-    """The manifest of a fetch that broke off. What ended it will be told, so not what fails here."""
-    from marey.client.manifest import write_manifest
-
-    whole = [(item, files) for item, files in planned if done.issuperset(file.path for file in files)]
-    with suppress(MareyError):
-        write_manifest(folder, job, _rows(folder, whole), overwrite=overwrite, whole=False)
-        wanted = sum(len(files) for _, files in planned)
-        console.say(
-            f"{console.home_relative(folder)}: {len(done)} of {wanted} files are there, and in manifest.csv; "
-            "the same command goes on."
-        )
-
-
-def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
-    from marey.client.manifest import row_of
-
-    return [
-        row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})
-        for item, files in planned
-    ]
 
 
 def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, Any]:

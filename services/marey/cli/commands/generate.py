@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
-from marey.cli.extras import needs_extra
 from marey.client import rows
 from marey.client.names import FileNames, Naming, check_template, slug
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, MareyError
+from marey.core.extras import needs_extra
 from marey.items.item import MAX_SEED, Item, Problem
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ def fetch(
 
     Commands that need them do so themselves, unless MAREY_FETCH_WEIGHTS is false.
     """
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.core.settings import settings
@@ -89,7 +89,7 @@ def _ask(path: str) -> Any:
 
 
 def _local_models() -> dict[str, Any]:
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.api.models.schemas import ModelsView
@@ -101,7 +101,7 @@ def _local_models() -> dict[str, Any]:
 
 
 def _local_model(name: str) -> dict[str, Any]:
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.api.catalogue import Catalogue

@@ -56,8 +56,8 @@ def review(
     A .png of up to 24 motions shows a row of each; one of more shows tiles.
     """
     from marey.cli.drawing import Drawers
-    from marey.cli.extras import needs_extra
     from marey.client.transport import Transport
+    from marey.core.extras import needs_extra
 
     try:
         import marey.viz.gallery  # noqa: F401

@@ -28,9 +28,9 @@ def serve(
 ) -> None:
     """Run everything here, with its own database and queue, until Ctrl-C."""
     os.umask(UMASK)
-    from marey.cli.extras import needs_extra
     from marey.cli.ports import try_port
     from marey.cli.roles.serving import default_roles, parse_roles
+    from marey.core.extras import needs_extra
 
     try:
         from marey.cli.supervisor import Supervisor
@@ -64,8 +64,8 @@ def worker(
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
     os.umask(UMASK)
-    from marey.cli.extras import needs_extra
     from marey.cli.roles.serving import SHOWS, parse_roles, role_of
+    from marey.core.extras import needs_extra
 
     queues = parse_roles(model.replace(",", "+"))[0]
     shown = [queue for queue in queues if queue in SHOWS]
@@ -95,7 +95,7 @@ def worker(
 def scheduler() -> None:
     """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
     os.umask(UMASK)
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.core.settings import settings
@@ -108,7 +108,7 @@ def scheduler() -> None:
 def api() -> None:
     """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
     os.umask(UMASK)
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.api.app import serve as serve_api
@@ -130,7 +130,7 @@ def probe(
     ] = Health.LIVE,
 ) -> None:
     """Check the workers and schedulers of this machine; exits 4 if one is not well. For health checks of containers."""
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.core.settings import settings

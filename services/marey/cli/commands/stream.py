@@ -13,8 +13,8 @@ from marey.cli import console, options
 from marey.core.errors import InvalidInput, MareyError, NotFound
 
 if TYPE_CHECKING:
-    from marey.cli.live.frames import Recording
     from marey.cli.live.steering import Interrupts
+    from marey.client.recording import Recording
     from marey.client.transport import Transport
 
 COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
@@ -98,7 +98,7 @@ def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]
 def _recording(path: Path | None, *, overwrite: bool) -> Recording | None:
     if path is None:
         return None
-    from marey.cli.live.frames import Recording
+    from marey.client.recording import Recording
 
     return Recording(path, overwrite=overwrite)
 

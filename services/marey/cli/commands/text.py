@@ -30,7 +30,7 @@ def parse(
     as_json: console.Json = False,
 ) -> None:
     """Show the graph a prompt becomes. Needs no server."""
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     texts = [item.prompt for item in right_items(read_prompts(prompts, file, input_format))]
     try:
@@ -51,7 +51,7 @@ def serve(
 ) -> None:
     """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is the secret that both share."""
     os.umask(UMASK)
-    from marey.cli.extras import needs_extra
+    from marey.core.extras import needs_extra
 
     try:
         from marey.text_service.server import serve_text

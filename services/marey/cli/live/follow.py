@@ -7,11 +7,12 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from marey.cli import console
-from marey.cli.live.frames import Recording, head_of
 from marey.cli.live.pace import Pace
 from marey.cli.live.screen import Screen
 from marey.cli.live.steering import HELP, Interrupts, Lines, message_of
+from marey.client.frames import head_of
 from marey.client.link import Link, Message
+from marey.client.recording import Recording
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError
 
 if TYPE_CHECKING:

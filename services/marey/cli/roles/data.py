@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.extras import needs_extra
 from marey.core.errors import InvalidInput, NotFound
+from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
     from marey.data.pack import JointsPack

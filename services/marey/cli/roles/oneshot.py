@@ -10,9 +10,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.extras import needs_extra
 from marey.cli.roles.serving import GENERATORS, threads_of
 from marey.core.errors import InvalidInput
+from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle

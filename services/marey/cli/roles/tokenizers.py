@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.extras import needs_extra
 from marey.core.errors import InvalidInput
+from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
     from marey.nn.motion_tokenizer import MotionTokenizer

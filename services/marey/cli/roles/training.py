@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from marey.cli.extras import needs_extra
+from marey.core.extras import needs_extra
 
 
 def train_stage(

@@ -1,42 +1,17 @@
-"""Frames as they arrive: what the counter wants to know of them, and the file they are written to."""
+"""The BVH file that a live stream is recorded to while it is made. Writing needs the extra `motion`."""
 
 from __future__ import annotations
 
-import struct
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.extras import needs_extra
+from marey.client.frames import read_frame
 from marey.core.errors import InvalidInput
+from marey.core.extras import needs_extra
 
 if TYPE_CHECKING:
     from marey.motion.io.bvh_live import LiveBVH
-
-HEAD = struct.Struct("<2sBBIHH")
-"""The first 12 bytes of a frame, as `marey.streams.frames` has them; that one wants numpy, which a client that
-writes no file does without."""
-
-
-@dataclass(frozen=True)
-class Head:
-    """Which frame it is, and which prompt was in force."""
-
-    number: int
-    prompt: int
-
-
-def head_of(data: bytes) -> Head:
-    """The head of a frame.
-
-    Raises:
-        InvalidInput: it is no frame of version 1.
-    """
-    if len(data) < HEAD.size or data[:3] != b"MF\x01":
-        hint = "client and server are of different releases: update the older one"
-        raise InvalidInput(f"{len(data)} bytes that are no frame of version 1", where="stream", hint=hint)
-    _, _, _, number, _, prompt = HEAD.unpack_from(data)
-    return Head(number, prompt)
 
 
 class Recording:
@@ -68,7 +43,7 @@ class Recording:
         """The file; None while it has no frame."""
         return self._path.absolute() if self._file is not None and self._file.frames else None
 
-    def add(self, data: bytes, stream: dict[str, Any]) -> None:
+    def add(self, data: bytes, stream: Mapping[str, Any]) -> None:
         """Write a frame.
 
         Args:
@@ -78,19 +53,20 @@ class Recording:
         Raises:
             MareyError: the frame, the skeleton or the file cannot be used.
         """
-        from marey.streams.frames import decode_frame
+        import numpy as np
 
         if self._file is None:
             self._file = self._open(stream)
-        frame = decode_frame(data, joints=len(self._file.skeleton))
-        self._file.add(frame.rotations, frame.root, missing=frame.number - self._file.frames)
+        frame = read_frame(data, joints=len(self._file.skeleton))
+        rotations, root = np.array(frame.rotations, np.float32), np.array(frame.root, np.float32)
+        self._file.add(rotations, root, missing=frame.number - self._file.frames)
 
     def close(self) -> None:
         """Nothing more comes."""
         if self._file is not None:
             self._file.close()
 
-    def _open(self, stream: dict[str, Any]) -> LiveBVH:
+    def _open(self, stream: Mapping[str, Any]) -> LiveBVH:
         import numpy as np
 
         from marey.motion.io.bvh_live import LiveBVH

@@ -1,0 +1,116 @@
+"""Following jobs and evaluations until they end, through restarts of the server and lost connections."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Mapping
+from typing import Any
+
+from marey.client.transport import PATIENCE, Transport
+from marey.client.types import ENDED_JOB, OPEN_EVALUATION
+from marey.core.errors import Busy, TimedOut, Unreachable
+
+View = dict[str, Any]
+SILENCE = 30.0
+"""Seconds an open connection may stay silent: the server pings every 15 s."""
+RETRY_SECONDS = 0.5
+POLL = 1.0
+"""Seconds between two looks: an evaluation takes minutes at least, and the scheduler looks every two."""
+WITHOUT_RESULT = ("failed", "dead", "cancelled")
+
+
+def follow_job(
+    transport: Transport,
+    job: str,
+    *,
+    timeout: float | None = None,
+    hint: str | None = None,
+) -> Generator[tuple[View, View | None], None, View]:
+    """Yield the job as the server shows it, then its events with it as they come, until it has ended; return it then.
+
+    A lost connection is taken up where it broke.
+
+    Args:
+        timeout: seconds; None = no limit.
+        hint: of the error of a timeout.
+
+    Raises:
+        TimedOut: `timeout` passed; the job goes on.
+        Unreachable: the server was away for longer than `PATIENCE`.
+    """
+    deadline = None if timeout is None else time.monotonic() + timeout
+
+    def patience() -> float:
+        if deadline is None:
+            return SILENCE
+        left = deadline - time.monotonic()
+        if left <= 0:
+            raise TimedOut("the time allowed has passed; the job goes on", where=f"job {job}", hint=hint)
+        return min(SILENCE, left)
+
+    state = transport.get(f"/v1/jobs/{job}")
+    seen, reachable = 0, time.monotonic()
+    yield state, None
+    while state["state"] not in ENDED_JOB:
+        try:
+            for event in transport.events(job, after=seen, patience=patience()):
+                seen = event["seq"]
+                reachable = time.monotonic()
+                yield state, event
+                patience()
+            state = transport.get(f"/v1/jobs/{job}")
+            reachable = time.monotonic()
+        except Busy as error:  # the key has all the event streams it may have: poll instead
+            time.sleep(min(error.seconds, patience()))
+            state = transport.get(f"/v1/jobs/{job}")
+            reachable = time.monotonic()
+        except Unreachable:
+            if time.monotonic() - reachable > PATIENCE:
+                raise
+            time.sleep(RETRY_SECONDS)
+        yield state, None
+    return state
+
+
+def follow_evaluation(
+    transport: Transport,
+    evaluation: str,
+    *,
+    timeout: float | None = None,
+    hint: str | None = None,
+    look: Callable[[View], None],
+) -> View:
+    """Call `look` with the evaluation as it stands, again and again until it is over; return it as it ended.
+
+    Raises:
+        TimedOut: `timeout` passed; the evaluation goes on.
+        Unreachable: the server was away for longer than `PATIENCE`.
+    """
+    deadline = None if timeout is None else time.monotonic() + timeout
+    reachable = time.monotonic()
+    while True:
+        try:
+            found = transport.get(f"/v1/evaluations/{evaluation}")
+            reachable = time.monotonic()
+            look(found)
+            if found["state"] not in OPEN_EVALUATION:
+                return found
+        except Unreachable:
+            if time.monotonic() - reachable > PATIENCE:
+                raise
+        left = POLL if deadline is None else deadline - time.monotonic()
+        if left <= 0:
+            raise TimedOut(
+                "the time allowed has passed; the evaluation goes on", where=f"evaluation {evaluation}", hint=hint
+            )
+        time.sleep(min(POLL, left))
+
+
+def ended_items(view: Mapping[str, Any]) -> int:
+    """The items of a job that are not open any more, by its counters."""
+    return view["counters"]["succeeded"] + items_without_result(view)
+
+
+def items_without_result(view: Mapping[str, Any]) -> int:
+    """The items of a job that failed, died or were cancelled, by its counters."""
+    return sum(view["counters"][name] for name in WITHOUT_RESULT)

@@ -1,0 +1,39 @@
+"""The public names of the Python API: what can be imported, from where, and at what cost."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+PACKAGES = ("marey.client",)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_is_there_and_typed(package: str) -> None:
+    module = import_module(package)
+    assert module.__version__ == version("marey")
+    for name in module.__all__:
+        assert getattr(module, name) is not None
+    assert module.__file__ is not None
+    assert (Path(module.__file__).parent / "py.typed").exists()
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        module.nonsense  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("module", "absent"),
+    [
+        ("marey.client", ("httpx2", "websockets", "numpy", "marey.client.types")),
+        ("marey.client.rows", ("httpx2", "websockets", "numpy", "marey.client.types")),
+        ("marey.client.client", ("numpy", "pydantic", "sqlalchemy", "typer", "rich", "platformdirs")),
+    ],
+)
+def test_an_import_brings_only_what_it_needs(module: str, absent: tuple[str, ...]) -> None:
+    code = f"import {module}, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(absent) & set(done.stdout.split())
