@@ -29,16 +29,16 @@ from marey.api.jobs.routes import SCHEMAS as JOB_SCHEMAS
 from marey.api.jobs.routes import router as jobs_router
 from marey.api.live.routes import router as live_router
 from marey.api.models.routes import router as models_router
-from marey.api.motions.routes import router as motions_router
 from marey.api.rates import Rates
 from marey.api.readiness import Readiness
 from marey.api.reference import build_reference
-from marey.api.resolving.routes import router as references_router
+from marey.api.references.routes import router as references_router
 from marey.api.schedules.routes import SCHEMAS as SCHEDULE_SCHEMAS
 from marey.api.schedules.routes import router as schedules_router
 from marey.api.stream_hub import Hub
 from marey.api.streams.protocol import socket_options
 from marey.api.streams.routes import router as streams_router
+from marey.api.takes.routes import router as motions_router
 from marey.api.text_client import TextService
 from marey.api.texts.routes import router as texts_router
 from marey.api.webhooks.routes import router as webhooks_router

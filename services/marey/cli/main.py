@@ -13,16 +13,16 @@ from marey.cli.commands import (
     admin,
     convert,
     data,
-    evaluate,
+    evaluations,
     fetch,
     generate,
     jobs,
     models,
-    motions,
     review,
     serve,
-    stream,
+    streams,
     submit,
+    takes,
     text,
     train,
     webhooks,
@@ -110,10 +110,10 @@ def root(
 app.command("generate")(generate.generate)
 app.command("submit")(submit.submit)
 app.add_typer(jobs.app, name="jobs")
-app.add_typer(motions.app, name="motions")
+app.add_typer(takes.app, name="motions")
 app.command("review")(review.review)
 app.command("fetch")(fetch.fetch)
-app.command("stream")(stream.stream)
+app.command("stream")(streams.stream)
 app.command("serve")(serve.serve)
 app.command("worker")(serve.worker)
 app.command("scheduler")(serve.scheduler)
@@ -123,7 +123,7 @@ app.add_typer(text.app, name="text")
 app.add_typer(models.app, name="models")
 app.add_typer(data.app, name="data")
 app.add_typer(train.app, name="train")
-app.add_typer(evaluate.app, name="eval")
+app.add_typer(evaluations.app, name="eval")
 app.add_typer(webhooks.app, name="webhooks")
 app.command("convert")(convert.convert)
 app.command("render")(convert.render)

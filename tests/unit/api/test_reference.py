@@ -19,10 +19,10 @@ import marey.api.docs
 from marey.api.app import create_app
 from marey.api.evaluations.schemas import NewEvaluationBody
 from marey.api.jobs.schemas import JobPatch, NewJobBody
-from marey.api.motions.schemas import NewRerollBody, NewReviewBody
 from marey.api.reference import EXAMPLES
 from marey.api.schedules.schemas import NewScheduleBody, SchedulePatch
 from marey.api.streams.schemas import NewStreamBody
+from marey.api.takes.schemas import NewRerollBody, NewReviewBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.settings import Settings
 from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS

@@ -27,8 +27,8 @@ from marey.api.jobs.schemas import (
     NewItemBody,
     NewJobBody,
 )
-from marey.api.motions.routes import Found
-from marey.api.motions.schemas import MotionView
+from marey.api.takes.routes import Found
+from marey.api.takes.schemas import MotionView
 from marey.core import metrics, tracing
 from marey.core.errors import InvalidInput
 from marey.http import schemas

@@ -9,7 +9,7 @@ from uuid import UUID
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.jobs.estimates import EstimateView
-from marey.api.motions.schemas import MotionView
+from marey.api.takes.schemas import MotionView
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT, SAMPLING, TAGS
 from marey.http.problems import QuotaBody
 from marey.http.schemas import Comment, Name, View

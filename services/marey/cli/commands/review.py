@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marey.cli import console
-from marey.cli.commands.motions import Review, review_of
+from marey.cli.commands.takes import Review, review_of
 from marey.cli.references import FORMS, find
 from marey.core.errors import Conflict, InvalidInput, NotFound
 

@@ -15,7 +15,7 @@ from marey.api.audit import note
 from marey.api.auth import Reader, Submitter
 from marey.api.context import Connection, Shared, deadline
 from marey.api.files import FILE_RESPONSES, FileRequest, file_response
-from marey.api.motions.schemas import (
+from marey.api.takes.schemas import (
     MotionDetailView,
     MotionView,
     NewRerollBody,
@@ -24,7 +24,7 @@ from marey.api.motions.schemas import (
     RerollView,
     ReviewFilter,
 )
-from marey.api.motions.service import file_stem, made_again
+from marey.api.takes.service import file_stem, made_again
 from marey.core.errors import NotFound
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
