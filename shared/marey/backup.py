@@ -20,7 +20,7 @@ from marey.jobs.leases import AssetDigest
 from marey.jobs.states import ENDED, JobControl, Review, Stage
 from marey.jobs.types import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, SEED_LIMIT, TEXT_QUEUE
 
-CHUNK = 1000  # rows of one statement
+CHUNK = 1000  # rows per statement
 Row = TypeVar("Row")
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
@@ -154,7 +154,7 @@ def back_up(conn: sa.Connection, tenant: str, job: UUID) -> JobBackup:
     """Return a job that has ended; a consistent snapshot if the transaction is repeatable read.
 
     Raises:
-        Conflict: it has gone on meanwhile, was deleted, or files of it are being written anew.
+        Conflict: it continued meanwhile, was deleted, or its files are being rewritten.
     """
     found = _rows(conn, tables.job, JobRecord, tables.job.c.id == job, tables.job.c.tenant_id == tenant)
     if not found or found[0]["finished_at"] is None:
@@ -198,12 +198,12 @@ def announce(conn: sa.Connection, tenant: str, assets: Sequence[AssetDigest]) ->
 def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
     """Restore a job; return False if it exists already. Its files are in the store, and were announced.
 
-    Items go through their states like any other's, so the database refuses what could never have been. Days after which
-    it was to be deleted are forgotten: they are over, mostly, when a backup is needed.
+    Items go through their states like any others, so the database refuses impossible histories. The retention period
+    is dropped: it has mostly passed when a backup is needed.
 
     Raises:
         Conflict: another tenant has a job of this id, or the garbage collector took a file: announce and PUT again.
-        InvalidFile: the database does not take it.
+        InvalidFile: the database refuses it.
     """
     job = backup.job
     there = conn.execute(sa.select(tables.job.c.tenant_id).where(tables.job.c.id == job.id)).scalar_one_or_none()

@@ -19,8 +19,8 @@ class Allowed:
     """Address policy of this installation.
 
     Attributes:
-        public: addresses of the internet, over https.
-        networks: these too, also over http.
+        public: allow public addresses, over https.
+        networks: allow these networks, also over http.
     """
 
     public: bool
@@ -31,7 +31,7 @@ class Allowed:
         """Parse `MAREY_WEBHOOK_ALLOW`: networks, and the word `public`.
 
         Raises:
-            InvalidInput: something else.
+            InvalidInput: any other value.
         """
         try:
             networks = tuple(ip_network(value) for value in values if value != PUBLIC)

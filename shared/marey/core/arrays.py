@@ -16,12 +16,12 @@ from marey.core.documents import read_bytes
 from marey.core.errors import InvalidFile, MareyError, NotFound, TooLarge
 
 MAX_UNPACKED = 2**30
-"""Bytes of the arrays of an npz file that is read whole."""
+"""Limit on the unpacked bytes of an npz file that is read whole."""
 PACKED = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
-"""The two that numpy writes. bzip2 and LZMA are unpacked in whole blocks, whatever size a member declares: 600 bytes
-became a gigabyte."""
+"""Compression methods that numpy writes. bzip2 and LZMA unpack whole blocks, whatever size a member declares: 600
+bytes became a gigabyte."""
 CHUNK = 2**22
-"""Numbers looked at in one go by the check for finite ones: a mapped file is not read into memory at once."""
+"""Numbers per step of the check for finite values: a mapped file is not read into memory at once."""
 
 Array = NDArray[Any]
 Shape = tuple[int | None, ...]
@@ -33,17 +33,17 @@ def check_array(
     """Check kind, shape and values of an array, and return it.
 
     Args:
-        array: as it was read.
-        name: what messages call it.
+        array: the array to check.
+        name: its name in messages.
         where: the file.
         kinds: letters of `numpy.dtype.kind` that are allowed (`f` floating, `iu` whole numbers, `b`, `U`), or one
             dtype's name (`float16`).
-        shape: length of each axis; None = any.
+        shape: length of each axis; None = any length.
         finite: refuse NaN and infinite numbers.
-        hint: what to do about it.
+        hint: advice for the error.
 
     Raises:
-        InvalidFile: it is something else.
+        InvalidFile: a check failed.
     """
     is_name = kinds[-1].isdigit()
     if array.dtype.name != kinds if is_name else array.dtype.kind not in kinds:
@@ -61,7 +61,7 @@ def map_npy(path: Path, *, hint: str | None = None) -> Array:
 
     Raises:
         NotFound: there is no such file.
-        InvalidFile: no npy file (an npz file with such a name neither), truncated, or with Python objects.
+        InvalidFile: not an npy file (or a renamed npz file), truncated, or with Python objects.
     """
     try:
         if not path.is_file():
@@ -71,7 +71,7 @@ def map_npy(path: Path, *, hint: str | None = None) -> Array:
         return np.lib.format.open_memmap(path, mode="r")
     except MareyError:
         raise
-    except Exception as error:  # a crafted header makes numpy raise nearly anything
+    except Exception as error:  # a crafted header makes numpy raise nearly any exception
         raise InvalidFile(_reason(error, "npy"), where=str(path), hint=hint) from None
 
 
@@ -106,7 +106,7 @@ def parse_npz(
     """Read arrays of an npz file's bytes by name; sizes are checked before anything is unpacked.
 
     Raises:
-        InvalidFile: no npz file, a broken one, one with Python objects, or an array is missing.
+        InvalidFile: not an npz file, broken, with Python objects, or without one of the arrays.
         TooLarge: it unpacks to more than `limit` bytes.
     """
     try:
@@ -126,10 +126,10 @@ def parse_npz(
             arrays = {name: file[name] for name in names}
     except MareyError:
         raise
-    except Exception as error:  # a crafted zip or header makes zipfile and numpy raise nearly anything
+    except Exception as error:  # a crafted zip or header makes zipfile and numpy raise nearly any exception
         raise InvalidFile(_reason(error, "npz"), where=where, hint=hint) from None
     foreign = [name for name, value in arrays.items() if not isinstance(value, np.ndarray)]
-    if foreign:  # a member that is no npy file comes as bytes
+    if foreign:  # numpy returns a member that is not an npy file as bytes
         raise InvalidFile(f"`{foreign[0]}` is no array", where=where, hint=hint)
     return arrays
 
@@ -140,13 +140,13 @@ def parse_safetensors(
     """Read the tensors of a safetensors file's bytes.
 
     Raises:
-        InvalidFile: no safetensors file, or with kinds of numbers that numpy does not have.
+        InvalidFile: not a safetensors file, or with number types that numpy does not have.
     """
     from safetensors.numpy import load
 
     try:
         return load(data)
-    except Exception as failure:  # SafetensorError, and KeyError or TypeError for kinds of numbers
+    except Exception as failure:  # SafetensorError, and KeyError or TypeError for unknown number types
         raise error(f"is not a safetensors file: {failure}", where=where, hint=hint) from None
 
 
@@ -154,11 +154,11 @@ def text_of(array: Array, name: str, where: str) -> str:
     """Return the text of an array that holds one string.
 
     Raises:
-        InvalidFile: it holds something else.
+        InvalidFile: it holds anything else.
     """
     try:
         return str(check_array(array, name, where, kinds="U", shape=())[()])
-    except ValueError:  # characters that are none
+    except ValueError:  # invalid code points
         raise InvalidFile(f"`{name}` is no text", where=where) from None
 
 

@@ -1,8 +1,8 @@
 """Characters that free text may not hold, and how text that holds them is displayed.
 
-A terminal obeys control characters, and direction overrides show text in another order than it is stored in. Text that
-comes in is checked once, at the edge, by `check_text`; text that goes out to a terminal or a log passes `escape`,
-because rows stored by earlier releases may hold anything. Standard library only: the small client imports it.
+Terminals execute control characters, and direction overrides display text in another order than it is stored in.
+Incoming text is checked once, at the edge, by `check_text`; text for a terminal or a log passes `escape`, because
+rows of earlier releases may hold any character. Standard library only: the small client imports it.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any, TextIO, cast
 from marey.core.errors import InvalidInput
 
 LINES = "\n\t"
-"""Control characters of text of several lines, such as comments."""
+"""Control characters allowed in multi-line text, such as comments."""
 WHITESPACE = "\n\r\t"
-"""Control characters of text whose whitespace is normalised, such as prompts."""
+"""Control characters allowed in text whose whitespace is normalised, such as prompts."""
 _CLASS = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
 """C0, DEL, C1, and the overrides and isolates of text direction."""
 MARKS = "\u200c\u200d\u200e\u200f"
@@ -25,21 +25,21 @@ STORED = "".join(map(chr, (*range(1, 0x20), *range(0x7F, 0xA0), *range(0x202A, 0
 """Forbidden characters that rows of earlier releases may hold: all but NUL and surrogates, which Postgres refuses."""
 _SHOWN_RAW = re.compile(rf"(?![{LINES}])[{_CLASS}\ud800-\udfff]")
 LINE_PATTERN = rf"^[^{_CLASS}]*$"
-"""Of JSON Schema, for text of one line; surrogates cannot be written there."""
+"""JSON Schema pattern for single-line text; surrogates cannot be written there."""
 TEXT_PATTERN = r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]*$"
-"""Of JSON Schema, for text that may hold `LINES`."""
+"""JSON Schema pattern for text that may hold `LINES`."""
 
 
 def check_text(text: str, *, allowed: str = "", subject: str = "it", where: str | None = None) -> str:
     """Return the text; raise if it holds a character that may not be in free text.
 
     Args:
-        allowed: control characters that may stand in it: `LINES`, `WHITESPACE`, `STORED`, or none.
-        subject: how the message begins, such as `the prompt`.
+        allowed: allowed control characters: `LINES`, `WHITESPACE`, `STORED`, or none.
+        subject: beginning of the message, such as `the prompt`.
         where: field, line or option, for the error.
 
     Raises:
-        InvalidInput: it names the first such character and its place.
+        InvalidInput: names the first forbidden character and its position.
     """
     found = find_forbidden(text, allowed)
     if found is None:
@@ -77,7 +77,7 @@ def escape(text: str, *, lines: bool = True) -> str:
     r"""Escape each forbidden character for a terminal, as `\x1b`, `\u202e`, `\ud800`.
 
     Args:
-        lines: keep newlines and tabs; else they are escaped too.
+        lines: keep newlines and tabs; otherwise they are escaped too.
     """
     return (_SHOWN_RAW if lines else FORBIDDEN).sub(_escaped, text)
 
@@ -97,7 +97,7 @@ class EscapingStream:
     """Text stream that escapes forbidden characters in everything written to it.
 
     Attributes:
-        unescaped: the stream behind it, for what draws on the terminal.
+        unescaped: the wrapped stream, for code that draws on the terminal.
     """
 
     def __init__(self, unescaped: TextIO) -> None:

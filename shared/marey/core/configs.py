@@ -33,7 +33,7 @@ def named(configs: Mapping[str, T], name: str) -> T:
     """Return one of several configurations by name.
 
     Raises:
-        InvalidInput: there is none of that name.
+        InvalidInput: the name is unknown.
     """
     if name not in configs:
         raise InvalidInput(f"there is no configuration {name!r}", hint=f"Known: {', '.join(configs)}.")

@@ -7,10 +7,10 @@ import unicodedata
 from urllib.parse import quote
 
 MOST_BYTES = 200
-"""Of a name without its ending, in UTF-8: file systems allow 255 with it."""
+"""Limit of the stem in UTF-8: file systems allow 255 bytes with the extension."""
 _UNSAFE = re.compile(r'[\x00-\x1f\x7f-\x9f/\\:*?"<>|\ud800-\udfff]')
 _PLAIN = re.compile(r"[^A-Za-z0-9!#$&+.^_`~ -]")
-"""Not for a quoted string that every client reads alike."""
+"""Characters that clients do not parse alike in a quoted string."""
 
 
 def download_name(stem: str, ending: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any, cast
 from marey.core.errors import InvalidFile, NotFound
 
 MAX_DEPTH = 64
-"""Levels of nesting. Our own documents have ten; the recursive code behind a parser takes a thousand."""
+"""Levels of nesting. Marey's own documents have ten; recursive code behind a parser handles a thousand."""
 MAX_JSON_BYTES = 64 * 2**20
 
 
@@ -24,17 +24,17 @@ def read_bytes(
 
     Args:
         path: the file.
-        limit: refuse a larger one before it is read.
-        error: what to raise for anything but a missing file.
-        where, hint: for the error; by default the path, and none.
+        limit: maximum size in bytes, checked before reading.
+        error: class to raise for anything but a missing file.
+        where, hint: for the error; by default the path, and no hint.
 
     Raises:
         NotFound: there is no such file.
-        InvalidFile: a folder, pipe or device, a link that leads in a circle, not readable, or over the limit.
+        InvalidFile: a folder, pipe or device, a circular link, unreadable, or over the limit.
     """
     where = str(path) if where is None else where
     try:
-        # Without O_NONBLOCK the opening of a pipe would wait for a writer.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(descriptor, "rb") as file:
             status = os.fstat(descriptor)
@@ -69,11 +69,11 @@ def parse_json(
     Args:
         data: the document.
         where, error, hint: for the error.
-        allow_nan: let NaN and infinite numbers pass, which Python writes and JSON does not have.
+        allow_nan: accept NaN and infinite numbers, which Python writes and JSON does not have.
         max_depth: levels of nesting.
 
     Raises:
-        InvalidFile: not JSON, nested too deeply, or with a text that is no Unicode.
+        InvalidFile: not JSON, nested too deeply, or with text that is not Unicode.
     """
     try:
         text = data.decode("utf-8-sig") if isinstance(data, bytes) else data

@@ -1,8 +1,8 @@
 """The error hierarchy.
 
-A message says what was wrong, where (file, line, field) and what to do about it. The command line prints an
+A message states what is wrong, where (file, line, field) and what to do about it. The command line prints an
 expected error verbatim and exits with `exit_code`; the API answers an RFC 9457 problem with `status` and
-`problem_type`. Anything outside this tree is a bug and shows a traceback (or a 500).
+`problem_type`. Any other exception is a bug and shows a traceback (or a 500).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ class MareyError(Exception):
     """Base class of expected failures, with a message for users.
 
     Args:
-        message: what was wrong, one sentence.
+        message: what is wrong, one sentence.
         where: file, line, field, row or identifier the message is about.
         hint: what to do about it.
     """
@@ -94,8 +94,8 @@ class Unreachable(MareyError):
         """Set the message for operators, and the one for API clients.
 
         Args:
-            public: what the API tells its clients, whoever they are: what is down, never where or how. None = only
-                that something the server needs is down.
+            public: message for API clients: which dependency is down, never where or how. None = only that a
+                dependency is down.
         """
         super().__init__(message, where=where, hint=hint)
         self.public = public
@@ -105,7 +105,7 @@ class Overloaded(Unreachable):
     """No capacity for the request now; the same request works later.
 
     Args:
-        seconds: when to ask again.
+        seconds: retry delay.
     """
 
     problem_type = "overloaded"
@@ -142,7 +142,7 @@ class Busy(Refused):
     """A quota or rate limit that is exhausted for now.
 
     Args:
-        seconds: when to ask again.
+        seconds: retry delay.
     """
 
     status = 429
@@ -157,7 +157,7 @@ class QuotaUsedUp(Busy):
     """A tenant's quota does not allow the request; nothing was written.
 
     Args:
-        quota: its name: `queued`, `bytes`.
+        quota: name of the quota: `queued`, `bytes`.
         limit, used, asked: items or bytes.
     """
 

@@ -1,7 +1,7 @@
 """All metrics of the product; a process exposes those of its part. The operations guide explains each.
 
-Labels are names from short lists: queues, states, stages, parts, routes. Tenants are the one label that grows with use;
-`MAX_TENANTS` of them have series of their own. Nothing here is an identifier of a job, an item or a key.
+Labels have few values: queues, states, stages, parts, routes. Only the number of tenants grows with use;
+`MAX_TENANTS` of them have series of their own. No label is an id of a job, an item or a key.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ API, WORKER, LIVE, SCHEDULER = _part(), _part(), _part(), _part()
 PARTS = {"api": API, "worker": WORKER, "live": LIVE, "scheduler": SCHEDULER}
 
 MAX_TENANTS = 50
-"""Tenants with series of their own, those that wait most; the rest is summed up."""
+"""Tenants with series of their own, those with the most waiting items; the rest is summed up."""
 OTHER_TENANTS = "(other)"
-"""No tenant has this name: parentheses are not allowed in one."""
+"""Label of the summed-up tenants: parentheses are not allowed in a tenant's name."""
 
 FAST = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0)
 """Seconds: from a claim to the run of a large batch on a slow machine."""
 
-# --- the API: what it answers ---
+# --- the API: requests ---
 
 HTTP_REQUESTS = Counter("marey_http_requests", "Answered requests.", ("method", "route", "status"), registry=API)
 HTTP_SECONDS = Histogram("marey_http_seconds", "Time to the end of an answer.", ("method", "route"), registry=API)
 SOCKETS = Gauge("marey_open_sockets", "Clients that watch a live stream.", registry=API)
 EVENT_STREAMS = Gauge("marey_open_event_streams", "Clients that follow a job.", registry=API)
 
-# --- the API: how the tables stand, asked at each scrape ---
+# --- the API: database figures, read at each scrape ---
 
 QUEUE = ("queue", "tenant")
 WAITING = Gauge("marey_waiting_items", "Ready items of jobs that run.", QUEUE, registry=API)
@@ -119,7 +119,7 @@ WEBHOOKS = Counter(
 )
 WEBHOOK_SECONDS = Histogram("marey_webhook_seconds", "Time of a try.", registry=SCHEDULER)
 
-# --- everywhere ---
+# --- all processes ---
 
 STORE_ERRORS = Counter(
     "marey_store_errors", "Times the asset store could not be used, by kind: folder or s3.", ("store",), registry=COMMON

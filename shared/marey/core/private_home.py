@@ -17,16 +17,16 @@ from marey.core.errors import InvalidInput
 FOLDER_MODE, FILE_MODE = 0o700, 0o600
 OPEN_TO_OTHERS = 0o077
 UMASK = 0o077
-"""Of all processes of a server: what they make is their user's alone."""
+"""Umask of all server processes: their files are private to the user."""
 CLOSED_FROM_ABOVE = frozenset({"assets", "models", "postgres", "valkey"})
-"""Folders of the home that are closed themselves, but not walked: they may hold a million files."""
+"""Folders of the home that are closed but not walked: they may hold a million files."""
 
 
 def make_private(home: Path) -> list[str]:
     """Make the home private: create it, or remove the access of other users to an existing one and its content.
 
     Returns:
-        What was open until now, for a warning.
+        Paths that were accessible until now, for a warning.
 
     Raises:
         InvalidInput: it cannot be made, written or closed, or belongs to another user.
@@ -86,12 +86,12 @@ def _close(path: Path) -> Iterator[tuple[Path, int]]:
     try:
         found = path.lstat()
         if stat.S_ISLNK(found.st_mode):
-            return  # what lies behind a link is not of this home
+            return  # the target of a link is outside this home
         mode = stat.S_IMODE(found.st_mode)
         if found.st_uid == os.geteuid() and mode & OPEN_TO_OTHERS:
             path.chmod(mode & ~OPEN_TO_OTHERS)
             yield path, mode
-    except FileNotFoundError:  # another process's temporary file
+    except FileNotFoundError:  # temporary file of another process
         return
 
 

@@ -1,6 +1,6 @@
 """Rate limits in text form ("600/minute"), by class of request.
 
-Plain text here, so that keys and settings can be checked without the library that counts.
+No dependency on the library that counts, so that keys and settings can be checked without it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from marey.core.errors import InvalidInput
 
 CLASSES = ("read", "submit", "operate", "parse")
-"""What a request does: look, make something, steer it; `parse` reads prompts, which costs a processor."""
+"""Classes of requests: read, create, operate; `parse` is separate because it costs CPU time."""
 UNITS = {"second": 1, "minute": 60, "hour": 3600, "day": 86_400}
 FORM = re.compile(r"([1-9][0-9]{0,8})/(second|minute|hour|day)")
 
@@ -33,7 +33,7 @@ def read_rate(text: str, *, where: str) -> Rate:
     """Parse a rate limit.
 
     Raises:
-        InvalidInput: it is none.
+        InvalidInput: it is not a rate limit.
     """
     form = FORM.fullmatch(text)
     if form is None:
@@ -45,7 +45,7 @@ def check_rates(rates: Mapping[str, str], *, where: str) -> dict[str, str]:
     """Check rate limits by class of request.
 
     Raises:
-        InvalidInput: an unknown class, or what is no rate.
+        InvalidInput: an unknown class, or an invalid rate limit.
     """
     for name, text in rates.items():
         if name not in CLASSES:

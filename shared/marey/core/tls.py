@@ -14,12 +14,12 @@ UNTRUSTED_HINT = f"If it belongs to a private certificate authority, set {VARIAB
 def trusting_context(ca_file: Path | None = None) -> ssl.SSLContext:
     """Return a client context that verifies certificates and names.
 
-    It trusts what the machine trusts (or `SSL_CERT_FILE`, `SSL_CERT_DIR`), and the authorities of `ca_file` as well.
+    Trusts the machine's authorities (or `SSL_CERT_FILE`, `SSL_CERT_DIR`), and those of `ca_file` as well.
 
     Raises:
         InvalidInput: the file cannot be read or holds no certificate.
     """
-    import httpx2  # costs 0.1 s of import; commands without a server do without
+    import httpx2  # costs 0.1 s of import, which commands without a server avoid
 
     context = httpx2.create_ssl_context()
     if ca_file is not None:

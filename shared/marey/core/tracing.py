@@ -1,7 +1,7 @@
 """Traces from a command through API, queue and worker to the motion row. Off unless an exporter is configured.
 
-`OTEL_EXPORTER_OTLP_ENDPOINT` (or `…_TRACES_ENDPOINT`) switches them on, and the other `OTEL_*` variables mean what they
-do everywhere; until then nothing of OpenTelemetry is imported, and a span is an empty object. A context travels as a
+`OTEL_EXPORTER_OTLP_ENDPOINT` (or `…_TRACES_ENDPOINT`) switches tracing on; the other `OTEL_*` variables have their
+usual meaning. Until then nothing of OpenTelemetry is imported, and a span is an empty object. A context travels as a
 W3C `traceparent`: in the header of a request, in the row of a job, and here, in a context variable. Attributes are
 identifiers and numbers, as in logs: no prompts, no names.
 """
@@ -35,7 +35,7 @@ class Span:
     """A unit of work. Without an exporter it only carries the context it was started in.
 
     Attributes:
-        traceparent: its context, for whoever goes on from here; None where there is none.
+        traceparent: its context, for child spans elsewhere; None if there is none.
     """
 
     __slots__ = ("_inner", "traceparent")
@@ -83,10 +83,10 @@ def configure_tracing(service: str, *, patience: float | None = None) -> None:
     """Export spans of this process as the service `marey-…`, if `wanted`. Call it once, at start-up.
 
     Args:
-        patience: seconds for a collector that does not answer, where `OTEL_EXPORTER_OTLP_TIMEOUT` says nothing.
+        patience: seconds to wait for a collector, if `OTEL_EXPORTER_OTLP_TIMEOUT` is unset.
 
     Raises:
-        InvalidInput: the packages are not installed, or another protocol is asked for.
+        InvalidInput: the packages are not installed, or another protocol is requested.
     """
     global _tracer, _provider
     if _tracer is not None or not wanted():
@@ -129,8 +129,8 @@ def begin(
     """Start a span that is ended later, perhaps on another thread.
 
     Args:
-        parent: `traceparent` of what it belongs to; None = what is under way here.
-        ago: seconds since it began.
+        parent: `traceparent` of the parent; None = the current context.
+        ago: seconds since the span started.
     """
     parent = parent or _current.get()
     if _tracer is None:

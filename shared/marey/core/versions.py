@@ -8,7 +8,7 @@ from marey.core.errors import Conflict
 
 POSTGRES = 15
 REDIS = (7, 0)
-"""Valkey counts as the Redis that it is compatible with, which it tells as `redis_version`."""
+"""Valkey counts as the compatible Redis version, which it reports as `redis_version`."""
 
 
 def check_postgres(number: int) -> None:

@@ -31,13 +31,13 @@ log = structlog.get_logger(__name__)
 RV = TypeVar("RV")
 _Waiting = Generator[Any, Any, RV]
 INTERVAL = 0.1
-"""Seconds between two looks at the deadline of a call that waits."""
+"""Seconds between checks of the deadline of a waiting call."""
 HEARD_LATELY = 2.0
-"""A connection that heard from the server this recently is not silent. Shorter than any deadline."""
+"""Seconds for which a connection counts as alive after an answer. Shorter than any deadline."""
 STOPPED = 1.0
-"""Longer than between two looks this process was stopped itself; that counts as so many seconds of waiting."""
+"""A gap longer than this between two checks means that this process was suspended; it counts as this many seconds."""
 TURN_SECONDS = 1.0
-"""A caller waits so long for another that already tries whether a silent server answers again."""
+"""Seconds that a caller waits for another one that already tries a silent server."""
 
 SET_UP = """
     SELECT pooled, clock_timestamp(), set_config('timezone', 'UTC', false),
@@ -79,9 +79,10 @@ class ConnectionGroup:
         self._probing = threading.Lock()
         self._lost: set[Session] = set()
         self.silent = False
-        """A deadline was missed, and nothing was heard since."""
+        """A deadline was missed, and no answer came since."""
         self.misses = 0
-        """How often the server was found silent: whoever compares it with an earlier value learns of an outage."""
+        """Number of times the server was found silent; a caller that compares it with an earlier value detects an
+        outage."""
 
     def add(self, connection: DeadlineConnection) -> None:
         """Add a new connection."""
@@ -91,8 +92,8 @@ class ConnectionGroup:
     def missed(self, seconds: float) -> None:
         """Handle a missed deadline: close every connection that has not heard from the server lately.
 
-        Threads that wait for an answer on one of them are woken by that. Connections that are in use and hear from the
-        server stay, so an alarm on a busy, living server costs idle connections and the longest statements only.
+        Threads that wait on a closed connection are woken. Connections that are in use and hear from the server stay
+        open, so a false alarm on a busy server costs idle connections and the longest statements only.
         """
         with self._lock:
             self.silent = True
@@ -113,7 +114,7 @@ class ConnectionGroup:
         """End the sessions of closed silent and of broken connections on the server, which may not have noticed.
 
         Such a session would keep its locks until a timeout of the server, a COPY that waits for data for ever (no
-        timeout of Postgres applies to it), and its place among `max_connections` until the network gives it up.
+        timeout of Postgres applies), and its share of `max_connections` until the network gives it up.
         """
         with self._lock:
             lost, self._lost = self._lost, set[Session]()
@@ -140,7 +141,7 @@ class ConnectionGroup:
     def turn(self) -> Generator[None]:
         """Guard the checkout of a connection: while the server is silent, one caller at a time tries it.
 
-        The others fail at once, and keep neither threads nor pool slots waiting for a server that does not answer.
+        The others fail at once, and occupy neither threads nor pool slots.
 
         Raises:
             SilentConnection: another caller tries already, and has not succeeded within `TURN_SECONDS`.
@@ -163,19 +164,19 @@ class ConnectionGroup:
 class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
     """A psycopg connection on which every round trip is limited to `limit` seconds of silence.
 
-    Every round trip of psycopg (statement, COPY, commit, rollback) goes through `wait`; connecting has a timeout of its
-    own. A missed deadline closes the connection and tells its group.
+    Every round trip of psycopg (statement, COPY, commit, rollback) goes through `wait`; connecting has a timeout of
+    its own. A missed deadline closes the connection and notifies its group.
     """
 
     group: ConnectionGroup
     limit: float = PING_SECONDS
-    """Seconds of silence after which a call is given up."""
+    """Seconds of silence after which a call fails."""
     deadline: Deadline = ORDINARY
-    """The limits that the server's session was set up with."""
+    """Limits that the server's session was set up with."""
     session: Session | None = None
-    """Its session on the server; None where a pooler hides it."""
+    """Session on the server; None if a pooler hides it."""
     pooled: bool = False
-    """A pooler (PgBouncer) stands between: the session's state is not ours."""
+    """True behind a pooler (PgBouncer): the session's state is shared."""
     _heard: float = 0.0
     _line: socket.socket | None = None
     _line_lock: threading.Lock
@@ -185,16 +186,17 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         self.group = group
         self._heard = time.monotonic()
         self._line_lock = threading.Lock()
-        # A descriptor of our own: libpq may close its one, and the number be given to another file, at any time.
+        # Duplicated descriptor: libpq may close its own at any time, and the number may be reused.
         self._line = socket.socket(fileno=os.dup(self.pgconn.socket))
         group.add(self)
 
     def set_up(self, deadline: Deadline) -> None:
         """Set the limits of the session, and learn whether a pooler stands between.
 
-        A pooler answers a connection with a process number of its own. In transaction mode it may run each transaction
-        in another session, so what a session holds (limits, prepared statements) is left alone there: `transaction`
-        sets the limits of each transaction. The time zone is the exception: poolers keep it for each client.
+        A pooler answers a connection with a process number of its own. In transaction mode it may run each
+        transaction in another session, so session state (limits, prepared statements) is not used there:
+        `transaction` sets the limits of each transaction. The time zone is the exception: poolers keep it for each
+        client.
         """
         self.deadline = deadline
         values = (self.pgconn.backend_pid, *milliseconds(deadline))
@@ -240,8 +242,8 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
         """Drive a round trip until it is done.
 
         Raises:
-            SilentConnection: nothing came for `limit` seconds, or bytes came too slowly (`in_all`). Not with a
-                `timeout`, by which the caller waits for notifications.
+            SilentConnection: no data for `limit` seconds, or data arrived too slowly (`in_all`). Not with a
+                `timeout`, which the caller sets to wait for notifications.
         """
         if timeout is not None:
             return super().wait(gen, interval, timeout)
@@ -249,8 +251,8 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
             return super().wait(self._watched(gen), interval)
         except psycopg.OperationalError as error:
             if error.sqlstate is None and not self.closed:
-                # psycopg leaves the connection "active" where poll finds the socket broken. It is of no use any more,
-                # and SQLAlchemy takes an error of its check before use for a lost connection only if it is closed.
+                # psycopg leaves the connection "active" when poll finds the socket broken. It is unusable, but
+                # SQLAlchemy treats an error of its pre-use check as a lost connection only if it is closed.
                 self.close()
             raise
 
@@ -289,7 +291,7 @@ class DeadlineConnection(psycopg.Connection[tuple[Any, ...]]):
     def _is_cut(line: socket.socket) -> bool:
         """Return True if the connection was reset, or the other side has closed it."""
         poll = select.poll()
-        poll.register(line, getattr(select, "POLLRDHUP", 0))  # Linux alone tells of a half-closed one
+        poll.register(line, getattr(select, "POLLRDHUP", 0))  # only Linux reports a half-closed one
         return bool(poll.poll(0))
 
     def _give_up(self, seconds: float) -> NoReturn:

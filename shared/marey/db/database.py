@@ -20,7 +20,7 @@ EVENT_CHANNEL = "marey_event"
 """NOTIFY channel: the job in the payload has new events."""
 
 POOL_SECONDS = 10
-"""A thread waits so long for another to give a connection back."""
+"""Seconds that a thread waits for a free connection of the pool."""
 GROUP, DEADLINE = "marey_group", "marey_deadline"
 """Execution options of an engine: its connection group, and the limits its sessions are set up with."""
 SNAPSHOT = sa.text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")
@@ -32,7 +32,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
     """Create an engine for `postgresql+psycopg://…` (plain `postgresql://` is taken as the same).
 
     Connections are checked before use, so a restarted server costs no failed transaction. Every round trip has a
-    deadline (`marey.db.deadlines`); `deadline` is that of transactions that name no other.
+    deadline (`marey.db.deadlines`); `deadline` is the default for transactions.
     """
     parsed = sa.make_url(url).set(drivername="postgresql+psycopg")
     group = group_of(parsed)
@@ -41,7 +41,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
         pool_size=pool_size,
         max_overflow=max_overflow,
         pool_pre_ping=True,
-        hide_parameters=True,  # an error's text goes to logs, and parameters hold prompts
+        hide_parameters=True,  # error texts are logged, and parameters hold prompts
         pool_timeout=POOL_SECONDS,
         connect_args={"application_name": "marey"},
         execution_options={GROUP: group, DEADLINE: deadline},
@@ -53,7 +53,7 @@ def create_engine(url: str, *, pool_size: int = 5, max_overflow: int = 10, deadl
 
     @event.listens_for(engine, "checkout")
     def _check_out(connection: DeadlineConnection, _record: object, _fairy: object) -> None:
-        connection.limit = deadline.answer  # after the check before use, which has the limit of a ping
+        connection.limit = deadline.answer  # after the pre-use check, which has the limit of a ping
         group.answered()
 
     @event.listens_for(engine, "checkin")
@@ -71,12 +71,12 @@ def transaction(
     """Run a block in one transaction: commit at the end, roll back on an exception.
 
     Args:
-        deadline: the kind of its calls (`marey.db.deadlines`); None = the engine's.
-        snapshot: every statement sees the database as it was at the first one, and none may write.
+        deadline: kind of the transaction's calls (`marey.db.deadlines`); None = the engine's.
+        snapshot: every statement sees the database as of the first one; read-only.
 
     Raises:
-        Unreachable: the database does not answer, or went away in the middle (nothing is written then, unless it went
-            away exactly during the commit: the caller's idempotency or lease token sorts that out).
+        Unreachable: the database does not answer, or the connection broke (nothing is written then, except if it
+            broke during the commit: the caller's idempotency key or lease token resolves that).
     """
     options = engine.get_execution_options()
     group: ConnectionGroup = options[GROUP]
@@ -86,7 +86,7 @@ def transaction(
             connection = engine.connect()
         with connection, connection.begin():
             if snapshot:
-                connection.execute(SNAPSHOT)  # Postgres takes it before any other statement alone
+                connection.execute(SNAPSHOT)  # Postgres accepts it only before any other statement
             _limit(connection, chosen)
             yield connection
     except (exc.OperationalError, exc.TimeoutError, psycopg.OperationalError) as error:
@@ -100,7 +100,7 @@ def transaction(
 def _limit(connection: sa.Connection, deadline: Deadline) -> None:
     """Apply the limits of a kind of call to the transaction that begins; costs a round trip if the session has others.
 
-    Behind a pooler always: the session may be any.
+    Always behind a pooler: the session may be any.
     """
     driver = connection.connection.driver_connection
     assert isinstance(driver, DeadlineConnection)

@@ -5,8 +5,8 @@ a clean error and its connection stays usable. The client waits a little longer,
 the server, and then treats the connection as silent: it closes it, and every other connection of the process that is
 silent too (`marey.db.connections`). Waiting for a lock counts as running.
 
-`transaction(engine, KIND)` chooses the kind. A process that makes long calls makes short ones beside them (the
-heartbeat of a worker, the LISTEN connections of API and scheduler), and finds a silent server within seconds by those.
+`transaction(engine, KIND)` chooses the kind. A process with long calls has short ones too (the heartbeat of a
+worker, the LISTEN connections of API and scheduler), and detects a silent server within seconds by those.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Deadline:
     statement: float
     """The server cancels a statement after this long (`statement_timeout`)."""
     idle: float
-    """The server ends a session that leaves its transaction open and idle for so long
-    (`idle_in_transaction_session_timeout`). The locks of a lost connection last this long at most."""
+    """Seconds until the server ends a session with an idle open transaction (`idle_in_transaction_session_timeout`):
+    the longest time that a lost connection keeps its locks."""
     margin: float = 2.0
 
     @property
@@ -33,25 +33,25 @@ class Deadline:
 
 
 CONNECT_SECONDS = 4
-"""For each address of the server, from the first packet to the end of the log-in; whole seconds, libpq's least is 2."""
+"""Per address of the server, from the first packet to the end of the log-in; whole seconds, libpq's minimum is 2."""
 PING_SECONDS = 3.0
-"""For the check of a pooled connection before use, and for a probe of a LISTEN connection: no lock, no table."""
+"""Pre-use check of a pooled connection, and probe of a LISTEN connection: no lock, no table."""
 ROLLBACK_SECONDS = 3.0
 """A rollback writes nothing and waits for no lock."""
 SHORT_SECONDS = 4.0
-"""Round trips with a limit of at most this long have answers of a few bytes: the limit counts the whole of them."""
+"""Round trips with at most this limit have answers of a few bytes: the limit applies to the whole answer."""
 SLOWNESS = 3
-"""Others may take this many times their limit as long as bytes come: a large answer on a slow line is no fault, a
-connection that lets a byte through now and then is one."""
+"""Other round trips may take this many times their limit while data arrives: a large answer on a slow line is no
+fault, a connection that transfers a byte now and then is one."""
 PROBE_EVERY = 3.0
 """Seconds without a notification after which a LISTEN connection is probed."""
 
 HEARTBEAT = Deadline("heartbeat", statement=3.0, idle=3.0, margin=1.0)
-"""Renewals of leases: several must fit into a lease of 10 s, and a lost one must not lock the next out."""
+"""Renewals of leases: several must fit into a lease of 10 s, and a lost one must not block the next."""
 ORDINARY = Deadline("ordinary", statement=10.0, idle=8.0)
-"""All calls that name no other kind: milliseconds, or the wait for the lock of a job that somebody else changes."""
+"""All calls without another kind: milliseconds, or the wait for the lock of a job that another transaction changes."""
 SEARCH = Deadline("search", statement=30.0, idle=8.0)
-"""Listings, searches, aggregates: they read many rows, and hold no locks that others wait for."""
+"""Listings, searches, aggregates: they read many rows, and hold no locks that block others."""
 BULK = Deadline("bulk", statement=60.0, idle=30.0)
 """Up to 100,000 items in one transaction: submit, cancel, retry, erase, delete, restore. A COPY is fed meanwhile."""
 MAINTENANCE = Deadline("maintenance", statement=60.0, idle=60.0)

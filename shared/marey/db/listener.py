@@ -42,9 +42,9 @@ class Listener:
         """Connect and listen.
 
         Raises:
-            Unreachable: the database does not answer. Make a new one later, and look at the tables once: what was
-                notified in between is not told again.
-            InvalidInput: a transaction pooler stands between, which passes no notifications on.
+            Unreachable: the database does not answer. Reconnect later, and read the tables once: notifications in
+                between are lost.
+            InvalidInput: a transaction pooler in between, which does not forward notifications.
         """
         self._received: list[Notification] = []
         try:
@@ -63,7 +63,7 @@ class Listener:
     def wait(self, timeout: float) -> list[Notification]:
         """Return the notifications that arrive within `timeout` seconds: at once with the first ones, [] if none.
 
-        After `PROBE_EVERY` seconds without any, the connection itself is asked whether it still answers.
+        After `PROBE_EVERY` seconds without any, the connection itself is probed.
 
         Raises:
             Unreachable: the connection is gone, or silent.
@@ -102,7 +102,7 @@ class Listener:
         """Notify this connection from another one, and check that the notification arrives.
 
         Raises:
-            InvalidInput: it does not.
+            InvalidInput: it does not arrive.
         """
         channel = f"marey_check_{uuid4().hex}"
         self._listen((channel,))

@@ -21,9 +21,9 @@ from marey.db.deadlines import MIGRATION
 
 LOCK = 0x6D61726579  # "marey": the advisory lock that migrations take
 LOCK_SECONDS = 3.0
-"""A statement that waits longer for a table gives up: whoever comes to that table behind it waits as long."""
+"""A statement that waits longer for a table's lock fails: every later statement on that table queues behind it."""
 PATIENCE = 60.0
-"""Then the migration is tried again, for so long."""
+"""Seconds for which the migration is retried after that."""
 PAUSE_SECONDS = 2.0
 VERSION = sa.cast(sa.func.current_setting("server_version_num"), sa.Integer)
 
@@ -32,8 +32,8 @@ def upgrade(engine: sa.Engine, revision: str = "head", *, patience: float = PATI
     """Migrate up, all or nothing, under an advisory lock: several processes may start at once.
 
     Raises:
-        Conflict: somebody held a table for `patience` seconds, the database is of a newer version, or its server is too
-            old.
+        Conflict: another transaction locked a table for `patience` seconds, the database is of a newer version, or
+            its server is too old.
         Unreachable: the database does not answer.
     """
     _migrate(engine, command.upgrade, revision, patience)
@@ -43,7 +43,7 @@ def downgrade(engine: sa.Engine, revision: str, *, patience: float = PATIENCE) -
     """Migrate down to a revision ("base" = no tables). Data of the younger tables and columns is lost.
 
     Raises:
-        Conflict: somebody held a table for `patience` seconds, or the database is of a newer version.
+        Conflict: another transaction locked a table for `patience` seconds, or the database is of a newer version.
         Unreachable: the database does not answer.
     """
     _migrate(engine, command.downgrade, revision, patience)
@@ -81,8 +81,8 @@ def check_revision(engine: sa.Engine) -> None:
     (docs/how-to/deployment.md).
 
     Raises:
-        Conflict: it is older, or not migrated at all, or its server is too old.
-        Unreachable: it does not answer.
+        Conflict: the database is older, or not migrated at all, or its server is too old.
+        Unreachable: the database does not answer.
     """
     with transaction(engine) as conn:
         table, version = conn.execute(sa.select(sa.func.to_regclass("alembic_version"), VERSION)).one()

@@ -1,9 +1,9 @@
 """Pages of listings, ordered by the database's clock. Cursors are opaque.
 
-A cursor holds the id and the creation time of the last row. Those of earlier releases hold its id alone, and are read
-too: the time is that of the row, or, when that is gone, the time in its UUIDv7. In turn an API process of an earlier
-release reads the id of ours, and goes on in its own order: the id in braces is base64 that ends in padding, where its
-decoder stops; the time stands behind it.
+A cursor holds the id and the creation time of the last row. Cursors of earlier releases hold the id alone, and are
+accepted too: the time is that of the row, or, if the row is gone, the time in its UUIDv7. In turn an API process of
+an earlier release reads the id of a current cursor, and continues in its own order: the id in braces is base64 that
+ends in padding, where its decoder stops; the time follows.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Order:
             scope: the rows of the listing; the row of an earlier release's cursor is looked up among them.
 
         Raises:
-            InvalidInput: it is none of ours.
+            InvalidInput: not a cursor of this listing.
         """
         mark = read_cursor(cursor, _Mark.read)
         at: sa.ColumnElement[Any] = sa.literal(mark.at, Time)
@@ -127,7 +127,7 @@ def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
     """Decode the mark of a cursor.
 
     Raises:
-        InvalidInput: it is none of ours.
+        InvalidInput: not a cursor of this listing.
     """
     try:
         parts = _PADDED.findall(cursor + "=" * (-len(cursor) % 4))

@@ -11,7 +11,7 @@ from sqlalchemy.dialects.postgresql import ARRAY
 from marey.core import characters
 
 CLOCK = sa.func.clock_timestamp()
-"""Database time at this statement; `now()` is that of the transaction's begin, before it waited for locks."""
+"""Database time at this statement; `now()` is the start of the transaction, before it waited for locks."""
 
 
 def among(column: sa.Column[Any], values: Iterable[object]) -> sa.ColumnElement[bool]:

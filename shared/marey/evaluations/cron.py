@@ -1,7 +1,7 @@
 """Due times of a cron line in a time zone, computed by cronsim: Debian's cron, also at clock changes.
 
-A time that a change of clocks leaves out comes at the end of the gap; one that comes twice is due once, at the first,
-unless its line names every hour or every minute.
+A time that a clock change skips becomes the end of the gap; one that occurs twice is due once, at the first, unless
+its line names every hour or every minute.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ FIELDS = 5
 MAX_LENGTH = 200
 HINT = 'Five fields: minute, hour, day of the month, month, day of the week. "0 3 * * 1" is every Monday at 03:00.'
 MOST_TRIES = 10_000
-"""Times looked at until one lies after the moment asked about; those of an hour that comes twice, at most."""
+"""Candidates examined until one lies after the given moment; at most those of an hour that occurs twice."""
 
 
 def check_cron(cron: str) -> str:
     """Validate a cron line and return it with single spaces.
 
     Raises:
-        InvalidInput: it is none, or it names a day that no year has.
+        InvalidInput: not a cron line, or it names a day that no year has.
     """
     text = " ".join(cron.split())
     next_time(text, "UTC", datetime(2026, 1, 1, tzinfo=UTC))
@@ -37,7 +37,7 @@ def check_zone(name: str) -> str:
     """Validate the name of a time zone and return its canonical form.
 
     Raises:
-        InvalidInput: there is none of that name.
+        InvalidInput: the name is unknown.
     """
     if name in _zones():
         return name
@@ -50,13 +50,13 @@ def next_time(cron: str, zone: str, after: datetime) -> datetime:
     """Return the first due time after a moment, in UTC.
 
     Raises:
-        InvalidInput: the line is none, or is never due again.
+        InvalidInput: the line is invalid, or never due again.
     """
     times = _times(cron, after.astimezone(ZoneInfo(zone)))
     try:
         for _ in range(MOST_TRIES):
             found = next(times).astimezone(UTC)
-            if found > after:  # in an hour that comes twice, cronsim thinks of the first
+            if found > after:  # in an hour that occurs twice, cronsim uses the first
                 return found
     except (StopIteration, OverflowError):
         pass
@@ -68,7 +68,7 @@ def last_time(cron: str, zone: str, until: datetime, since: datetime) -> datetim
     between.
 
     Raises:
-        InvalidInput: the line is none.
+        InvalidInput: the line is invalid.
     """
     times = _times(cron, (until + timedelta(seconds=1)).astimezone(ZoneInfo(zone)), reverse=True)
     for found in times:

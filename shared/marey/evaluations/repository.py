@@ -1,7 +1,7 @@
 """Evaluations: rows with state and reason. Their work is done by ordinary jobs.
 
-Every change of state happens under the lock of the evaluation's row, which comes before the locks of its jobs, and
-leaves an event with its reason. What makes an evaluation `done` stands in `scoring.py`.
+Every change of state happens under the lock of the evaluation's row, which precedes the locks of its jobs, and
+writes an event with its reason. `scoring.py` moves an evaluation to `done`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def store_prompts(conn: sa.Connection, tenant: str, prompts: Sequence[Evaluation
     sha256 = prompts_sha256(prompts)
     rows = [prompt.as_json() for prompt in prompts]
     new = insert(tables.prompt_set).values(tenant_id=tenant, sha256=sha256, count=len(rows), prompts=rows)
-    # The update changes nothing, but locks the row until whoever refers to it has done so: see `remove_unused_prompts`.
+    # The update changes nothing, but locks the row until the referring row is committed: see `remove_unused_prompts`.
     key = ["tenant_id", "sha256"]
     conn.execute(new.on_conflict_do_update(index_elements=key, set_={"count": new.excluded.count}))
     return sha256
@@ -55,8 +55,8 @@ def remove_unused_prompts(conn: sa.Connection) -> int:
         sa.exists().where(schedule.tenant_id == table.c.tenant_id, schedule.prompts_sha256 == table.c.sha256)
         | sa.exists().where(evaluation.tenant_id == table.c.tenant_id, evaluation.prompts_sha256 == table.c.sha256)
     )
-    # Locked first, asked again then: nobody can begin to refer to a row that is locked, and a new statement sees who
-    # did before.
+    # Locked first, checked again afterwards: no transaction can start to refer to a locked row, and the second
+    # statement sees earlier references.
     lock = sa.select(table.c.tenant_id, table.c.sha256).where(unused).with_for_update(skip_locked=True, of=table)
     found = [tuple(row) for row in conn.execute(lock)]
     if not found:
@@ -159,7 +159,7 @@ def check_baseline(conn: sa.Connection, tenant: str, request: EvaluationRequest,
     evaluator. Distances in the space of another evaluator are other numbers.
 
     Raises:
-        InvalidInput: it cannot.
+        InvalidInput: it is not comparable.
     """
     if request.baseline is None:
         return
@@ -175,7 +175,7 @@ def check_comparable(run: EvaluationRow, *, prompts: str | None, evaluator: str 
     prompts, measured by the same evaluator.
 
     Raises:
-        InvalidInput: it cannot; `where` is what names the run in the request.
+        InvalidInput: it is not comparable; `where` is the field that names the run.
     """
     other = None
     if run.state is not EvaluationState.DONE:
@@ -217,7 +217,7 @@ def lock_evaluation(conn: sa.Connection, evaluation: UUID, *, skip_locked: bool 
     locked)."""
     table = tables.evaluation.c
     lock = sa.select(table.id).where(table.id == evaluation)
-    # NO KEY: reports and events that refer to the row may be looked at by others meanwhile.
+    # NO KEY: reports and events that refer to the row may be inserted meanwhile.
     locked = conn.execute(lock.with_for_update(key_share=True, skip_locked=skip_locked)).one_or_none()
     return None if locked is None else _read(conn, _evaluations().where(table.id == evaluation))[0]
 
@@ -228,7 +228,7 @@ def move_evaluation(
     """Move a locked evaluation to another state.
 
     Raises:
-        ValueError: it may not go there from where it is.
+        ValueError: the transition is not allowed.
     """
     if state not in EVALUATION_TRANSITIONS[row.state]:
         raise ValueError(f"an evaluation may not go from {row.state} to {state}")
@@ -355,7 +355,7 @@ def refuse_needed(conn: sa.Connection, tenant: str, job: UUID) -> None:
     """Validate that no open evaluation uses this job. The evaluation's row is locked, before the job's.
 
     Raises:
-        Conflict: one does.
+        Conflict: an open evaluation uses the job.
     """
     table = tables.evaluation.c
     ours = (table.tenant_id == tenant) & ((table.generate_job_id == job) | (table.score_job_id == job))

@@ -19,7 +19,7 @@ from marey.jobs import EVALUATOR_QUEUE, NO_TEXT, PRIORITY_LIMIT, NewItem, NewJob
 from marey.jobs.generators import GeneratorCapabilities, capabilities_of, new_items
 
 BACKGROUND = -PRIORITY_LIMIT
-"""Priority of the jobs of evaluations: whatever a person waits for goes first."""
+"""Priority of the jobs of evaluations: interactive work goes first."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Plan:
         for number, prompt in enumerate(self.prompts):
             seconds = prompt.seconds
             if seconds is not None and request.splits:
-                seconds = min(max(seconds, low), high)  # real clips are as long as they are
+                seconds = min(max(seconds, low), high)  # the lengths of real clips are fixed
             yield Item(
                 prompt.prompt,
                 seconds=seconds,
@@ -62,19 +62,19 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
     """Resolve the bundles of a request, and validate that it can run. Loads no model.
 
     Args:
-        prompts: its own; None = those of the evaluator's bundle.
+        prompts: custom prompts; None = those of the evaluator's bundle.
 
     Raises:
         NotFound, InvalidBundle, Refused: of the bundles; `where` is the field that names it.
         InvalidItems: with every prompt whose length the model cannot make.
-        InvalidInput: a setting that the model has not, too many motions, a seed that is too high.
+        InvalidInput: a setting that the model lacks, too many motions, a seed that is too high.
     """
     with named_by("bundle"):
         offer = capabilities_of(choose_bundle(request.bundle, config=config, verify=False), config)
     with named_by("evaluator"):
         evaluator = choose_evaluator(request.evaluator, generator=offer.bundle, config=config)
         _check_layout(offer.bundle, evaluator)
-        # Own prompts have real motion beside them too: whether it is there shall not be found out after the last one.
+        # Custom prompts are compared with real motion too: check that it exists before any motion is made.
         captions = tuple(p for split in request.splits or (TEST_SPLIT,) for p in reference_prompts(evaluator, split))
     prompts = captions if prompts is None else prompts
     offer.check_settings(request.settings)
@@ -93,7 +93,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
 def scoring_job(row: EvaluationRow) -> NewJob:
     """Return the job of one item that measures the motions."""
     evaluator = row.request.evaluator
-    assert evaluator is not None  # exact since its motions were asked for
+    assert evaluator is not None  # exact since generation started
     item = NewItem(
         index=0,
         prompt=f"measure evaluation {row.label}",

@@ -25,7 +25,7 @@ def create_schedule(conn: sa.Connection, new: NewSchedule) -> UUID:
     """Create a schedule, first due at its next time from now.
 
     Raises:
-        InvalidInput: of its cron line, time zone or name.
+        InvalidInput: an invalid cron line, time zone or name.
     """
     check_text(new.name, "name")
     cron, zone = check_cron(new.cron), check_zone(new.time_zone)
@@ -79,7 +79,7 @@ def change_schedule(conn: sa.Connection, tenant: str, schedule: UUID, change: Sc
 
     Raises:
         NotFound: the tenant has no such schedule.
-        InvalidInput: of the new cron line, time zone or name.
+        InvalidInput: an invalid cron line, time zone or name.
     """
     check_text(change.name, "name")
     row = _locked(conn, tenant, schedule)
@@ -114,14 +114,14 @@ def run_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> UUID:
     Raises:
         NotFound: the tenant has no such schedule.
     """
-    _locked(conn, tenant, schedule)  # a change under way comes first, or waits: its request and prompts go together
+    _locked(conn, tenant, schedule)  # wait for a concurrent change: its request and prompts belong together
     row = get_schedule(conn, tenant, schedule)
     made = create_evaluation(conn, _evaluation(row, None, "asked for, beside the times of its schedule"))
-    assert made is not None  # only one with a due time can be there already
+    assert made is not None  # only one with a due time can exist already
     return made
 
 
-# --- what the scheduler does ---
+# --- the scheduler's functions ---
 
 
 def due_schedules(conn: sa.Connection) -> list[UUID]:
@@ -134,7 +134,7 @@ def fire_schedule(conn: sa.Connection, schedule: UUID) -> UUID | None:
     """Plan the due evaluation of a schedule; None if it is not due, or another process has it.
 
     After an outage the newest of the missed times stands for all of them. A schedule whose cron line or time zone is
-    known no longer is paused, and its evaluation has failed with the reason.
+    no longer valid is paused, and its evaluation fails with the reason.
     """
     table = tables.schedule
     lock = sa.select(table.c.next_at).where(table.c.id == schedule, _is_due())

@@ -31,7 +31,7 @@ from marey.jobs.types import Problem
 
 OWN = ("index", "variant", "prompt", "seconds", "seed", "frames", "fps", "elapsed", "licence")
 HISTORY = 20
-"""Runs that a report may draw a trend of."""
+"""Number of runs in a report's trend."""
 
 EVALUATION_OF_LEASE = sa.text("""
     SELECT evaluation.id FROM evaluation JOIN lease ON lease.job_id = evaluation.score_job_id
@@ -43,8 +43,8 @@ def load_score(conn: sa.Connection, job: UUID) -> ScoreRows:
     """Return the input of a job's score item.
 
     Raises:
-        NotFound: no evaluation is scored by this job, or what it needs was deleted.
-        Conflict: its evaluation is over, or still needs motions.
+        NotFound: no evaluation is scored by this job, or its data was deleted.
+        Conflict: the evaluation has ended, or still needs motions.
     """
     table = tables.evaluation.c
     row = conn.execute(sa.select(table.tenant_id, table.id).where(table.score_job_id == job)).one_or_none()
@@ -65,11 +65,11 @@ def load_score(conn: sa.Connection, job: UUID) -> ScoreRows:
 def commit_score(conn: sa.Connection, lease_token: UUID, score: NewScore) -> Committed:
     """End a score item and its evaluation: reports, summary, states, counters and events in this transaction.
 
-    The files must lie in the asset store and have been announced by `begin_assets`. Where the evaluation was over
-    before, the item fails and nothing else is written.
+    The files must be in the asset store and have been announced by `begin_assets`. If the evaluation had already
+    ended, the item fails and nothing else is written.
 
     Raises:
-        ValueError: a format that is none of a report's, or a measure that is no number.
+        ValueError: an unknown report format, or a measure that is not a number.
     """
     _check(score)
     found = conn.execute(EVALUATION_OF_LEASE, {"token": lease_token}).scalar_one_or_none()

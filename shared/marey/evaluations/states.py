@@ -10,9 +10,9 @@ class EvaluationState(StrEnum):
 
     PLANNED = "planned"
     GENERATING = "generating"
-    """Its motions are made by a job like any other, in the background."""
+    """An ordinary background job makes its motions."""
     SCORING = "scoring"
-    """They are measured, by a job of one item."""
+    """A job of one item measures them."""
     DONE = "done"
     FAILED = "failed"
     CANCELLED = "cancelled"
@@ -26,6 +26,6 @@ EVALUATION_TRANSITIONS: dict[EvaluationState, frozenset[EvaluationState]] = {
     EvaluationState.FAILED: frozenset(),
     EvaluationState.CANCELLED: frozenset(),
 }
-"""Allowed transitions of evaluations; the trigger `evaluation_transition` is the same table."""
+"""Allowed transitions of evaluations; the trigger `evaluation_transition` has the same table."""
 OPEN_EVALUATIONS = frozenset({EvaluationState.PLANNED, EvaluationState.GENERATING, EvaluationState.SCORING})
-"""States of evaluations that are not over."""
+"""States of open evaluations."""

@@ -27,10 +27,10 @@ schedule = sa.Table(
     sa.Column("name", sa.Text),
     sa.Column("cron", sa.Text, nullable=False),
     sa.Column("time_zone", sa.Text, nullable=False),
-    sa.Column("request", JSONB, nullable=False),  # names as they were given: each run looks up the exact bundles
+    sa.Column("request", JSONB, nullable=False),  # names as given: each run resolves the exact bundles
     sa.Column("prompts_sha256", sa.Text),  # null = those of the evaluator's bundle
     sa.Column("paused", sa.Boolean, nullable=False, server_default=sa.false()),
-    sa.Column("next_at", Time, nullable=False),  # means nothing while paused
+    sa.Column("next_at", Time, nullable=False),  # without meaning while paused
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.ForeignKeyConstraint(
         ["tenant_id", "prompts_sha256"],
@@ -49,17 +49,17 @@ evaluation = sa.Table(
     sa.Column("id", Id, primary_key=True),
     sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
     sa.Column("schedule_id", Id, sa.ForeignKey("schedule.id", ondelete="SET NULL")),
-    sa.Column("due_at", Time),  # the time of its schedule that it stands for; null = somebody asked for it
+    sa.Column("due_at", Time),  # due time of its schedule; null = requested directly
     sa.Column("name", sa.Text),
     sa.Column("comment", sa.Text),
     sa.Column("request", JSONB, nullable=False),  # exact once it is generating
     sa.Column("prompts_sha256", sa.Text),  # known once it is generating
     sa.Column("state", sa.Text, nullable=False, server_default="planned"),
-    sa.Column("reason", sa.Text, nullable=False),  # why it came to this state
+    sa.Column("reason", sa.Text, nullable=False),  # reason of this state
     sa.Column("generate_job_id", Id, sa.ForeignKey("job.id", ondelete="SET NULL")),
     sa.Column("score_job_id", Id, sa.ForeignKey("job.id", ondelete="SET NULL")),
     sa.Column("summary", JSONB),
-    sa.Column("regressed", sa.Boolean),  # null = there was nothing to compare with
+    sa.Column("regressed", sa.Boolean),  # null = there was no baseline
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("started_at", Time),
     sa.Column("finished_at", Time),
@@ -81,7 +81,7 @@ evaluation = sa.Table(
     sa.Index("ix_evaluation_schedule_id_id", "schedule_id", "id"),
     sa.Index("ix_evaluation_schedule_created", "schedule_id", "created_at", "id"),
     sa.Index("ix_evaluation_open", "id", postgresql_where=sa.text("finished_at IS NULL")),
-    # What the next run is compared with: the last one of the same prompts.
+    # Baseline of the next run: the last one of the same prompts.
     sa.Index("ix_evaluation_done", "tenant_id", "prompts_sha256", "id", postgresql_where=sa.text("state = 'done'")),
     sa.Index("ix_evaluation_generate_job_id", "generate_job_id"),
     sa.Index("ix_evaluation_score_job_id", "score_job_id"),

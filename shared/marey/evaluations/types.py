@@ -16,15 +16,14 @@ from marey.jobs.types import Problem
 
 REPORT_FORMATS = ("html", "json", "md")
 TEST_SPLIT, COMPOSITIONAL = "test", "compositional"
-"""What an evaluator's bundle carries prompts of: clips that no model was trained on, and clips whose pairs of act and
-style none was."""
+"""Splits of an evaluator's bundle: clips outside all training data, and clips whose pairs of action and style are."""
 BUNDLE_SOURCES = (TEST_SPLIT, COMPOSITIONAL, f"{TEST_SPLIT}+{COMPOSITIONAL}")
-"""Sources of prompts that are not their owner's: one of the splits, or both, in this order."""
+"""Sources of prompts other than custom ones: one of the splits, or both, in this order."""
 MAX_MISSING = 0.01
-"""Share of motions that may be missing from a report: with more, its numbers are those of another set."""
+"""Maximum share of missing motions in a report: beyond it, the numbers describe another set."""
 
 Summary = Mapping[str, float | None]
-"""What was measured, by name; None = it could not be."""
+"""Measures by name; None = not measurable."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +31,14 @@ class EvaluationRequest:
     """Subject and parameters of an evaluation.
 
     Args:
-        bundle: the generator: an exact bundle; in a schedule whatever was given, as `hgm3-starter` or `hgm3`.
-        evaluator: the evaluator's bundle, likewise; None = the one that is here.
-        model: the model of the generator; None while its bundle was not looked up.
-        source: where the prompts are from: one of `BUNDLE_SOURCES`, or the name that their owner gave them.
-        settings: of sampling, the same for all motions.
+        bundle: the generator: an exact bundle; in a schedule the given name, such as `hgm3-starter` or `hgm3`.
+        evaluator: the evaluator's bundle, likewise; None = the only one here.
+        model: the model of the generator; None before its bundle is resolved.
+        source: source of the prompts: one of `BUNDLE_SOURCES`, or the name of a custom set.
+        settings: sampling settings, the same for all motions.
         repeats: motions of each prompt.
         seed: of the first motion; motion k, in input order and repeats within prompt, uses seed + k.
-        baseline: an evaluation to compare with, whatever came after it.
+        baseline: an evaluation to compare with, instead of the previous run.
     """
 
     bundle: str
@@ -78,12 +77,13 @@ class NewEvaluation:
     """An evaluation to plan.
 
     Args:
-        prompts: digest of stored prompts (`store_prompts`); None = those of the evaluator's bundle, not looked up yet.
-        due: the time of its schedule that it stands for.
-        reason: why it is there.
-        idempotency_key: makes a request once, however often it is sent.
+        prompts: digest of stored prompts (`store_prompts`); None = those of the evaluator's bundle, not resolved
+            yet.
+        due: due time of its schedule.
+        reason: why it was created.
+        idempotency_key: makes repeated requests create one evaluation.
         body_sha256: digest of the request; goes with `idempotency_key`.
-        id: what it is going to be called.
+        id: id to use.
     """
 
     tenant: str
@@ -181,11 +181,11 @@ class MadeItem:
     frames: int | None
     fps: float | None
     elapsed: float | None
-    """Seconds of work on it."""
+    """Seconds of computation."""
     licence: str | None
-    """Terms of the weights that made it."""
+    """Licence of the generating weights."""
     npz: AssetDigest | None
-    """Its motion; None where there is none."""
+    """The motion; None if there is none."""
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class ScoreRows:
     items: tuple[MadeItem, ...]
     """In input order, variants within prompt."""
     history: tuple[EarlierRun, ...]
-    """The last of the same model, the oldest first."""
+    """Last runs of the same model, oldest first."""
     baseline: EarlierRun | None
 
 
@@ -254,7 +254,7 @@ class ScheduleRow:
     prompt_count: int | None
     paused: bool
     next: datetime | None
-    """When it is due; None while it is paused."""
+    """Next due time; None while paused."""
     last: UUID | None
     """Its newest evaluation."""
     last_state: EvaluationState | None

@@ -1,6 +1,6 @@
 """The prompts of an evaluation: allowed values of a line of a file or body, and their only check.
 
-Standard library only: the small client reads files with it, the API bodies, and both say the same of the same line.
+Standard library only: the small client reads files with it, the API bodies, and both report the same problems.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from marey.items.item import CHECKS, Problem, checked, read_fields
 COLUMNS = ("prompt", "seconds", "expected")
 PromptCheck = Callable[[Mapping[str, Any], int | None], Iterable[Problem]]
 MIN_PROMPTS = 2
-"""What is measured over a set (how real it looks, how varied, which prompt fits which motion) has no value for one."""
+"""Minimum of prompts: metrics of a set (realism, diversity, retrieval) are undefined for one prompt."""
 MAX_PROMPTS = 10_000
 
 
@@ -42,10 +42,10 @@ def read_prompts(
     """Return all prompts, or raise one error with all problems.
 
     Args:
-        check: gives what else is wrong with the fields of a prompt that can be used.
+        check: yields other problems of a prompt's usable fields.
 
     Raises:
-        InvalidItems: at least one is wrong.
+        InvalidItems: at least one prompt is invalid.
         InvalidInput: fewer than `MIN_PROMPTS`.
         TooLarge: more than `MAX_PROMPTS`.
     """

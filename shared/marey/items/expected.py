@@ -1,7 +1,7 @@
 """Expected content of a motion, as a person writes it: `walk`, `wave left`, `walk straight then bow`.
 
-Acts stand in the order in which they must come, joined by `then`. Standard library only: the small client reads files
-of prompts with it, and so does the API. What it means for a motion is for whoever judges one.
+Actions are in the order in which they must occur, joined by `then`. Standard library only: the small client and the
+API read files of prompts with it. The evaluator defines what an action means for a motion.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from marey.core.errors import InvalidInput
 
 TURN = "turn"
 TRAVELS = ("walk", "run", "walk_back")
-"""Acts that may be asked to go `straight`."""
+"""Actions that may be `straight`."""
 SIDED: dict[str, tuple[str, ...]] = {
     TURN: ("left", "right"),
     "wave": ("left", "right", "both"),
     "raise": ("left", "right", "both"),
 }
-"""Acts that may name a side: the way a turn goes, the hand that waves or is raised."""
+"""Actions that may name a side: the direction of a turn, the hand that waves or is raised."""
 ACTS = (*TRAVELS, *SIDED, "bow", "kick", "punch", "slash", "dance")
 STRAIGHT = "straight"
 JOIN = "then"
@@ -38,7 +38,7 @@ def read_expected(text: str) -> tuple[ExpectedAct, ...]:
     """Parse the actions of a text such as `walk straight then wave left`.
 
     Raises:
-        InvalidInput: an unknown act, a word that does not belong to its act, or too many acts.
+        InvalidInput: an unknown action, a word that does not belong to its action, or too many actions.
     """
     parts: list[list[str]] = [[]]
     for word in text.lower().split():

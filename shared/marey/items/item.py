@@ -1,7 +1,7 @@
 """One line of input, and its only check.
 
-The command line (files, `generate`) and the API (JSON and NDJSON bodies) read items through here, so that a problem
-has the same words everywhere. Standard library only: the small client imports it.
+The command line (files, `generate`) and the API (JSON and NDJSON bodies) read items with this module, so that
+problems have the same words everywhere. Standard library only: the small client imports it.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ MAX_ITEMS = 100_000
 """Items (prompts times variants) of one job."""
 MAX_BODY_BYTES = 64 * 2**20
 MAX_PROBLEMS = 1000
-"""More than these are counted, not listed."""
+"""Problems beyond this number are counted, not listed."""
 MAX_UNKNOWN = 100
-"""Unknown fields of one item that are told one by one."""
+"""Unknown fields of one item that are reported one by one."""
 MAX_SEED = 2**31 - 1
 MAX_VARIANTS = 100
 MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
-"""What any model here may do; a bundle's own range, which is narrower, is checked where the bundle is known."""
+"""Range over all models; a bundle's own range, which is narrower, is checked once the bundle is known."""
 MAX_TAGS, MAX_TAG_LENGTH = 20, 64
 
 COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
 FIELDS = (*COLUMNS, "settings")
 OUTPUT_FPS = "fps"
-"""The one setting of an item that is not the network's: the frame rate of its files."""
+"""The only setting of an item that is not the network's: the frame rate of its files."""
 SETTINGS = {
     "steps": (1, 100),
     "guidance": (0.0, 100.0),
@@ -50,15 +50,15 @@ SETTINGS = {
     "residual_top_k": (0.001, 1.0),
     OUTPUT_FPS: (1.0, 240.0),
 }
-"""Settings of sampling, each with its range; which of them a model has, its bundle says. One with whole bounds is
-whole."""
+"""Sampling settings, each with its range; a bundle declares which ones it has. Settings with whole bounds are
+integers."""
 
 MAX_NAME = 100
 NAME = re.compile(rf"[^\W_][^/\\]{{0,{MAX_NAME - 1}}}")
-"""A name begins with a letter or digit of any script and holds no separators; characters that do not show are refused
-besides. The client derives the file name from it (`marey.client.names`)."""
+"""A name begins with a letter or digit of any script and holds no separators and no invisible characters. The client
+derives the file name from it (`marey.client.names`)."""
 RESERVED = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
-"""Names that Windows keeps for devices."""
+"""Reserved device names of Windows."""
 MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
 
 
@@ -146,8 +146,8 @@ def read_item(raw: object, line: int | None = None) -> tuple[Item | None, list[P
     """Return the item in `raw`, a JSON object, or all its problems.
 
     Args:
-        raw: what a JSON line or an element of `items` holds, or `Unreadable`.
-        line: where it stood, for the problems.
+        raw: value of a JSON line or an element of `items`, or `Unreadable`.
+        line: line number, for the problems.
     """
     values, problems = read_values(raw, line)
     return (None, problems) if problems else (Item(**values), [])
@@ -175,8 +175,8 @@ def read_fields(
 
     Args:
         raw: see `read_item`.
-        checks: of the known fields; each gives the value, or raises `InvalidInput`.
-        line: where it stood, for the problems.
+        checks: by known field; each returns the value, or raises `InvalidInput`.
+        line: line number, for the problems.
     """
     if isinstance(raw, Unreadable):
         return {}, [Problem(line, raw.field, raw.message)]
@@ -213,12 +213,12 @@ def read_items(
     """Yield items while they are read, as `checked` does.
 
     Args:
-        check: gives what else is wrong with the usable fields of an item; called where `names_model`.
+        check: yields other problems of an item's usable fields; called if `names_model`.
 
     Raises:
-        InvalidItems: at least one is wrong.
-        InvalidInput: there are none.
-        TooLarge: more than `MAX_ITEMS` with their variants.
+        InvalidItems: at least one item is invalid.
+        InvalidInput: there are no items.
+        TooLarge: more than `MAX_ITEMS`, counting variants.
     """
     count = 0
 
@@ -239,7 +239,7 @@ def check_count(count: int, line: int | None, where: str | None) -> None:
     """Validate the number of motions of a job; reading stops far above the limit.
 
     Raises:
-        TooLarge: it may not.
+        TooLarge: the number is over the limit.
     """
     if count > MAX_ITEMS:
         raise TooLarge(
@@ -259,8 +259,8 @@ def checked(
     valid only if no error follows.
 
     Raises:
-        InvalidItems: at least one is wrong.
-        InvalidInput: there are none.
+        InvalidItems: at least one item is invalid.
+        InvalidInput: there are no items.
     """
     problems: list[Problem] = []
     good = total = 0
@@ -407,4 +407,4 @@ CHECKS: dict[str, Callable[[object], object]] = {
     "tags": _tags,
     "settings": _settings,
 }
-"""How the value of each field is checked."""
+"""Check of each field's value."""

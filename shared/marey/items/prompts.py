@@ -12,21 +12,21 @@ MAX_WORDS = 200
 MAX_CHARACTERS = 2_000
 MAX_WORD_CHARACTERS = 100
 MIN_LATIN_SHARE = 0.5
-"""The encoders and the labeller read English: text mostly in another script would give an arbitrary motion."""
+"""Minimum share of Latin letters: encoders and labeller read English; other scripts would give an arbitrary motion."""
 
 
 def check_prompt(prompt: str, *, where: str | None = None, stored: bool = False) -> str:
     """Return the prompt as it is stored and parsed: Unicode NFC, runs of whitespace made one space, ends trimmed.
 
     Args:
-        prompt: what the user wrote.
+        prompt: the user's text.
         where: line or field, for the error (`line 7`, `items.3.prompt`).
-        stored: a server has accepted it, perhaps an earlier release, which let text direction controls pass.
+        stored: accepted earlier, perhaps by a release that allowed text direction controls.
 
     Raises:
         InvalidInput: empty, too long, with control characters, or without English words.
     """
-    if len(prompt) > MAX_CHARACTERS * 100:  # normalising megabytes first would be work for nothing
+    if len(prompt) > MAX_CHARACTERS * 100:  # avoid normalising megabytes that are refused anyway
         raise _too_long(f"{len(prompt):,} characters", where)
     check_text(prompt, allowed=STORED if stored else WHITESPACE, subject="the prompt", where=where)
     text = " ".join(unicodedata.normalize("NFC", prompt).split())

@@ -1,7 +1,7 @@
 """Jobs and their items: states, submission, claims, leases, results.
 
-Functions take a `sqlalchemy.Connection` inside a transaction and never commit; `marey.db.transaction(engine)` gives one
-and turns outages into `Unreachable`. Everything is synchronous: an event loop runs it in threads.
+Functions take a `sqlalchemy.Connection` inside a transaction and never commit; `marey.db.transaction(engine)` opens
+one and converts outages to `Unreachable`. Everything is synchronous: an event loop runs it in threads.
 
     engine = create_engine(url)
     with transaction(engine) as conn:

@@ -17,9 +17,9 @@ from marey.jobs.policy import Policy, policy
 from marey.jobs.states import ItemState, JobControl, Stage
 from marey.tenants.quotas import runnable_items
 
-LANES_TRIED = 8  # whoever finds eight lanes emptied by others asks again
+LANES_TRIED = 8  # lanes tried in a claim; a worker that finds all of them emptied by others claims again
 
-# Items being made, by tenant, and the jobs of those who may have more made.
+# Running items by tenant, and the jobs of tenants with capacity.
 SHARE = """
     share AS (
         SELECT tenant_id, sum(leased) AS running FROM job WHERE id IN (SELECT job_id FROM lease) GROUP BY tenant_id
@@ -31,8 +31,8 @@ SHARE = """
     )
 """
 
-# In order: tenant with the smallest share running, priority, age. The first lanes, and the first with the key that the
-# worker has loaded.
+# In order: tenant with the smallest share running, priority, age. The first lanes, and the first with the worker's
+# loaded batch key.
 LANES = sa.text(f"""
     WITH {SHARE}, ordered AS (
         SELECT lane.job_id, lane.batch_key,
@@ -52,7 +52,7 @@ LANES = sa.text(f"""
     ORDER BY place
 """)  # noqa: S608 - of constants alone
 
-# One statement, for each costs a round trip while the job is locked. Without an item that is free it writes nothing.
+# One statement, since each costs a round trip while the job is locked. Without a free item it writes nothing.
 TAKE = sa.text("""
     WITH picked AS MATERIALIZED (
         SELECT id FROM item
@@ -98,11 +98,11 @@ class _Lane:
     batch_key: str
     waited: float
     running: int
-    """Items of its tenant that are being made."""
+    """Running items of its tenant."""
     limited: bool
-    """Its tenant has a quota of running items."""
+    """True if its tenant has a quota of running items."""
     lonely: bool
-    """It has items that must run alone."""
+    """True if it has items that must run alone."""
 
 
 def claim(
@@ -117,9 +117,9 @@ def claim(
     """Claim up to `limit` ready items of one lane under a new lease; None when there is no work.
 
     The lane is that of the tenant with the smallest share running, then of the highest priority, then of the oldest
-    job. With `prefer_batch_key` (the bundle and settings a worker has loaded) such a lane goes first until the one that
-    is next in order has waited 30 s, or 5 s where that one is of a tenant that has less running. Nothing is taken of
-    tenants that are suspended, or beyond their quota of running items.
+    job. With `prefer_batch_key` (the bundle and settings a worker has loaded) such a lane goes first until the next
+    in order has waited 30 s, or 5 s if its tenant has less running. Nothing is claimed from suspended tenants, or
+    beyond a tenant's quota of running items.
     """
     rules = rules or policy()
     found = conn.execute(LANES, {"queue": queue, "tried": LANES_TRIED, "prefer": prefer_batch_key})
@@ -131,7 +131,7 @@ def claim(
             return taken
         if not locked:
             contended.append(lane)
-    for lane in contended:  # only lanes that others are changing right now: wait for them
+    for lane in contended:  # only lanes that other workers are changing right now: wait for them
         taken, _ = _try_lane(conn, lane, queue, worker, limit, rules, skip_locked=False)
         if taken is not None:
             return taken
@@ -149,7 +149,7 @@ def heartbeat(
     """Renew a lease and return the items that were cancelled or lost.
 
     Args:
-        open_items: the items of the claim that are not committed, failed or released yet.
+        open_items: items of the claim that are not committed, failed or released yet.
         progressed: the decode loop moved since the last heartbeat, or a bundle is being loaded or compiled. Without
             progress for 120 s the lease is not renewed.
     """
@@ -215,8 +215,8 @@ def _try_lane(
 ) -> tuple[Claim | None, bool]:
     """Return the items taken from a lane, and whether its job could be locked.
 
-    Where nothing was taken the job is free again: two workers that each kept one job and waited for the other's would
-    wait for ever.
+    If nothing was taken, the job is unlocked again: two workers that each held one job and waited for the other's
+    would deadlock.
     """
     savepoint = conn.begin_nested()
     job = lock_job(conn, lane.job, skip_locked=skip_locked)

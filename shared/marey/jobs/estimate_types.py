@@ -15,9 +15,9 @@ class Speed:
 
     bundle: str
     motions: int
-    """How many it was measured on."""
+    """Number of measured motions."""
     seconds: float
-    """Of a worker, for one motion; reading the prompt and writing the files go on beside it."""
+    """Seconds of a worker per motion; parsing and writing files run in parallel."""
     since: datetime
     until: datetime
 
@@ -28,12 +28,12 @@ class Estimate:
 
     items: int
     seconds: float | None
-    """None = some of their bundles were not measured."""
+    """None = some of the bundles were not measured."""
     workers: Mapping[str, int]
-    """Those that live, by model; where none does, one is reckoned with."""
+    """Live workers, by model; at least one is assumed."""
     speeds: tuple[Speed, ...]
     unmeasured: tuple[str, ...]
-    """Bundles with which none of the last motions was made."""
+    """Bundles without a recent motion."""
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class QueuePlace:
 
     state: JobState
     jobs_ahead: int
-    """Of the same tenant, with waiting items."""
+    """Jobs of the same tenant, with waiting items."""
     items_ahead: int
     tenants: int
-    """With waiting items in the same queues, this one too: they take turns."""
+    """Tenants with waiting items in the same queues, including this one: they take turns."""
     seconds: float | None
-    """Until it is done; None = it has ended or is held, or nothing like it was measured."""
+    """Seconds until it is done; None = it has ended or is paused, or its bundles were not measured."""
     estimate: Estimate
-    """Of its own open items."""
+    """Estimate for its own open items."""

@@ -15,7 +15,7 @@ from marey.jobs.types import TEXT_QUEUE
 from marey.jobs.workers import live_workers
 
 MEASURED = 2000
-"""The last motions that were made, whoever's: a bundle that is not among them has no measure."""
+"""Number of recent motions, of all tenants, that are measured."""
 
 SPEEDS = sa.text("""
     WITH recent AS (SELECT item_id, elapsed, created_at FROM motion ORDER BY id DESC LIMIT :measured)
@@ -26,7 +26,7 @@ SPEEDS = sa.text("""
     GROUP BY item.bundle ORDER BY item.bundle
 """)
 
-# In the order of a claim, with equal shares: within the tenant priority, then age; other tenants take turns with it.
+# In claim order, with equal shares: within the tenant priority, then age; other tenants take turns with it.
 AHEAD = sa.text("""
     WITH ours AS (SELECT id, tenant_id, priority, created_at FROM job WHERE id = :job),
     waiting AS (
@@ -52,14 +52,14 @@ def estimate(conn: sa.Connection, items: Mapping[tuple[str, str], int], *, tenan
 
     Args:
         items: motions by model and exact bundle.
-        tenants: how many share the workers.
+        tenants: number of tenants that share the workers.
     """
     measured = {speed.bundle: speed for speed in _speeds(conn, [bundle for _, bundle in items])}
     workers = live_workers(conn)
     unmeasured = tuple(sorted(bundle for _, bundle in items if bundle not in measured))
     seconds = None
     if not unmeasured:
-        # Queues have workers of their own, and go on side by side.
+        # Queues have workers of their own, and run in parallel.
         by_queue = {
             queue: sum(count * measured[b].seconds for (q, b), count in items.items() if q == queue)
             / max(workers.get(queue, 0), 1)
@@ -88,14 +88,14 @@ def place_of(conn: sa.Connection, tenant: str, job: UUID) -> QueuePlace:
         .where(item.job_id == job, item.state.in_(sorted(OPEN)))
         .group_by(item.model, item.bundle)
     ).all()
-    queues = [TEXT_QUEUE, *{each.model for each in left}]  # what is read now is made later
+    queues = [TEXT_QUEUE, *{each.model for each in left}]  # items in the text stage are generated later
     ahead = conn.execute(AHEAD, {"job": job, "queues": queues}).one()
     tenants = 1 + int(ahead.tenants)
     own = estimate(conn, {(each.model, each.bundle): each.items for each in left}, tenants=tenants)
     held = row.state in ENDED or row.control is not JobControl.RUN
     seconds = None
     if own.seconds is not None and not held:
-        # What is before it is taken to be as long as its own motions.
+        # Items ahead are assumed to take as long as its own motions.
         seconds = own.seconds * (1 + int(ahead.items) / max(own.items, 1))
     return QueuePlace(
         state=row.state,

@@ -8,7 +8,7 @@ from datetime import datetime
 import sqlalchemy as sa
 
 # A lane is a counter row; the age of its oldest item is one probe of `ix_item_ready`, in input order: re-rolls come
-# last. What waits for another try (`run_after`) is in no lane.
+# last. Items that wait for a retry (`run_after`) are in no lane.
 QUEUES = sa.text("""
     WITH waiting AS (
         SELECT lane.queue, job.tenant_id, sum(lane.ready + lane.solo)::bigint AS items,
@@ -53,13 +53,13 @@ class QueueDepth:
     queue: str
     tenant: str
     waiting: int
-    """Ready items of jobs that run."""
+    """Ready items of running jobs."""
     running: int
     """Items under a lease."""
     oldest: float
-    """Since the oldest of the ready ones was submitted; a retry does not begin anew."""
+    """Seconds since the oldest ready item was submitted; a retry does not restart the clock."""
     unserved: float
-    """Since any of the ready ones' kind was last claimed, at most."""
+    """Maximum seconds since the last claim from a lane with ready items."""
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,9 @@ def files_of(
 
     Args:
         owner: the column that names the owner, in a table with `format` and `asset_id`.
-        owners: whose files.
-        kind: makes one of format, sha256, size and media type.
-        where: which files.
+        owners: ids of the owners.
+        kind: constructor of a file from format, sha256, size and media type.
+        where: condition on the files.
     """
     file, asset = owner.table.c, tables.asset.c
     query = (

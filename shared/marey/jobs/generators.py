@@ -24,7 +24,7 @@ class GeneratorCapabilities:
 
     bundle: Bundle
     text: TextSpec
-    """With every hash filled in."""
+    """Text specification with all hashes."""
     min_seconds: float
     max_seconds: float
 
@@ -43,7 +43,7 @@ class GeneratorList:
 
     found: tuple[GeneratorCapabilities, ...]
     broken: tuple[BrokenBundle, ...]
-    """Bundles that are here and cannot be used; of any kind, since a broken manifest does not tell its kind."""
+    """Broken bundles of any kind, since a broken manifest does not reveal its kind."""
 
 
 def offers(config: Settings) -> GeneratorList:
@@ -64,8 +64,8 @@ def capabilities_of(bundle: Bundle, config: Settings) -> GeneratorCapabilities:
     """Return the capabilities of a generator bundle.
 
     Raises:
-        InvalidBundle: it is no generator, or its manifest does not say what it makes.
-        NotFound: what reads its prompts is not here.
+        InvalidBundle: not a generator, or its manifest lacks fps or limits.
+        NotFound: its text encoder or labeller is missing.
     """
     manifest = bundle.manifest
     if manifest.kind != "generator" or manifest.text is None or not manifest.fps:

@@ -23,13 +23,13 @@ def take_key(
     """Register a key for a new object, or return the object that has it. Waits for a concurrent request with the key.
 
     Args:
-        key: None = none was sent.
+        key: None = the request has none.
         body_sha256: digest of the request; digests of different kinds of requests differ.
-        owner: what is made.
-        identifier: its id; the row has to be there when the transaction commits.
+        owner: kind of the new object.
+        identifier: its id; its row has to exist when the transaction commits.
 
     Returns:
-        the id of what an earlier request with this key made; None = go on.
+        the id of the object of an earlier request with this key; None = proceed.
 
     Raises:
         InvalidInput: a key without digest.

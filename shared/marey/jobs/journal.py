@@ -39,7 +39,7 @@ class LockedJob:
     dead: int
     cancelled: int
     erased: bool = False
-    """Its prompts are gone: nothing of it can be made again."""
+    """True if its prompts were erased: its items cannot be made again."""
     traceparent: str | None = None
 
     @property
@@ -88,7 +88,7 @@ def lock_job(
     ).where(table.id == job)
     if tenant is not None:
         query = query.where(table.tenant_id == tenant)
-    # NO KEY: rows that refer to the job may be inserted by others meanwhile.
+    # NO KEY: rows that refer to the job may be inserted meanwhile.
     row = conn.execute(query.with_for_update(key_share=True, skip_locked=skip_locked)).mappings().one_or_none()
     if row is None:
         return None
@@ -126,8 +126,8 @@ def record(
     """Write changes of a locked job: counters, control, times, numbered events, notification, and webhook events.
 
     Args:
-        moved: how many items went from one state to another.
-        added: how many were added, ready.
+        moved: number of items by transition.
+        added: number of new ready items.
         events: in order. When the job's state changes an event `state` follows them.
     """
     grown = replace(job, control=control or job.control, total=job.total + added, ready=job.ready + added)
@@ -151,7 +151,7 @@ def record(
         .returning(table.c.event_seq)
     ).scalar_one()
     if ended:
-        conn.execute(sa.delete(tables.lane).where(tables.lane.c.job_id == job.id))  # all empty; a retry makes them anew
+        conn.execute(sa.delete(tables.lane).where(tables.lane.c.job_id == job.id))  # a retry creates them again
     if events:
         _write_events(conn, after, events, first=last - len(events) + 1)
     enqueue_job_event(conn, job.tenant, job.id, job.state, after.state, after.counters())

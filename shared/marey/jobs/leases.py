@@ -43,10 +43,11 @@ class Claim:
     batch_key: str
     bundle: str
     solo: bool
-    """The single item of this claim was in a batch whose lease was lost; losing this one costs it an attempt."""
+    """True if the single item of this claim was in a batch whose lease was lost; losing this one costs it an
+    attempt."""
     items: tuple[ClaimedItem, ...]
     traceparent: str | None = None
-    """Of the request that submitted the job."""
+    """`traceparent` of the submitting request."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,9 @@ class HeartbeatReply:
     """The database's answer to a worker's heartbeat."""
 
     lost: bool
-    """The lease is gone (expired and swept, or all its items taken away): stop, throw the batch away."""
+    """The lease is gone (expired and swept, or all its items cancelled): stop, and discard the batch."""
     gone: frozenset[UUID]
-    """Items, of those asked about, that the lease no longer holds: cancelled. Drop their rows."""
+    """Requested items that are no longer under the lease: cancelled. Drop their rows."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class WorkerHeartbeat:
     pid: int
     device: str
     bundle: str | None = None
-    """Bundle it has loaded."""
+    """Loaded bundle."""
     batch_key: str | None = None
 
 
@@ -93,8 +94,9 @@ class SchedulerRow:
     """A known scheduler.
 
     Attributes:
-        seen: when it last made progress in all its parts; `silence`: seconds since then, by the database's clock.
-        live: that was a moment ago.
+        seen: time of the last progress of all its components; `silence`: seconds since then, by the database's
+            clock.
+        live: True if that was recently.
     """
 
     id: str
@@ -124,9 +126,9 @@ class NewMotion:
     frames: int
     fps: float
     licence: str
-    """SPDX name or short text of the terms of the weights."""
+    """SPDX name or short text of the licence of the weights."""
     elapsed: float
-    """Seconds of work on it."""
+    """Seconds of computation."""
     metadata: JsonObject = field(default_factory=dict[str, object])
 
 
@@ -153,11 +155,11 @@ class Committed:
     """Result of a write under a lease."""
 
     items: tuple[UUID, ...]
-    """Written now."""
+    """Written by this call."""
     lost: tuple[UUID, ...]
-    """Not ours any more (lease lost, cancelled, or committed before): the result is thrown away."""
+    """No longer under the lease (lost, cancelled, or committed before): the results are discarded."""
     states: Mapping[UUID, ItemState] = field(default_factory=dict[UUID, ItemState])
-    """Of items that could not be made: `failed`, `dead`, or `ready` for another try."""
+    """New state of failed items: `failed`, `dead`, or `ready` for a retry."""
 
 
 @dataclass(frozen=True)
@@ -170,4 +172,4 @@ class SweepReport:
     items_due: int = 0
     """Items whose `run_after` has passed."""
     stale_assets: int = 0
-    """Assets still `writing` an hour after their lease went; `collect_garbage` removes them."""
+    """Assets still `writing` an hour after their lease ended; `collect_garbage` removes them."""

@@ -59,7 +59,7 @@ def list_items(
 
     Args:
         states: only items in one of these.
-        reviews: only items with a motion of which one of these was said.
+        reviews: only items with a motion in one of these review states.
 
     Raises:
         NotFound: the tenant has no such job.

@@ -100,7 +100,7 @@ def retry(
         .returning(table.c.queue, table.c.batch_key)
     ).all()
     change_lanes(conn, job, returned((row.queue, row.batch_key, False) for row in rows))
-    # What was cancelled or had ended goes on now; a pause of what is still open holds.
+    # Cancelled or ended jobs continue; the pause of a job with open items stays.
     control = JobControl.RUN if locked.state in ENDED else None
     record(conn, locked, [NewEvent("retried", reason, data={"items": len(rows)})], moved=moved, control=control)
     return get_job(conn, tenant, job)
@@ -128,7 +128,7 @@ def set_fail_early(
 
     Raises:
         NotFound: the tenant has no such job.
-        InvalidInput: no share between 0 and 1.
+        InvalidInput: not between 0 and 1.
     """
     check_share(share)
     locked = replace(lock_job_of(conn, tenant, job), fail_early=share)

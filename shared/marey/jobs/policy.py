@@ -17,18 +17,18 @@ class Policy:
     """A lease without progress for this long is not renewed."""
     max_attempts: int = 3
     patience: float = 30.0
-    """A worker keeps to its loaded bundle until the lane that is next in order has waited this long."""
+    """Seconds for which a worker keeps its loaded bundle before it takes the next lane in order."""
     tenant_patience: float = 5.0
-    """The same where that lane is of a tenant that has less running: a load of a bundle is no reason to wait longer."""
+    """The same if that lane is of a tenant with less running: loading a bundle does not justify a longer wait."""
     backoff: float = 5.0
     """Delay after the first retryable error; doubles each attempt, up to `backoff_limit`."""
     backoff_limit: float = 300.0
     worker_live: float = 10.0
-    """A worker counts as live this long after it was last seen."""
+    """Seconds after its last heartbeat for which a worker counts as live."""
     worker_kept: float = 86_400.0
     idempotency: float = 86_400.0
     asset_grace: float = 3_600.0
-    """Assets still `writing` are stale this long after their lease went."""
+    """Seconds after the end of their lease when assets still `writing` are stale."""
     audit_kept: float = 400 * 86_400.0
 
 

@@ -21,13 +21,13 @@ from marey.jobs.operate import cancel_if_failing
 from marey.jobs.policy import Policy, policy
 from marey.jobs.states import Cause, ItemState, Stage
 
-# The lease stays until the announcement stands; heartbeats may go on.
+# The lease stays until the announcement is committed; heartbeats may continue.
 HOLD_LEASE = sa.text("""
     SELECT job.tenant_id FROM lease JOIN job ON job.id = lease.job_id WHERE lease.token = :token FOR KEY SHARE OF lease
 """)
 
-# The rows of a batch travel as one JSON array: a statement that is compiled and prepared once, however many rows it
-# writes. VALUES lists and a statement a row were half of the CPU time that a worker needs to commit an item.
+# The rows of a batch travel as one JSON array: one statement, compiled and prepared once, for any number of rows.
+# VALUES lists and one statement per row took half of the CPU time of a commit.
 
 # In order of content, so that two announcements never wait for each other.
 ANNOUNCE = sa.text("""
@@ -42,8 +42,8 @@ ANNOUNCE = sa.text("""
     INSERT INTO asset_writer (asset_id, lease_token) SELECT id, :token FROM announced ON CONFLICT DO NOTHING
 """)
 
-# All that finished items write. Assets are locked in the order in which they were announced; those that are missing are
-# missing from the answer.
+# Everything that finished items write. Assets are locked in the order of their announcement; missing ones are missing
+# from the answer.
 FINISH = sa.text("""
     WITH ours AS MATERIALIZED (
         SELECT id, sha256, state FROM asset
@@ -73,10 +73,10 @@ FINISH = sa.text("""
 def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetDigest]) -> bool:
     """Announce assets before their upload (rows `writing`), in a transaction of its own.
 
-    Content that is there already is announced again: the garbage collector leaves it alone while this lease lives.
+    Existing content is announced again: the garbage collector keeps it while this lease lives.
 
     Returns:
-        False when the lease is gone: put nothing.
+        False if the lease is gone: upload nothing.
     """
     tenant = conn.execute(HOLD_LEASE, {"token": lease_token}).scalar_one_or_none()
     if tenant is None:
@@ -93,7 +93,7 @@ def begin_assets(conn: sa.Connection, lease_token: UUID, assets: Sequence[AssetD
 def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[NewMotion]) -> Committed:
     """Finish items: assets, motions, counters and one progress event in this transaction.
 
-    The files must lie in the asset store and have been announced by `begin_assets`.
+    The files must be in the asset store and have been announced by `begin_assets`.
     """
     leased = lock_lease(conn, lease_token, [motion.item for motion in motions])
     if leased is None:
@@ -110,7 +110,7 @@ def commit_motions(conn: sa.Connection, lease_token: UUID, motions: Sequence[New
 def commit_texts(conn: sa.Connection, lease_token: UUID, texts: Sequence[NewText]) -> Committed:
     """Store text features and move their items to the stage `generate`.
 
-    Ready items of the same job with the same key go with them.
+    Ready items of the same job with the same key move with them.
     """
     leased = lock_lease(conn, lease_token, [text.item for text in texts])
     if leased is None:
@@ -165,7 +165,7 @@ def release(conn: sa.Connection, lease_token: UUID, reason: str, items: Sequence
     return leased.committed(list(leased.items) if items is None else items)
 
 
-# --- what the sweeper uses too ---
+# --- shared with evaluations ---
 
 
 def store_assets(conn: sa.Connection, job: LockedJob, digests: Collection[str]) -> dict[str, UUID]:
@@ -253,7 +253,7 @@ def _leave_text_stage(conn: sa.Connection, job: LockedJob, items: Sequence[UUID]
             state=ItemState.READY,
             lease_token=None,
             run_after=None,
-            solo=False,  # a new stage, other code: it starts with a clean sheet
+            solo=False,  # a new stage starts with fresh attempts
             attempts=0,
             reason=str(Cause.TEXT_READY),
         )

@@ -1,7 +1,7 @@
 """States of items and jobs, and the table of allowed transitions.
 
-The database holds the same table in the trigger `item_transition` (a test walks every pair against it), and computes
-a job's state from its counters as a generated column with the rule of `job_state`.
+The trigger `item_transition` has the same table (a test compares every pair), and a generated column computes a
+job's state from its counters with the rule of `job_state`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class ItemState(StrEnum):
     LEASED = "leased"
     SUCCEEDED = "succeeded"
     FAILED = "failed"
-    """The handler said the item cannot work, however often it is tried."""
+    """The handler reported that the item cannot work, however often it is retried."""
     DEAD = "dead"
     """The item used up its attempts (retryable errors, or leases lost while it ran alone)."""
     CANCELLED = "cancelled"
@@ -78,16 +78,16 @@ TRANSITIONS: dict[tuple[ItemState, ItemState], frozenset[Cause]] = {
     (ItemState.DEAD, ItemState.READY): frozenset({Cause.OPERATOR}),
     (ItemState.CANCELLED, ItemState.READY): frozenset({Cause.OPERATOR}),
 }
-"""Allowed transitions and what may cause each."""
+"""Allowed transitions and their causes."""
 
 OPEN = frozenset({ItemState.READY, ItemState.LEASED})
-"""States of items that still have work ahead."""
+"""States of open items."""
 
 RETRYABLE = frozenset({ItemState.FAILED, ItemState.DEAD, ItemState.CANCELLED})
-"""States an operator may send back to `READY`."""
+"""States from which an operator may retry."""
 
 ENDED = frozenset({JobState.SUCCEEDED, JobState.PARTIAL, JobState.FAILED, JobState.CANCELLED})
-"""States of jobs without open items."""
+"""States of ended jobs."""
 
 
 def allowed(before: ItemState, after: ItemState) -> bool:
@@ -101,7 +101,7 @@ class Review(StrEnum):
     KEPT = "kept"
     REJECTED = "rejected"
     REROLLED = "rerolled"
-    """Another take was asked for in its place."""
+    """A re-roll was requested."""
 
 
 class Counters(Protocol):

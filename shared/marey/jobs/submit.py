@@ -32,10 +32,10 @@ from marey.jobs.types import (
 )
 from marey.tenants.quotas import check_queue, reserve_quotas
 
-CHUNK = 2000  # items held in memory at a time, and keys of one look-up
+CHUNK = 2000  # items per COPY chunk, and keys per look-up
 
 TEXTS_LOCK = 0x6D617265
-"""Advisory lock: shared by those who count on text features that they saw, exclusive to who forgets some."""
+"""Advisory lock: shared by transactions that rely on existing text features, exclusive for those that delete some."""
 
 COLUMNS = (
     *("id", "job_id", "position", "index", "variant", "name", "prompt", "model", "bundle", "seed", "seconds"),
@@ -47,12 +47,12 @@ COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Id
 def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     """Write a job and its items; the relay is notified when the transaction commits.
 
-    Items whose text features are in the database already skip the text stage. With an idempotency key, a second submit
-    of the same body within 24 hours answers the first one's job, `replayed`.
+    Items with known text features skip the text stage. With an idempotency key, a second submit of the same body
+    within 24 hours returns the first one's job, `replayed`.
 
     Raises:
         InvalidInput: no items, or a value out of its range; nothing is written (roll the transaction back).
-        QuotaUsedUp: the tenant's quotas have no room for it; likewise.
+        QuotaUsedUp: the tenant's quotas do not allow it; nothing is written.
         IdempotencyMismatch: the key was used with another body.
     """
     if not -PRIORITY_LIMIT <= job.priority <= PRIORITY_LIMIT:
@@ -85,7 +85,7 @@ def submit(conn: sa.Connection, job: NewJob) -> SubmittedJob:
     if total == 0:
         raise InvalidInput("there is nothing to submit", where="items")
     if job.metered:
-        reserve_quotas(conn, job.tenant, total)  # last: others of the tenant wait from here to the commit
+        reserve_quotas(conn, job.tenant, total)  # last: other transactions of the tenant wait from here to the commit
     _begin(conn, identifier, total)
     change_lanes(conn, identifier, {lane: LaneChange(ready=count) for lane, count in lanes.items()})
     return SubmittedJob(identifier, replayed=False, items=total)
@@ -159,7 +159,7 @@ def check_share(share: float | None) -> None:
     """Validate a failure ratio for `fail_early`; None = off.
 
     Raises:
-        InvalidInput: it is not between 0 and 1.
+        InvalidInput: not between 0 and 1.
     """
     if share is not None and not 0 <= share <= 1:
         raise InvalidInput(f"{share} is not a share between 0 and 1", where="fail_early", hint="0.1 is one in ten.")

@@ -26,8 +26,8 @@ def sweep(engine: sa.Engine, *, rules: Policy | None = None) -> SweepReport:
     """Reclaim expired leases, make due items ready, and delete old idempotency rows, workers, webhook events and audit
     rows.
 
-    An item of a lost lease is marked `solo`: it is claimed alone next time, and only the loss of a lease it was alone
-    in (as such) counts as an attempt. Safe to run in several processes at once; each job is a transaction of its own.
+    An item of a lost lease is marked `solo`: it is claimed alone next time, and only the loss of a lease it was
+    alone in counts as an attempt. Safe to run in several processes; each job is a transaction of its own.
 
     Raises:
         Unreachable: the database does not answer.
@@ -68,7 +68,7 @@ def _take_back(conn: sa.Connection, job_id: UUID, rules: Policy) -> SweepReport:
     if job is None:
         return report
     lease = tables.lease.c
-    expired = conn.execute(  # looked at again under lock: a heartbeat may have come in between
+    expired = conn.execute(  # checked again under lock: a heartbeat may have arrived in between
         sa.select(lease.token, lease.worker, lease.solo)
         .where(lease.job_id == job_id, lease.expires_at < CLOCK)
         .order_by(lease.token)

@@ -1,12 +1,12 @@
 """Tables of jobs, items and leases, and of the motions and files that items become.
 
-The rows of `job` and `lane` change with every claim and commit. No index names what changes in them, and their pages
-are half empty, so that Postgres cleans up behind each update by itself (heap-only tuples) and a claim costs the same
-after thousands of others. Lanes of jobs that have ended are deleted.
+The rows of `job` and `lane` change with every claim and commit. No index covers the changing columns, and pages are
+half empty, so that Postgres cleans up within the page (heap-only tuples) and a claim costs the same after thousands
+of others. Lanes of jobs that have ended are deleted.
 
-Lock order, so that nothing deadlocks: schedule row, evaluation row, job row, lease row, item rows, lane rows, asset
-rows, tenant row. Who holds a job's lock may change everything about that job; the heartbeat takes a lease row alone.
-Under the tenant's lock claims and submits count what there is of a quota, one after the other.
+Lock order, to prevent deadlocks: schedule row, evaluation row, job row, lease row, item rows, lane rows, asset rows,
+tenant row. The holder of a job's lock may change everything of that job; the heartbeat takes a lease row alone.
+Claims and submits count quotas under the tenant's lock, one after the other.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ job = sa.Table(
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("started_at", Time),
     sa.Column("finished_at", Time),
-    sa.Column("keep_days", sa.Integer),  # deleted this long after it ended; null = by hand alone
-    sa.Column("erased_at", Time),  # its prompts are gone
-    sa.Column("traceparent", sa.Text),  # of the request that submitted it: what is done for it goes on from there
+    sa.Column("keep_days", sa.Integer),  # deleted this long after it ended; null = only by hand
+    sa.Column("erased_at", Time),  # its prompts were erased
+    sa.Column("traceparent", sa.Text),  # `traceparent` of the submitting request
     sa.CheckConstraint(one_of("control", list(JobControl)), name="control"),
     sa.CheckConstraint("priority BETWEEN -1000 AND 1000", name="priority"),
     sa.CheckConstraint("fail_early BETWEEN 0 AND 1", name="fail_early"),
@@ -68,7 +68,7 @@ job = sa.Table(
     sa.Index("ix_job_short_id", "tenant_id", short_id()),
     sa.Index("ix_job_name", "tenant_id", "name", postgresql_where=sa.text("name IS NOT NULL")),
     sa.Index("ix_job_keep_days", "id", postgresql_where=sa.text("keep_days IS NOT NULL")),
-    # For counting what a tenant has in the queue. Its predicate changes once in a job's life.
+    # For counting a tenant's queued items. Its predicate changes once in a job's life.
     sa.Index("ix_job_open", "tenant_id", postgresql_where=sa.text("finished_at IS NULL")),
     postgresql_with={"fillfactor": 50},
 )
@@ -98,12 +98,12 @@ item = sa.Table(
     sa.Column("reason", sa.Text),
     sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),
     sa.Column("solo", sa.Boolean, nullable=False, server_default=sa.false()),
-    sa.Column("run_after", Time),  # set = not in its lane; the sweeper puts it back
+    sa.Column("run_after", Time),  # set = not in its lane; the sweeper returns it
     sa.Column("lease_token", Id, sa.ForeignKey("lease.token")),
     sa.Column("problem", JSONB),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("finished_at", Time),
-    # The motion that this item is another take of.
+    # Replaced motion of a re-roll.
     sa.Column("replaces", Id, sa.ForeignKey("motion.id", ondelete="SET NULL", use_alter=True)),
     sa.CheckConstraint(one_of("state", list(ItemState)), name="state"),
     sa.CheckConstraint(one_of("stage", list(Stage)), name="stage"),
@@ -113,7 +113,7 @@ item = sa.Table(
     sa.CheckConstraint("state <> 'succeeded' OR stage = 'generate'", name="succeeded"),
     sa.CheckConstraint("seed >= 0", name="seed"),
     sa.UniqueConstraint("job_id", "position"),
-    # The claim's order: within a lane by position, those that must run alone apart.
+    # Claim order: within a lane by position, solo items separate.
     sa.Index(
         "ix_item_ready",
         *("job_id", "queue", "batch_key", "solo", "position"),
@@ -123,7 +123,7 @@ item = sa.Table(
     sa.Index("ix_item_lease_token", "lease_token", postgresql_where=sa.text("lease_token IS NOT NULL")),
     sa.Index("ix_item_text_key", "job_id", "text_key", postgresql_where=sa.text("state = 'ready' AND stage = 'text'")),
     sa.Index("ix_item_replaces", "replaces", unique=True, postgresql_where=sa.text("replaces IS NOT NULL")),
-    # What motions are searched by. Items that succeeded alone are in them: a submit pays nothing.
+    # Search columns of succeeded items only: a submit has no overhead.
     sa.Index(
         "ix_item_tags",
         "tags",
@@ -150,9 +150,9 @@ lane = sa.Table(
     sa.Column("job_id", Id, sa.ForeignKey("job.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("queue", sa.Text, primary_key=True),
     sa.Column("batch_key", sa.Text, primary_key=True),
-    sa.Column("ready", sa.Integer, nullable=False),  # claimable now, in company
-    sa.Column("solo", sa.Integer, nullable=False),  # claimable now, alone
-    sa.Column("waiting_since", Time, nullable=False, server_default=NOW),  # last claim, or when it stopped being empty
+    sa.Column("ready", sa.Integer, nullable=False),  # claimable now, in batches
+    sa.Column("solo", sa.Integer, nullable=False),  # claimable now, one at a time
+    sa.Column("waiting_since", Time, nullable=False, server_default=NOW),  # last claim, or when it was last empty
     sa.CheckConstraint("ready >= 0 AND solo >= 0", name="counters"),
     sa.Index("ix_lane_queue", "queue"),
     postgresql_with={"fillfactor": 50},
@@ -213,7 +213,7 @@ idempotency = sa.Table(
     sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), primary_key=True),
     sa.Column("key", sa.Text, primary_key=True),
     sa.Column("body_sha256", sa.Text, nullable=False),
-    # Checked at commit: the key is taken first, so that a second submit waits for the first and writes nothing.
+    # Checked at commit: the key is inserted first, so that a second submit waits for the first and writes nothing.
     sa.Column(
         "job_id",
         Id,
@@ -241,7 +241,7 @@ asset = sa.Table(
     sa.Column("media_type", sa.Text, nullable=False),
     sa.Column("state", sa.Text, nullable=False),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
-    sa.Column("announced_at", Time, nullable=False),  # when somebody last said they would PUT it
+    sa.Column("announced_at", Time, nullable=False),  # time of the last announced upload
     sa.UniqueConstraint("tenant_id", "sha256"),
     sa.CheckConstraint("state IN ('writing', 'stored')", name="state"),
     sa.CheckConstraint("sha256 ~ '^[0-9a-f]{64}$'", name="sha256"),
@@ -249,7 +249,7 @@ asset = sa.Table(
     sa.Index("ix_asset_stored", "tenant_id", postgresql_include=["size"], postgresql_where=sa.text("state = 'stored'")),
 )
 
-# Who is writing what: two leases may produce the same content at once, and each keeps it from the collector.
+# Leases that are writing an asset: two may produce the same content at once, and each protects it from the collector.
 asset_writer = sa.Table(
     "asset_writer",
     metadata,
@@ -271,9 +271,9 @@ motion = sa.Table(
     sa.Column("elapsed", sa.Double, nullable=False),
     sa.Column("metadata", JSONB, nullable=False),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
-    sa.Column("review", sa.Text),  # null = nobody looked at it yet
+    sa.Column("review", sa.Text),  # null = not reviewed
     sa.Column("reviewed_at", Time),
-    sa.Column("reviewed_by", sa.Text),  # the name of an API key
+    sa.Column("reviewed_by", sa.Text),  # name of an API key
     sa.Column("review_comment", sa.Text),
     sa.CheckConstraint(one_of("review", list(Review)), name="review"),
     sa.CheckConstraint("num_nulls(review, reviewed_at, reviewed_by) IN (0, 3)", name="reviewed"),
@@ -283,10 +283,10 @@ motion = sa.Table(
     sa.Index("ix_motion_review", "tenant_id", "review", "id", postgresql_where=sa.text("review IS NOT NULL")),
 )
 
-# What motions are listed and searched by, narrow and with indexes of its own. Triggers keep it (migration 0014), so
-# that the writes of every release reach it. No foreign key: a trigger removes rows, many at a time.
-# `terms` are the words of the prompt and, behind chr(1), everything else that a filter names: `t` tenant, `j` job, `x`
-# index of the prompt, `n` name in lower case, `g` tag, `r` review. One index intersects them all.
+# Search and listing columns of motions, narrow and with indexes of their own. Triggers maintain them (migration 0014),
+# so that writes of every release are covered. No foreign key: a trigger removes rows, many at a time. `terms` are the
+# words of the prompt and, behind chr(1), all other filter values: `t` tenant, `j` job, `x` index of the prompt, `n`
+# name in lower case, `g` tag, `r` review. One index intersects them all.
 motion_search = sa.Table(
     "motion_search",
     metadata,
@@ -297,7 +297,7 @@ motion_search = sa.Table(
     sa.Column("terms", TSVECTOR, nullable=False),
     sa.Index("ix_motion_search_created", "tenant_id", "created_at", "motion_id"),
     sa.Index("ix_motion_search_job", "job_id", "created_at", "motion_id"),
-    # A search reads what is pending through to its end.
+    # A search reads the whole pending list.
     sa.Index(
         "ix_motion_search_terms", "terms", postgresql_using="gin", postgresql_with={"gin_pending_list_limit": 512}
     ),
@@ -310,7 +310,7 @@ motion_file = sa.Table(
     sa.Column("motion_id", Id, sa.ForeignKey("motion.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("format", sa.Text, primary_key=True),
     sa.Column("asset_id", Id, sa.ForeignKey("asset.id"), nullable=False),
-    # It holds an erased prompt and waits to be written anew: nobody gets it any more.
+    # The file holds an erased prompt and waits to be rewritten; it is not served.
     sa.Column("erasing", sa.Boolean, nullable=False, server_default=sa.false()),
     sa.Index("ix_motion_file_asset_id", "asset_id"),
     sa.Index("ix_motion_file_erasing", "motion_id", postgresql_where=sa.text("erasing")),

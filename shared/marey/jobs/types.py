@@ -16,7 +16,7 @@ TEXT_QUEUE = "text"
 EVALUATOR_QUEUE = "evaluator"
 """The queue of score items."""
 NO_TEXT = ""
-"""The `text_key` of an item whose prompt nobody reads: it begins at `generate`."""
+"""`text_key` of an item without text features: it starts at `generate`."""
 SEED_LIMIT = 2**31
 """Seeds are 0 … 2³¹ − 1."""
 PRIORITY_LIMIT = 1000
@@ -52,16 +52,16 @@ class NewItem:
 
     Args:
         index: place of the prompt in the input, from 0; variants share it.
-        prompt: what the person wrote, without NUL characters.
-        model: the handler's queue, as "hgm3".
+        prompt: the user's text, without NUL characters.
+        model: the handler's queue, such as "hgm3".
         bundle: the exact bundle, name and weights hash.
         batch_key: hash of the bundle and the settings that are uniform in a batch.
-        text_key: key of the text features (`TextPipeline.key`); `NO_TEXT` = it needs none.
+        text_key: key of the text features (`TextPipeline.key`); `NO_TEXT` = none needed.
         text_batch_key: hash of the text specification; prompts of one claim of the text stage share it.
         seed: 0 … 2³¹ − 1.
-        seconds: length wanted; None = the model's estimate.
-        settings: what the handler needs (steps, guidance, fps, formats, …).
-        replaces: the motion that it is another take of.
+        seconds: requested length; None = the model's estimate.
+        settings: the handler's settings (steps, guidance, fps, formats, …).
+        replaces: replaced motion of a re-roll.
     """
 
     index: int
@@ -90,18 +90,19 @@ class NewJob:
     comment: str | None = None
     priority: int = 0
     fail_early: float | None = None
-    """Share of failed and dead items (0 … 1) above which the rest is cancelled; None = never."""
+    """Ratio of failed and dead items (0 … 1) above which open items are cancelled; None = off."""
     keep_days: int | None = None
-    """Days after its end when it is deleted, motions and files too; None = by hand alone."""
+    """Days after its end when it is deleted, with motions and files; None = only by hand."""
     count: int | None = None
-    """How many items there are, where that is known: a job that no quota has room for is refused before it is read."""
+    """Number of items, if known: a job beyond the quota is refused before it is read."""
     metered: bool = True
-    """Quotas apply. Not to what only finishes what was accepted: a stream's clip, the score of an evaluation."""
+    """True if quotas apply. False for work that completes accepted work: a stream's clip, the score of an
+    evaluation."""
     idempotency_key: str | None = None
     body_sha256: str | None = None
     """Hex digest of the request's body; goes with `idempotency_key`."""
     traceparent: str | None = None
-    """Of the request, as `marey.core.tracing` writes it."""
+    """`traceparent` of the request (`marey.core.tracing`)."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +142,9 @@ class JobRow:
     finished: datetime | None
     keep_days: int | None
     expires: datetime | None
-    """When it is deleted; None = never, or not before it ends."""
+    """Time of deletion; None = never, or not before it ends."""
     erased: datetime | None
-    """When its prompts were erased."""
+    """Time when its prompts were erased."""
 
 
 @dataclass(frozen=True)
@@ -185,9 +186,9 @@ class MotionRow:
     """Name of an API key."""
     review_comment: str | None
     replaces: UUID | None
-    """The motion that it is another take of."""
+    """Replaced motion of a re-roll."""
     replaced_by: UUID | None
-    """The item that is another take of it."""
+    """Item of its re-roll."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ class ItemRow:
     id: UUID
     job: UUID
     position: int
-    """Place in the job: input order, variants within prompt."""
+    """Position in the job: input order, variants within prompt."""
     index: int
     variant: int
     name: str | None
@@ -214,12 +215,12 @@ class ItemRow:
     solo: bool
     run_after: datetime | None
     reason: str | None
-    """Why it came to this state."""
+    """Reason of the current state."""
     problem: Problem | None
     created: datetime
     finished: datetime | None
     replaces: UUID | None
-    """The motion that it is another take of."""
+    """Replaced motion of a re-roll."""
     motion: MotionRow | None
 
 

@@ -11,9 +11,9 @@ from marey.jobs.leases import SchedulerRow, WorkerHeartbeat, WorkerRow
 from marey.jobs.policy import Policy, policy
 
 SCHEDULER = "scheduler"
-"""Queue of the rows by which schedulers say that they work: they are no workers."""
+"""Queue of the heartbeat rows of schedulers: they are not workers."""
 SCHEDULER_LIVE = 30.0
-"""Seconds after its last word for which a scheduler counts as working; it says so every 5 s."""
+"""Seconds after its last heartbeat for which a scheduler counts as working; it sends one every 5 s."""
 
 
 def beat(conn: sa.Connection, worker: WorkerHeartbeat) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from marey.core.errors import InvalidInput
 from marey.measures.inputs import Array, Numbers, at_least, embeddings, integers
 
-_AT_ONCE = 2_000_000  # draws held: under 64 MB with what they pick
+_AT_ONCE = 2_000_000  # draws in memory: under 64 MB with their values
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ def paired_bootstrap(
     """Percentile bootstrap of the mean difference of two runs (Efron and Tibshirani 1993, sections 8.4 and 13.3).
 
     Args:
-        before: (n,) scores of the first run, more is better.
+        before: (n,) scores of the first run, higher is better.
         after: (n,) scores of the second run on the same prompts, paired by position.
         rounds: resamples.
-        groups: (n,) integers, the prompt of each score: several seeds of one prompt are alike, and resampled together.
-            Without them each score is a prompt.
+        groups: (n,) integers, the prompt of each score: several seeds of one prompt are alike, and resampled
+            together. Without them each score is its own group.
 
     Raises:
         InvalidInput: scores that are not finite or not paired, or a single prompt.

@@ -1,7 +1,7 @@
 """Comparison of two evaluations of the same prompts, motion by motion.
 
-Motions are paired by prompt and repeat, and the repeats of a prompt are resampled together. Only metrics with a number
-a motion can be paired; a distance of distributions has none.
+Motions are paired by prompt and repeat, and the repeats of a prompt are resampled together. Only metrics with a
+value per motion can be paired; a distance of distributions has none.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from marey.measures.scores import MotionScore
 
 OBEYED, RETRIEVED = "obeyed", "r_precision_3_of_32"
 COMPARED = {OBEYED: "obeyed", RETRIEVED: "retrieved"}
-"""Metrics with a number a motion, and the field of `MotionScore` that holds it. All of them raise alarms."""
+"""Metrics with a value per motion, and the field of `MotionScore` that holds it. All of them raise alarms."""
 ROUNDS = 10_000
 
 Verdict = Literal["better", "worse", "no difference found"]
@@ -30,12 +30,12 @@ class MetricChange:
 
     Attributes:
         metric: its key.
-        before: mean over the pairs, there.
-        after: here.
+        before: mean over the pairs in the earlier run.
+        after: mean over the pairs in the later run.
         low: lower end of the 95 % interval of after - before.
         high: upper end.
-        prompts: that were resampled.
-        motions: pairs.
+        prompts: number of resampled prompts.
+        motions: number of pairs.
         verdict: `no difference found` is a result: the interval holds 0.
     """
 
@@ -56,8 +56,8 @@ def compare(
 
     Args:
         before: scores of the earlier run.
-        after: of the later one.
-        seed: of the resampling.
+        after: scores of the later run.
+        seed: seed of the resampling.
         where: the earlier run, for the error.
 
     Raises:

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 Integers = NDArray[np.int64]
 
-# The networks' range. Squares and cubes of what is within it stay finite in float64.
+# The networks' range. Squares and cubes of values within it stay finite in float64.
 _LARGEST = float(np.finfo(np.float32).max)
 
 
@@ -22,7 +22,7 @@ def embeddings(name: str, values: Numbers | Sequence[float], *, axes: str = "ND"
     """Validate one finite float64 array, with as many axes as `axes` has letters and none of them empty.
 
     Raises:
-        InvalidInput: of another shape, or a value that float32 does not hold (NaN, infinite, larger).
+        InvalidInput: wrong shape, or a value that float32 does not hold (NaN, infinite, larger).
     """
     array = np.asarray(values, np.float64)
     if array.ndim != len(axes) or 0 in array.shape:
@@ -42,7 +42,7 @@ def pairs(first: Numbers, second: Numbers, *, names: tuple[str, str] = ("text", 
     """Validate two arrays (N, D) whose rows correspond.
 
     Raises:
-        InvalidInput: as `embeddings`, or shapes that differ.
+        InvalidInput: as `embeddings`, or different shapes.
     """
     one, other = embeddings(names[0], first), embeddings(names[1], second)
     if one.shape != other.shape:
@@ -58,7 +58,7 @@ def integers(name: str, values: Numbers, *, count: int | None = None) -> Integer
     """Validate whole numbers (N,), as many as `count` if it is given.
 
     Raises:
-        InvalidInput: of another shape, or not integers.
+        InvalidInput: wrong shape, or not integers.
     """
     array = np.asarray(values)
     if array.ndim != 1 or len(array) != (count or len(array)) or not np.issubdtype(array.dtype, np.integer):

@@ -19,9 +19,9 @@ class MotionScore:
     """Scores of one motion; None if not measured.
 
     Attributes:
-        index: of the prompt.
-        variant: of the prompt's motions.
-        obeyed: whether the motion passed its prompt check, 0 or 1.
+        index: index of the prompt.
+        variant: number among the prompt's motions.
+        obeyed: 1 if the motion passed its prompt check, else 0.
         retrieved: R-precision of this motion, the share of its pools in which its prompt was found, 0 to 1.
     """
 
@@ -40,7 +40,7 @@ def check_document(document: object, where: str) -> dict[str, Any]:
     """Return the fields of a report that was parsed from JSON.
 
     Raises:
-        InvalidFile: it is no report, or of another version.
+        InvalidFile: not a report, or of another version.
     """
     if not isinstance(document, dict) or cast("dict[str, Any]", document).get("schema") != SCHEMA:
         raise InvalidFile("is no report of an evaluation", where=where, hint=f'`schema` must be "{SCHEMA}".')
@@ -54,7 +54,7 @@ def read_scores(data: bytes, where: str) -> tuple[MotionScore, ...]:
     """Return the scores of a JSON report; the rest is ignored.
 
     Raises:
-        InvalidFile: no such JSON, of another version, or scores that are none.
+        InvalidFile: not a report, of another version, or with invalid scores.
     """
     document = parse_json(data, where)
     rows: Any = check_document(document, where).get("scores")

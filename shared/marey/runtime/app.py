@@ -1,7 +1,7 @@
 """The Celery app: every process that publishes or consumes hints creates it here, with the same settings.
 
-A message is only a hint that a queue has work; the rows in Postgres are the truth. Losing one, or getting one twice,
-must not matter, and each setting below is there because something that did matter went wrong without it.
+A message is only a hint that a queue has work; the rows in Postgres are authoritative. Lost or duplicate messages
+are harmless, and each setting below fixes a failure that was not.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
@@ -14,29 +14,28 @@ from celery.app.amqp import AMQP
 from kombu.connection import Connection
 
 DRAIN = "marey.drain"
-"""Name of the one task: `drain(queue)` claims, runs and commits until nothing is left or 300 s have passed."""
+"""Name of the only task: `drain(queue)` claims, runs and commits until no work is left or 300 s have passed."""
 
 TIME_LIMIT = 1200
-"""Seconds until the parent kills a child that hangs in a task; its leases are long gone by then."""
+"""Seconds until the parent kills a child that hangs in a task; its leases have long expired by then."""
 
 VISIBILITY_TIMEOUT = 3600
-"""Redis hands an unacknowledged message to another worker after this long, running or not (celery #5935): more than
-twice the time limit, so that it never happens to a living task; the lease makes a duplicate harmless even so."""
+"""Redis redelivers an unacknowledged message after this long, running or not (celery #5935): more than twice the
+time limit, so that it never happens to a running task; the lease makes a duplicate harmless even so."""
 
 SOCKET_TIMEOUT = 3.0
-"""Seconds until a call that Redis does not answer ends: every one of ours takes milliseconds, or says how long it
-blocks. Without it a connection that stays open and silent would be waited for without end; keepalives do not find it,
-for the peer's kernel goes on acknowledging."""
+"""Deadline of a Redis call: each takes milliseconds, or has an explicit block time. Without it a silent connection
+would be waited for without end; keepalives do not detect it, since the peer's kernel still acknowledges."""
 CONNECT_TIMEOUT = 3.0
 HEALTH_CHECK_INTERVAL = 2
 """A worker that waits for a hint asks with a timeout of 1 s at the server. Kombu drops the connection when no answer
-came for this many seconds longer, and looks as often: 5 s after a connection fell silent at the latest."""
+came for this many seconds longer, and checks as often: within 5 s after a connection fell silent."""
 RECONNECT_START, RECONNECT_STEP, RECONNECT_MAX = 0.5, 0.5, 3.0
-"""Seconds between a worker's tries to connect again. Kombu's own grow to 30: that long a worker would stay idle after
-the queue is back."""
+"""Seconds between a worker's reconnects. Kombu's own grow to 30: a worker would stay idle that long after the queue
+is back."""
 
 PUBLISH_RETRY = {"max_retries": 2, "interval_start": 0.1, "interval_step": 0.2, "interval_max": 0.5}
-"""Bounded: the relay must come round again rather than hang on a broker that is down (celery #4296, #6911)."""
+"""Bounded: the relay must start its next round rather than hang on a broker that is down (celery #4296, #6911)."""
 
 
 def transport_options() -> dict[str, Any]:
@@ -78,16 +77,16 @@ def create_app(queue_url: str) -> Celery:
         result_backend_transport_options={"visibility_timeout": VISIBILITY_TIMEOUT},
         visibility_timeout=VISIBILITY_TIMEOUT,
         broker_connection_retry_on_startup=True,
-        broker_connection_max_retries=None,  # a worker outlives any outage of the queue
+        broker_connection_max_retries=None,  # a worker survives any outage of the queue
         broker_pool_limit=2,
-        # No results: the outcome stands in the rows, and result keys leak (celery #3812, #4824, #6963).
+        # No results: outcomes are stored in rows, and result keys leak (celery #3812, #4824, #6963).
         result_backend=None,
         task_ignore_result=True,
         task_store_errors_even_if_ignored=False,
-        # A killed child gives its hint back (celery #1628, #3541); the attempts column stops a toxic loop.
+        # A killed child returns its hint (celery #1628, #3541); the attempts column stops a toxic loop.
         task_acks_late=True,
         task_reject_on_worker_lost=True,
-        task_acks_on_failure_or_timeout=True,  # but an exception does not: the rows say what remains
+        task_acks_on_failure_or_timeout=True,  # but an exception does not: the rows hold the remaining work
         task_time_limit=TIME_LIMIT,
         task_create_missing_queues=True,
         task_serializer="json",
@@ -102,11 +101,11 @@ def create_app(queue_url: str) -> Celery:
         worker_concurrency=1,
         worker_pool_start_method="spawn",
         worker_proc_alive_timeout=300,  # importing torch and loading a bundle happen before the child reports
-        worker_cancel_long_running_tasks_on_connection_loss=False,  # losing the hint must not stop the work
+        worker_cancel_long_running_tasks_on_connection_loss=False,  # a lost hint must not stop the work
         worker_max_tasks_per_child=None,  # the model stays loaded
         worker_send_task_events=False,
         worker_enable_remote_control=False,  # liveness is the age of the last tick, not `inspect ping`
-        worker_hijack_root_logger=False,  # structlog has it
+        worker_hijack_root_logger=False,  # structlog configures it
         worker_redirect_stdouts=False,
         enable_utc=True,
     )

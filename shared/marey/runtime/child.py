@@ -32,7 +32,7 @@ from marey.storage import open_store
 log = logger(__name__)
 
 ROLE_VARIABLE = "MAREY_ROLE"
-"""Environment variable by which a parent tells its child, a fresh interpreter, what to serve."""
+"""Environment variable that tells a child, a fresh interpreter, what to serve."""
 NAME_VARIABLE = "MAREY_WORKER_NAME"
 
 
@@ -65,7 +65,7 @@ class Child:
         self._name = name
         self._settings = chosen
         self._engine = create_engine(url, pool_size=4)
-        # Of its own: a heartbeat never waits for a commit's connection.
+        # Separate engine: a heartbeat never waits for a commit's connection.
         self._beats = create_engine(url, pool_size=1, deadline=HEARTBEAT)
         self._stopping = threading.Event()
         self._ready = False
@@ -108,7 +108,7 @@ class Child:
         configure_tracing(f"worker-{self._role.name}")
         expose("worker", self._settings)
         signal.signal(signal.SIGTERM, self._on_sigterm)
-        self._tell_status()  # the parent finds us by it
+        self._tell_status()  # the parent finds the child by it
         self._heartbeat.start()
         self._committer.start()
         for queue, bundle in self._role.preload.items():
@@ -117,7 +117,7 @@ class Child:
         try:
             self._present()
         except Unreachable as error:
-            log.warning("presence_failed", error=error.message)  # the heartbeat goes on trying
+            log.warning("presence_failed", error=error.message)  # the heartbeat retries
         log.info("ready", worker=self._name, queues=list(self._role.handlers))
 
     def drain(self) -> int:
@@ -137,8 +137,8 @@ class Child:
                 for queue in self._role.handlers:
                     retire(conn, self._worker(queue))
         except Unreachable as error:
-            log.warning("not_retired", error=error.message)  # the row says by its age that nobody is there
-        end_tracing()  # billiard ends this process without what runs at an ordinary exit
+            log.warning("not_retired", error=error.message)  # the age of the row shows that this worker is gone
+        end_tracing()  # billiard ends this process without the usual exit handlers
 
     def _on_sigterm(self, _signal: int, _frame: FrameType | None) -> None:
         self._stopping.set()
@@ -194,7 +194,7 @@ def wait_for_database(chosen: Settings, seconds: float = 60.0) -> None:
     Raises:
         Unreachable: it did not.
     """
-    assert chosen.database_url is not None  # the caller's edge has checked
+    assert chosen.database_url is not None  # validated at the process's edge
     engine = create_engine(chosen.database_url.get_secret_value(), pool_size=1)
 
     def ask() -> None:

@@ -39,9 +39,9 @@ from marey.storage import AssetStore, NewObject
 
 log = logger(__name__)
 
-GROUP = 64  # outcomes of one transaction, at most: a commit costs an fsync and the lock of its job row
-GROUP_SECONDS = 2.0  # but what a killed child would lose is kept small
-STORE_PATIENCE = 60.0  # seconds; rides out a restart of the store, after that the items are given back
+GROUP = 64  # maximum outcomes per transaction: a commit costs an fsync and the lock of its job row
+GROUP_SECONDS = 2.0  # limits the loss when a child is killed
+STORE_PATIENCE = 60.0  # seconds; covers a restart of the store, after that the items are released
 DATABASE_PATIENCE = 120.0
 WENT = {
     "motions": "succeeded",
@@ -50,7 +50,7 @@ WENT = {
     "failures": "failed",
     "release": "released",
 }
-"""Where items go by a write, if it does not say of each; as metrics call it."""
+"""States after a write that does not report them itself, as metric labels."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ _Result: TypeAlias = _Exported | TextDone | Scored | Failed
 class Committer(threading.Thread):
     """Queues outcomes and writes them. Every write is fenced; lost results are discarded.
 
-    A worker told to stop waits for nobody: what it cannot write at the next try goes back.
+    A stopping worker does not wait: after one more try, unwritten items are released.
 
-    At most two leases are under way, one running and one being stored; `acquire_slot` waits until that holds.
+    At most two leases are active, one running and one being stored; `acquire_slot` waits until that holds.
     """
 
     def __init__(self, engine: sa.Engine, store: AssetStore, heartbeat: Heartbeat, stopping: threading.Event) -> None:
@@ -146,7 +146,7 @@ class Committer(threading.Thread):
                 self._give_back(lease, lease.open, first.reason)
             else:
                 self._write_or_fail(lease, self._group(lease, first))
-        except Exception as error:  # the thread must live; what is not written runs again when the lease is swept
+        except Exception as error:  # the thread must survive; unwritten items run again when the lease is swept
             problem = as_problem(error)
             log.exception("not_written", error=problem.problem_type)
 
@@ -194,7 +194,7 @@ class Committer(threading.Thread):
         try:
             self._write(lease, group)
         except Unreachable:
-            raise  # given back when the lease is finished
+            raise  # released when the lease is finished
         except Exception as error:
             log.exception("write_failed", items=len(group), item_ids=ids_of(outcome.item for outcome in group))
             problem = Problem.of(as_problem(error))
@@ -279,7 +279,7 @@ class Committer(threading.Thread):
             with transaction(self._engine) as conn:
                 return write(conn, lease.claim.lease_token)
 
-        # A commit whose answer got lost is repeated: its items then count as `lost`, their rows stand.
+        # A commit whose answer was lost is repeated: its items then count as `lost`, but their rows are written.
         with lease.telemetry.stage("commit") as span:
             committed = retry_unreachable(attempt, seconds=DATABASE_PATIENCE, stopping=self._stopping)
             span.set(what=what, items=len(committed.items), item=",".join(ids_of(committed.items)))

@@ -18,10 +18,10 @@ def expose(part: str, chosen: Settings) -> None:
     """Serve metrics at `MAREY_METRICS_HOST` and `MAREY_METRICS_PORT` until the process ends; disabled if no port is
     set.
 
-    A worker's child does so, not its parent: the numbers are where the work is, and stand there once.
+    A worker's child does so, not its parent: the child does the work, and each number is exposed once.
 
     Args:
-        part: whose numbers: a name of `metrics.PARTS`.
+        part: a name of `metrics.PARTS`.
 
     Raises:
         Conflict: the port is taken.
@@ -46,7 +46,7 @@ def measure_gpu() -> None:
         return
     for device in range(torch.cuda.device_count()):
         reserved = torch.cuda.memory_reserved(device)
-        if reserved:  # to ask a device for its memory takes some of it
+        if reserved:  # querying a device allocates memory on it
             free, total = torch.cuda.mem_get_info(device)
             kinds = {
                 "allocated": torch.cuda.memory_allocated(device),

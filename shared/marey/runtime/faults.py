@@ -13,7 +13,7 @@ from marey.core.errors import MareyError, Unreachable
 
 T = TypeVar("T")
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.2, 2.0  # seconds between tries, doubling with jitter
+FIRST_PAUSE, LONGEST_PAUSE = 0.2, 2.0  # seconds between retries, doubling with jitter
 
 
 class HandlerError(MareyError):
@@ -31,7 +31,7 @@ class OutOfMemory(HandlerError):
 def retry_unreachable(action: Callable[[], T], *, seconds: float, stopping: threading.Event | None = None) -> T:
     """Call `action` until it does not raise `Unreachable`, for at most `seconds`; then raise the last error.
 
-    With `stopping`, a worker told to stop makes one more try and gives up.
+    With `stopping`, a stopping worker makes one more try and gives up.
     """
     give_up = tenacity.stop_after_delay(seconds)
     wait = tenacity.wait_exponential_jitter(multiplier=FIRST_PAUSE, max=LONGEST_PAUSE, jitter=FIRST_PAUSE)

@@ -1,16 +1,16 @@
 """The interface between the claim loop and handlers: one protocol and its data types.
 
 A handler turns claimed items into outcomes. It never sees the database, the queue or the store: the loop claims,
-keeps the lease alive, stores files, commits, releases and retries. The rules a handler may rely on:
+renews the lease, stores files, commits, releases and retries. A handler may rely on these rules:
 
 - `run` is called on one thread, one batch at a time; every item of a batch has the same bundle and settings.
 - `run` yields one outcome per item, in any order, as soon as it is known; items in `control.dropped()` need none.
 - The items of an evaluator's queue come one by one, and their batch has `scoring`: the motions to measure.
 - `Done.export` is called once, later, on the store thread, while the next batch runs: decoding, clean-up and file
   formats belong there, not into `run`.
-- An exception out of `run` concerns every item of the batch that has no outcome yet: a `MareyError` fails them with
-  its message (`Unreachable` releases them uncounted), out of memory halves the batch in place, anything else is a
-  bug and is retried until the attempts are used up.
+- An exception from `run` concerns every item of the batch without an outcome: a `MareyError` fails them with its
+  message (`Unreachable` releases them uncounted), out of memory halves the batch in place, any other is a bug and is
+  retried until the attempts are used up.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Batch:
     features: Mapping[str, bytes]
     """Text features (`TextFeatures.to_blob`) by the items' `text_key`; empty in the text stage."""
     scoring: ScoreInput | None = None
-    """What an evaluation made; for items that read no prompt."""
+    """Motions of an evaluation, for score items, which have no prompt."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class ExportedFile:
     """One file of a motion or report, in memory: it goes to the asset store under its sha256."""
 
     format: str
-    """`npz`, `bvh`, …: the name under which `motions/{id}/files/{format}` serves it, or `html`, `json`, `md`, under
-    which `evaluations/{id}/report/{format}` does."""
+    """`npz`, `bvh`, …: name in the URL `motions/{id}/files/{format}`; or `html`, `json`, `md`, in
+    `evaluations/{id}/report/{format}`."""
     content: bytes
     media_type: str = "application/octet-stream"
 
@@ -58,7 +58,7 @@ class Export:
     """Poses in the exported clip, at `fps`."""
     fps: float
     licence: str
-    """SPDX name or short text of the terms of the weights."""
+    """SPDX name or short text of the licence of the weights."""
     manifest: Mapping[str, Any]
     """The JSON of the npz's `manifest`: prompt, rewritten prompt, graph, bundle, weights, seed, settings, licence."""
 
@@ -73,7 +73,7 @@ class Done:
     item: UUID
     export: Callable[[], Export]
     elapsed: float
-    """Seconds of computing this item took: its batch's time divided by the items in it."""
+    """Seconds of computation of this item: its batch's time divided by the items in it."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,7 @@ class TextDone:
 class Scored:
     """A measured evaluation: `files` (`html`, `json`, `md`) are its report, `summary` its numbers for lists and trends.
 
-    `regressed`: it is worse than what it was compared with; None = there was nothing to compare with. `reason` is one
-    sentence for people.
+    `regressed`: worse than the baseline; None = there was no baseline. `reason` is one sentence for people.
     """
 
     item: UUID
@@ -129,9 +128,9 @@ class Handler(Protocol):
     """The work of one queue. Created in the worker's child; the parent never imports its module."""
 
     queue: str
-    """`hgm3`, `text`: which items it claims."""
+    """`hgm3`, `text`: the queue it claims from."""
     batch_size: int
-    """Items of one claim, at most."""
+    """Maximum items of one claim."""
 
     def load(self, bundle: str) -> None:
         """Load `bundle`; may take minutes (its lease is kept alive). Called when the bundle changes.

@@ -17,17 +17,17 @@ log = logger(__name__)
 
 LOOK_SECONDS = 1.0
 AGAIN_SECONDS = 1.0
-"""After a failed renewal the next comes this soon: a lease must outlast a connection that fell silent."""
+"""Seconds until the retry of a failed renewal: a lease must outlast a connection that fell silent."""
 
 Renew = Callable[[UUID, Collection[UUID], bool], HeartbeatReply]
-"""Renews one lease in the database: its token, its open items, whether it progressed. Raises `Unreachable`."""
+"""Renews one lease in the database, given its token, open items and progress. Raises `Unreachable`."""
 
 
 class HeldLease:
     """A claim in progress: shared state of the handler and the heartbeat.
 
-    It is the `BatchControl` of `marey.runtime.handler`. Its state is a few attributes replaced as a whole, so the
-    decode loop pays no lock.
+    Implements the `BatchControl` of `marey.runtime.handler`. Its state is a few attributes replaced atomically, so
+    the decode loop needs no lock.
     """
 
     def __init__(self, claim: Claim, stopping: threading.Event) -> None:
@@ -103,8 +103,8 @@ class Heartbeat(threading.Thread):
     """Renews every held lease each `interval` seconds, on its own connection, and polls each second in between for lost
     items: cancelled items leave the batch within two seconds, a decode step included.
 
-    A batch that is silent for too long is not renewed: the database measures that, by its own clock. While the database
-    is away nothing is given up here: the fence decides at the commit.
+    A batch that is silent for too long is not renewed: the database measures that by its own clock. During an outage
+    of the database the lease is kept here: the fence decides at the commit.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Heartbeat(threading.Thread):
             except Unreachable as error:
                 log.warning("presence_failed", error=error.message)
             except Exception:
-                log.exception("presence_failed")  # without this thread every lease here would run out
+                log.exception("presence_failed")  # without this thread every lease here would expire
             due = time.monotonic() + (self._interval if renewed else min(self._interval, AGAIN_SECONDS))
 
     def close(self) -> None:

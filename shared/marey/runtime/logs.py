@@ -1,7 +1,7 @@
 """Structured logs: JSON lines for machines, readable lines for people, never a prompt or a secret.
 
-Lines about work carry its `job`, `lease` and `trace` by themselves (`marey.runtime.telemetry`); those of a request its
-`trace`. Log identifiers and numbers; a prompt belongs to the studio that wrote it and stays in the database.
+Log lines of claims carry `job`, `lease` and `trace` automatically (`marey.runtime.telemetry`); those of a request
+its `trace`. Log identifiers and numbers; a prompt belongs to its tenant and stays in the database.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from marey.core import tracing
 from marey.core.characters import escape, unescaped
 
 FORBIDDEN = frozenset({"prompt", "prompts", "text", "rewritten", "key", "api_key", "secret", "password", "url", "dsn"})
-"""Keys that could carry a prompt or a secret; the processor drops them, whoever logged them."""
+"""Keys that could carry a prompt or a secret; the processor drops them from every log line."""
 
 
 def _drop_forbidden(_logger: WrappedLogger, _method: str, event: EventDict) -> EventDict:
@@ -96,7 +96,7 @@ def configure_logging(service: str, *, level: str = "INFO", json: bool = False) 
     root = logging.getLogger()
     root.handlers[:] = [handler]
     root.setLevel(level)
-    # One INFO line per hint and per connection tells nothing; the loop logs its own. httpx2 would tell whole URLs.
+    # INFO lines per hint and per connection are noise; the loop logs its own. httpx2 would log whole URLs.
     for noisy in ("celery.worker.strategy", "celery.app.trace", "kombu", "amqp", "urllib3", "httpx2"):
         logging.getLogger(noisy).setLevel(max(logging.WARNING, root.level))
 

@@ -29,8 +29,8 @@ from marey.storage import AssetStore
 log = logger(__name__)
 
 STOP_PATIENCE = 20.0  # of the 25 s a worker has to stop
-WRITE_PATIENCE = 300.0  # longer than the committer's own patience with store and database together
-OUTAGE_PAUSE = 5.0  # seconds; what a handler could not reach is not asked again at once
+WRITE_PATIENCE = 300.0  # longer than the committer's own retries with store and database together
+OUTAGE_PAUSE = 5.0  # seconds; delay before retrying an unreachable dependency
 CLAIM_PATIENCE = 30.0  # seconds without a database until a drain gives up; the next hint starts another
 
 
@@ -45,8 +45,8 @@ class Loaded:
 def end_child() -> NoReturn:
     """Crash this process: its accelerator's context is gone and every later call would fail, or a batch hangs in it.
 
-    The parent starts another child; the lease runs out as after any crash, so that a prompt which does this each time
-    ends `dead` and its neighbours do not.
+    The parent starts another child; the lease expires as after any crash, so that an item which causes this each
+    time ends as `dead` and other items do not.
     """
     os._exit(70)  # EX_SOFTWARE
 
@@ -56,10 +56,10 @@ class Drain:
 
     Args:
         engine: the database.
-        worker: name under which it claims from a queue.
-        handlers: by queue; served in turns, so that texts stay ahead of motions and hold none of them up.
-        store: where score items read motions from.
-        ticked: called at each claim and step of progress: liveness is the age of the last.
+        worker: name for its claims from a queue.
+        handlers: by queue; served in turns, so that texts stay ahead of motions and do not delay them.
+        store: source of the motions of score items.
+        ticked: called at each claim and step of progress: liveness is the age of the last call.
     """
 
     def __init__(
@@ -244,8 +244,8 @@ class Drain:
             if left:
                 self._fail_all(lease, left, HandlerError("the worker gave no result for this item"), retryable=True)
             return
-        # Outside the except block, where the exception no longer holds the tensors that did not fit.
-        lease.exempt()  # new shapes may compile anew
+        # Outside the except block, where the exception no longer references the large tensors.
+        lease.exempt()  # new shapes may compile again
         middle = (len(left) + 1) // 2
         for half in (left[:middle], left[middle:]):
             self._run_bucket(lease, handler, replace(batch, items=tuple(half)))

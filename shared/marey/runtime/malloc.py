@@ -9,16 +9,16 @@ import sys
 ARENA_MAX = -8
 """`M_ARENA_MAX` of malloc.h."""
 SAID = ("MALLOC_ARENA_MAX", "GLIBC_TUNABLES")
-"""Environment variables by which an operator says otherwise."""
+"""Environment variables with which an operator overrides this."""
 
 
 def one_heap() -> None:
     """Share one heap among all threads; for a server of many threads, before it starts them.
 
-    glibc gives threads heaps of their own, eight for each core. What one thread made and another let go of leaves holes
-    there, and each heap keeps what its largest request once took: a server with forty threads that come and go grows
-    for hours, though nothing of it is in use. Threads of Python hardly ever wait for each other there, for the
-    interpreter's lock lets one run at a time. Other C libraries are left as they are.
+    glibc gives threads heaps of their own, eight per core. Memory allocated by one thread and freed by another
+    leaves holes there, and each heap keeps the size of its largest request: a server with forty short-lived threads
+    grows for hours without using the memory. Python threads hardly ever contend for a heap, since the interpreter's
+    lock lets one run at a time. Other C libraries are unaffected.
     """
     if not sys.platform.startswith("linux") or any(name in os.environ for name in SAID):
         return

@@ -22,8 +22,8 @@ SOCKET_SCHEME = "redis+socket://"
 class _OneRetry(Retry):
     """One retry, at once, on a fresh connection; after a missed deadline every idle connection is closed too.
 
-    Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
-    cost its next user a deadline. A longer wait is the caller's to make: it knows whom to tell meanwhile.
+    Connections fall silent together (a proxy or a firewall drops all flows of a host). Found one by one, each would
+    cost its next user a deadline. Longer retries are left to the caller, which can report the outage meanwhile.
     """
 
     def __init__(self, pool: redis.ConnectionPool) -> None:
@@ -31,7 +31,7 @@ class _OneRetry(Retry):
         self._pool = weakref.ref(pool)
 
     def __deepcopy__(self, _memo: dict[int, Any]) -> _OneRetry:
-        return self  # redis-py copies it for each connection; it has no state of one
+        return self  # redis-py copies it for each connection; it has no per-connection state
 
     def call_with_retry(
         self,
@@ -61,8 +61,8 @@ def redis_client(
     """Create a client of `redis://…`, `rediss://…` or `redis+socket:///path` (kombu's spelling; redis-py says
     `unix://`).
 
-    A call on a connection that fell silent is answered after one deadline, by a new connection; where that is silent
-    too, redis-py raises its TimeoutError after two. Options in the URL override those given here.
+    A call on a silent connection is repeated after one deadline on a new connection; if that is silent too, redis-py
+    raises its TimeoutError after two. Options in the URL override those given here.
 
     Args:
         timeout: deadline of each read and write, in seconds; a command that blocks must block for less.
@@ -79,7 +79,7 @@ def redis_client(
     if queue_url.startswith(SOCKET_SCHEME):
         client = redis.Redis.from_url("unix://" + queue_url.removeprefix(SOCKET_SCHEME), **options)
     else:
-        # redis-py raises TypeError for keepalive on a Unix socket, hence here alone.
+        # redis-py raises TypeError for keepalive on a Unix socket, hence only here.
         client = redis.Redis.from_url(queue_url, socket_keepalive=True, **options)
     client.set_retry(_OneRetry(client.connection_pool))
     return client
@@ -89,7 +89,7 @@ def check_queue(queue_url: str) -> str:
     """Return the version of a Redis that answers and is new enough.
 
     Raises:
-        Unreachable: it does not answer, or refuses us.
+        Unreachable: it does not answer, or refuses the connection.
         Conflict: it is too old.
     """
     try:

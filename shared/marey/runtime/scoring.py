@@ -20,13 +20,13 @@ class ScoreInput:
     """An evaluation whose motions are made.
 
     Attributes:
-        request: what was asked for, with exact bundles.
-        prompts: digest of its prompts: equal ones may be compared.
+        request: the evaluation request, with exact bundles.
+        prompts: digest of its prompts: equal digests are comparable.
         generation: the job that made the motions, with its times.
-        items: every motion that was asked for, in input order, repeats (`variant`) within prompt (`index`); those that
-            were not made have a `problem` and no motion.
-        history: the last 20 runs that are done, of the same model and prompts, by the same evaluator; the oldest first.
-        baseline: the run that the request names to compare with.
+        items: every requested motion, in input order, repeats (`variant`) within prompt (`index`); failed ones have
+            a `problem` and no motion.
+        history: the last 20 runs that are done, of the same model and prompts, by the same evaluator; oldest first.
+        baseline: the run that the request names for comparison.
     """
 
     evaluation: UUID
@@ -38,7 +38,7 @@ class ScoreInput:
     history: tuple[EarlierRun, ...]
     baseline: EarlierRun | None
     read: Callable[[str], bytes] = field(repr=False)
-    """Content by sha256."""
+    """Reads content by sha256."""
 
     @property
     def previous(self) -> EarlierRun | None:
@@ -50,7 +50,7 @@ class ScoreInput:
 
         Raises:
             NotFound: it has none, or the store has lost it.
-            Unreachable: the store does not answer; let it through, and the item is given back.
+            Unreachable: the store does not answer; do not catch it, and the item is released.
         """
         if item.npz is None:
             raise NotFound("there is no motion", where=f"prompt {item.index}, repeat {item.variant}")
@@ -67,7 +67,7 @@ def score_input(engine: sa.Engine, store: AssetStore, job: UUID) -> ScoreInput:
     with transaction(engine, SEARCH) as conn:
         rows = load_score(conn, job)
     evaluation = rows.evaluation
-    assert evaluation.prompts is not None  # `load_score` looks
+    assert evaluation.prompts is not None  # validated by `load_score`
     assert evaluation.generation is not None
     return ScoreInput(
         evaluation=evaluation.id,

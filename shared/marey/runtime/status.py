@@ -22,7 +22,7 @@ from marey.core.private_home import open_private
 
 TELL_SECONDS = 3.0
 FRESH = 15.0  # seconds; a status file older than this belongs to a child that no longer beats
-TICK_LIMIT = 600.0  # longest honest silence: a drain's 300 s of claims and the last batch's end, doubled
+TICK_LIMIT = 600.0  # longest legitimate silence: a drain's 300 s of claims and the last batch's end, doubled
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class WorkerStatus:
     """Wall clock."""
     host: str = field(default_factory=socket.gethostname)
     error: str | None = None
-    """Why the child could not start; its parent ends then."""
+    """Reason of a failed start; the parent ends then."""
 
     def alive(self, now: float) -> bool:
         """Return True if a liveness probe should pass: its threads beat, and hints reach it."""
@@ -98,7 +98,7 @@ class StatusReporter(threading.Thread):
 
     Args:
         name: unique among the workers of `home`.
-        silence: seconds without a sign of what this process is there for.
+        silence: seconds since the last sign of progress.
     """
 
     def __init__(self, home: Path, name: str, silence: Callable[[], float], stopping: threading.Event) -> None:

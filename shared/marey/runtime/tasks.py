@@ -55,7 +55,7 @@ def drain(queue: str) -> None:
     except Unreachable as error:
         log.warning("drain_ended", queue=queue, error=error.message)
     except Exception:
-        # Celery would log the exception's text as it is, and that of a failed row holds the row. The next hint comes.
+        # Celery would log the exception's text, and that of a failed row holds the row. The next hint comes.
         log.exception("drain_failed", queue=queue)
     else:
         log.debug("drained", queue=queue, items=items)

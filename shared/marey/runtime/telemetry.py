@@ -14,7 +14,7 @@ from marey.core.tracing import Span
 from marey.jobs import Claim
 
 MOST_IDS = 64
-"""Items named in one attribute or line; a claim holds no more."""
+"""Maximum ids in one attribute or line; a claim holds no more."""
 
 
 class ClaimTelemetry:

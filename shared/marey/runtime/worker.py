@@ -62,7 +62,7 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
     os.environ[ROLE_VARIABLE] = json.dumps(asdict(role))
     os.environ[NAME_VARIABLE] = name
     os.environ["MAREY_DATABASE_URL"] = chosen.database_url.get_secret_value()  # the child is a fresh interpreter
-    # Celery warns root of pickle, which this app does not accept.
+    # Celery warns about pickle as root, which this app does not accept.
     warnings.filterwarnings("ignore", category=SecurityWarning)
     app = create_app(chosen.queue_url.get_secret_value())
     signals.setup_logging.connect(_keep_logging, weak=False)
@@ -78,7 +78,7 @@ def worker_main(role: Role, chosen: Settings, *, name: str | None = None) -> int
         loglevel=chosen.log_level,
         without_gossip=True,
         without_mingle=True,
-        without_heartbeat=True,  # Celery's, over the broker; ours stands in the database
+        without_heartbeat=True,  # Celery's own, over the broker; Marey's is in the database
         quiet=True,
     )
     threading.Thread(target=_watch, args=(home, own_name), name="watch", daemon=True).start()
@@ -97,7 +97,7 @@ def _keep_logging(**_: Any) -> None:
 def _watch(home: Path, name: str) -> None:
     """End this worker when its child is stuck, or no hint reaches it: its supervisor restarts it.
 
-    Three looks must agree: after a suspended laptop wakes up, the first status it finds is old.
+    Three checks must agree: after a suspended laptop resumes, the first status is old.
     """
     stuck = 0
     while stuck < WATCH_LOOKS:

@@ -46,7 +46,7 @@ def open_store(chosen: Settings) -> AssetStore:
             where="MAREY_STORE",
             hint="Set MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY (or the _FILE of each).",
         )
-    from marey.storage.s3 import S3Options, S3Store  # minio costs 0.2 s of import; the folder does without
+    from marey.storage.s3 import S3Options, S3Store  # importing minio costs 0.2 s; the folder store avoids it
 
     return S3Store(
         S3Options(

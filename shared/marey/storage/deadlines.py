@@ -1,7 +1,7 @@
 """HTTP connections to an object store with a deadline for each read and write; silent connections are not reused.
 
-A deadline counts one operation on the socket, never a whole object: one that moves slowly but steadily takes as long
-as it takes.
+A deadline applies to one operation on the socket, never to a whole object: a slow but steady transfer may take any
+time.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -18,24 +18,24 @@ from typing import Any
 import urllib3
 from urllib3.connection import HTTPConnection, HTTPSConnection
 
-# The SDK's own pool waits 300 s and tries 5 times; a worker must know within seconds and release its lease.
+# The SDK's own pool waits 300 s and retries 5 times; a worker must know within seconds and release its lease.
 CONNECT_SECONDS = 3.0
 """Deadline of a connect, and of each write."""
 READ_SECONDS = 6.0
-"""Deadline of each read; the first waits until the store has put an object on its disks."""
+"""Deadline of each read; the first one includes the time until the store has written an object to its disks."""
 RETRIES = 2
 CONNECTIONS = 16
 WRITE_BYTES = 1 << 16
-"""Bytes of one write: Python's `sendall` has one deadline for all that it is given."""
+"""Bytes per write: Python's `sendall` has one deadline for all its data."""
 UNSENT_BYTES = 1 << 17
-"""Bytes that the kernel takes ahead of the network. Megabytes, as by default, would drain while the deadline of the
-answer runs already."""
+"""Bytes that the kernel buffers for sending. Megabytes, the default, would drain while the deadline of the answer
+already runs."""
 
 
 class Silence:
     """Time of the last missed deadline; connections opened earlier are not reused.
 
-    Connections fall silent together (a proxy or a firewall forgets all flows of a host). Found one by one, each would
+    Connections fall silent together (a proxy or a firewall drops all flows of a host). Found one by one, each would
     cost its next user a deadline.
     """
 
@@ -55,8 +55,8 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
     """Create the connections of one client.
 
     Args:
-        silence: shared by the clients of one store.
-        trust: for https; None = the default of urllib3.
+        silence: shared by all clients of one store.
+        trust: TLS context for https; None = the default of urllib3.
     """
 
     class Deadlines:
@@ -112,6 +112,6 @@ def open_pool(silence: Silence, trust: ssl.SSLContext | None) -> urllib3.PoolMan
 
 
 def _socket_options() -> list[tuple[int, int, int]]:
-    option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # Linux and macOS have it
+    option = getattr(socket, "TCP_NOTSENT_LOWAT", None)  # only Linux and macOS have it
     little_unsent = [] if option is None else [(socket.IPPROTO_TCP, option, UNSENT_BYTES)]
     return [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1), *little_unsent]

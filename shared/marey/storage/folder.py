@@ -30,12 +30,12 @@ from marey.storage.port import (
     read_chunks,
 )
 
-ABANDONED_SECONDS = 3600.0  # no writer takes so long
+ABANDONED_SECONDS = 3600.0  # age after which a temporary file is left over
 INCOMING = ".incoming"
-"""Folder of files being written; its name is no key's, so listings never show it."""
-FILES_AT_ONCE = 64  # two for each item of a batch; macOS lets a process open 256
+"""Folder of temporary files; its name is not a key, so listings never include it."""
+FILES_AT_ONCE = 64  # two per item of a batch; macOS lets a process open 256
 SYNCS_AT_ONCE = 32  # threads that only wait for the disk; 64 are no faster
-CREATE = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # O_BINARY: Windows alone has it
+CREATE = os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_BINARY", 0)  # O_BINARY: Windows only
 
 Value = TypeVar("Value")
 Result = TypeVar("Result")
@@ -132,8 +132,8 @@ class FolderStore:
     def _put_together(self, contents: Sequence[tuple[str, BinaryIO]]) -> list[Digest]:
         """Run each step for all objects, so that the fsyncs of a step wait for the disk at the same time.
 
-        A flush of the disk takes milliseconds and serves everybody who asked for one before it began: two files an item
-        cost 2 to 3 ms when each of eight threads took them one by one, 0.3 ms like this.
+        A flush of the disk takes milliseconds and serves all requests made before it began: two files per item cost
+            2 to 3 ms when each of eight threads flushed them one by one, 0.3 ms like this.
         """
         paths = [self.path(key) for key, _ in contents]
         with _outages(self.root), self._incoming(len(contents)) as temporaries:
@@ -152,7 +152,7 @@ class FolderStore:
             yield names
         except BaseException:
             for name in names:
-                with suppress(OSError):  # the first error is the one to tell
+                with suppress(OSError):  # report the first error
                     name.unlink()
             raise
 
@@ -182,7 +182,7 @@ def _keys_of(root: Path, folder: str, folders: list[str], files: list[str]) -> I
 
 
 def _raise(error: OSError) -> None:
-    if not isinstance(error, FileNotFoundError):  # a folder not made yet holds nothing
+    if not isinstance(error, FileNotFoundError):  # the folder does not exist yet
         raise error
 
 

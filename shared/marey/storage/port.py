@@ -14,7 +14,7 @@ from marey.core.errors import InvalidInput, NotFound
 CHUNK = 1 << 20
 PRESIGN_SECONDS = 900
 PUBLIC = "the asset store does not answer"
-"""The message for clients of the API when the store is down, without its address."""
+"""Message for API clients when the store is down, without its address."""
 KEY = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
 
 
@@ -56,8 +56,8 @@ class NewObject:
 class AssetStore(Protocol):
     """A store of immutable objects. Safe to use from several threads.
 
-    Every method raises `Unreachable`, within bounded time, when the store does not answer or refuses the credentials;
-    `InvalidInput` for a key that is not one.
+    Every method raises `Unreachable`, within bounded time, when the store does not answer or refuses the
+    credentials; `InvalidInput` for an invalid key.
     """
 
     def prepare(self) -> None:
@@ -68,14 +68,14 @@ class AssetStore(Protocol):
         """Store bytes, or the content of a file, under `key`, atomically.
 
         Raises:
-            InvalidInput: the last part of `key` is a SHA-256, and not that of the content.
+            InvalidInput: the last part of `key` is a SHA-256 of other content.
         """
         ...
 
     def put_all(self, objects: Sequence[NewObject]) -> Iterator[str]:
         """Store a batch, faster than single `put` calls; yield the keys that are stored durably.
 
-        Nothing happens before it is read. When it raises, as `put` does, put again what it has not yielded.
+        Lazy: iterate to store. After an error, as of `put`, repeat the objects that were not yielded.
         """
         ...
 
@@ -120,7 +120,7 @@ class AssetStore(Protocol):
     def presign(self, key: str, *, filename: str, media_type: str, seconds: int = PRESIGN_SECONDS) -> str | None:
         """Return a URL that gives access to the object for `seconds`, as a download named `filename`.
 
-        None where the store has no URLs (a folder): send the content then.
+        None if the store has no URLs (a folder): send the content then.
         """
         ...
 
@@ -128,7 +128,7 @@ class AssetStore(Protocol):
         """Check that the store accepts objects now; for /readyz and doctor.
 
         Raises:
-            Unreachable: it would not.
+            Unreachable: it does not.
         """
         ...
 
@@ -145,7 +145,7 @@ def checked_key(key: str) -> str:
     """Validate `key` and return it: parts of letters, digits and `._-`, none beginning with a dot.
 
     Raises:
-        InvalidInput: it is not (an absolute path, `..`, a backslash, NUL, …).
+        InvalidInput: an invalid key (an absolute path, `..`, a backslash, NUL, …).
     """
     if not KEY.fullmatch(key) or len(key) > 512:
         raise InvalidInput(f"{key[:80]!r} is not a key of the asset store", where="key")
@@ -176,8 +176,8 @@ def range_past_end(key: str, start: int, size: int) -> InvalidInput:
 def read_chunks(file: BinaryIO, length: int) -> Iterator[bytes]:
     """Yield the next `length` bytes of an open file in chunks; the file is closed at the end.
 
-    No read asks for more than is left: it is given that much memory before the first byte is there, and most files
-    are a hundredth of a chunk.
+    No read requests more than is left: its buffer is allocated before the first byte arrives, and most files are a
+    hundredth of a chunk.
     """
     with file:
         left = length

@@ -34,11 +34,11 @@ from marey.storage.port import (
 )
 
 PROBE = "doctor/none"
-"""A key without an object."""
-PUTS_AT_ONCE = 8  # of one batch; half of the pool's connections
+"""Codes for a missing object."""
+PUTS_AT_ONCE = 8  # parallel uploads of one batch; half of the pool's connections
 MISSING = frozenset({"NoSuchKey", "404"})
 WORDLESS = frozenset({"AccessDenied", "BadRequest"})
-"""Codes that the SDK makes up where an answer has no body, as that to a HEAD."""
+"""Codes that the SDK invents for an answer without a body, such as that to a HEAD."""
 NO_BUCKET = "NoSuchBucket"
 _KEYS = "does not accept the keys", "Check MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY."
 _REGION = "is in another region", "Set MAREY_S3_REGION to that of the bucket."
@@ -59,7 +59,7 @@ REASONS = {
     "XMinioStorageFull": _FULL,
     "XMinioAdminBucketQuotaExceeded": _FULL,
 }
-"""What the object store does, and what to do about it, by the code of its answer."""
+"""Problem and advice by the code of the store's answer."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class S3Store:
             try:
                 self._client.make_bucket(bucket)
             except S3Error as error:
-                if error.code not in {"BucketAlreadyOwnedByYou", "BucketAlreadyExists"}:  # another process was quicker
+                if error.code not in {"BucketAlreadyOwnedByYou", "BucketAlreadyExists"}:  # another process created it
                     raise
 
     def put(self, key: str, source: bytes | Path, *, media_type: str = "application/octet-stream") -> Digest:
@@ -239,7 +239,7 @@ class S3Store:
         except (urllib3.exceptions.HTTPError, OSError) as error:
             if (why := verification_error(error)) is not None:
                 raise self._untrusted(why) from error
-            self._silence.note(error)  # in the midst of an object, where no retry sees it
+            self._silence.note(error)  # within an object, where no retry applies
             cause = getattr(error, "reason", None) or error
             raise self._unreachable(f"{type(cause).__name__}: {cause}") from error
 
@@ -254,7 +254,7 @@ class S3Store:
         except S3Error as better:
             return error if better.code in MISSING else better
         except (MinioException, urllib3.exceptions.HTTPError, OSError):
-            pass  # away by now: the first error is as good
+            pass  # unreachable by now: report the first error
         return error
 
     def _because(self, code: str, message: str | None = None) -> Unreachable:
@@ -288,7 +288,7 @@ def _client(options: S3Options, endpoint: str, silence: Silence) -> Minio:
         host,
         access_key=options.access_key,
         secret_key=options.secret_key,
-        region=options.region,  # else presigning asks the network for it
+        region=options.region,  # otherwise presigning requests it from the network
         secure=secure,
         http_client=open_pool(silence, trusting_context(options.ca_file) if secure else None),
     )

@@ -9,6 +9,6 @@ class ActionStart(NamedTuple):
     """Start of an action of the prompt in force."""
 
     frame: int
-    """The first that was drawn under it."""
+    """Number of the first frame of the action."""
     act: int
-    """Its number in its prompt, counted from 0."""
+    """Number of the action in its prompt, from 0."""

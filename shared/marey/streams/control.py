@@ -1,7 +1,7 @@
 """Control messages of clients to a running stream: from any API process to the worker that holds the stream.
 
-They lie in a Redis stream of their own and stay when the worker dies: the next one reads on from the last message that
-the durable state of the stream names.
+Messages are kept in a Redis stream of their own and survive the worker: its successor reads on from the last message
+that the stream's row names.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
@@ -46,7 +46,7 @@ class Control:
         """Decode a message.
 
         Raises:
-            InvalidInput: it is none that this release knows.
+            InvalidInput: unknown to this release.
         """
         try:
             message = json.loads(data)
@@ -84,12 +84,12 @@ class ControlQueue:
     def read(self, after: str = START, *, block_ms: int = 0) -> list[tuple[str, Control | InvalidInput]]:
         """Return all messages after the one with this id, oldest first, each with its own id.
 
-        A message that this release does not know comes as the error that says so: a worker that stopped at it would
-        stop at it for ever.
+        A message unknown to this release is returned as an error: a worker that stopped at it would never get past
+        it.
 
         Args:
-            after: id of the last message that was obeyed.
-            block_ms: how long to wait when there is none, at most 1 s; 0 does not wait.
+            after: id of the last applied message.
+            block_ms: time to wait if there is none, at most 1 s; 0 does not wait.
         """
         block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
         with reached(self.stream):

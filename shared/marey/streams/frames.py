@@ -10,13 +10,13 @@
     12      12    float32 x y z of the root, metres, Y up
     24      8 J   int16 w x y z of each joint's local rotation, times 32,767
 
-The order of joints, their parents and offsets are those of the stream's skeleton, which a client reads once. With them
-a frame drives a rig by forward kinematics alone.
+The order of joints, their parents and offsets are those of the stream's skeleton, which a client reads once.
+Together they drive a rig by forward kinematics alone.
 
-Rotations are quantised, the root is not. A turn is then off by at most 0.004 degrees, which puts no joint of a body
-0.3 mm away, for half the bytes (200 a frame on 22 joints, 376 with float32). A root, which may walk for hours, has no
-range to quantise over. Eight bytes a joint rather than six (the smallest three components) are what
-a browser reads as one `Int16Array`, without arithmetic on bits.
+Rotations are quantised, the root is not. A rotation is off by at most 0.004 degrees, less than 0.3 mm at any joint
+of a body, for half the bytes (200 a frame on 22 joints, 376 with float32). A root, which may walk for hours, has no
+range to quantise over. Eight bytes per joint rather than six (the smallest three components) let a browser read one
+`Int16Array`, without bit arithmetic.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ JOINT_BYTES = 8
 MOST_JOINTS = 512
 LAST = 1 << 4
 SCALE = 32767.0
-OFF_UNIT = 1e-3  # of a quaternion's length: rounding changes it by 3e-5, other bytes by far more
+OFF_UNIT = 1e-3  # of a quaternion's length: rounding changes it by 3e-5, other data by far more
 
 Float32 = NDArray[np.float32]
 
@@ -49,8 +49,8 @@ class Frame:
         root: (3,) metres.
         rotations: (J, 4) local unit quaternions `w x y z`.
         contacts: L ankle, L toe, R ankle, R toe stand.
-        prompt: which prompt was in force, from 0.
-        last: none comes after it.
+        prompt: number of the prompt in force, from 0.
+        last: True for the last frame.
     """
 
     number: int
@@ -87,7 +87,7 @@ def decode_frame(data: bytes, *, joints: int | None = None) -> Frame:
 
     Args:
         data: exactly one frame.
-        joints: J of the stream's skeleton, when it is known.
+        joints: J of the stream's skeleton, if known.
 
     Raises:
         InvalidInput: truncated, foreign, of another version or of another skeleton.

@@ -1,7 +1,7 @@
 """Notification of live workers about a new stream, ahead of their next poll of the rows.
 
-A counter that they compare twenty times a second. Who misses it, or has no Redis for a moment, finds the row half a
-second later: nothing depends on it but that half second.
+A counter that workers compare twenty times a second. A worker that misses a change, or has no Redis for a moment,
+finds the row half a second later; nothing else depends on it.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false

@@ -10,7 +10,7 @@ import redis
 from marey.streams.redis import reached, stream_key
 
 KEEP_MS = 10_000
-REFRESH_SECONDS = 3.0  # two may fail before the key is gone
+REFRESH_SECONDS = 3.0  # two refreshes may fail before the key expires
 
 
 class ViewerPresence:

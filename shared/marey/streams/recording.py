@@ -18,7 +18,7 @@ from marey.text.features import TextFeatures
 
 FORMAT = 1
 Prompts: TypeAlias = Sequence[tuple[int, str]]
-"""Texts with the frames from which they were in force."""
+"""Prompts with their first frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +28,8 @@ class Recording:
     Attributes:
         stream: its id.
         tokens: (T, V) int16.
-        prompts: the first begins at frame 0.
-        text: of the first prompt.
+        prompts: the first one begins at frame 0.
+        text: features of the first prompt.
     """
 
     stream: str

@@ -1,14 +1,15 @@
 """Frame streams on Redis: one worker writes, any number of API processes read, and readers can resume.
 
-A stream has four keys, all in one hash slot: `frames` (a Redis stream of the last 1,200 frames, one minute at 20 fps;
-frame n has the id `{n+1}-0`, since 0-0 is none), `lease` (who writes; gone 1.5 s after its last renewal), `fence` (the
-number of the newest lease) and `control` (`control.py`). All are gone an hour after the last write.
+A stream has four keys, all in one hash slot: `frames` (a Redis stream of the last 1,200 frames, one minute at 20
+fps; frame n has the id `{n+1}-0`, since 0-0 is invalid), `lease` (the writer; expires 1.5 s after its last
+renewal), `fence` (the number of the newest lease) and `control` (`control.py`). All expire an hour after the
+last write.
 
-Whoever writes holds the lease: the script that adds frames compares it in the same step, so a worker that was frozen
-and wakes up adds nothing after the stream moved on. A lease is known by its fencing number, for the rows that are
-written elsewhere, and by a random token, for a Redis that lost its memory and counts from the start again.
+A writer holds the lease: the script that adds frames compares it atomically, so a worker that was frozen and wakes
+up adds nothing after another one took the stream. A lease has a fencing number, for the rows in Postgres, and a
+random token, for a Redis that lost its memory and restarts counting.
 
-Every call raises `Unreachable` when Redis does not answer, is full or refuses.
+Every call raises `Unreachable` when Redis does not answer, is full or refuses the request.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
@@ -33,7 +34,7 @@ LEASE_MS = 1500
 RENEW_SECONDS = 0.4  # three renewals may fail before the lease is lost
 KEPT_FRAMES = 1200
 KEEP_MS = 3600 * 1000
-BLOCK_MS = 1000  # a read waits no longer: well under the deadline of a call, and a stopping process must look up
+BLOCK_MS = 1000  # a read waits no longer: well under the deadline of a call, and a stopping process must notice
 FIELD = b"f"
 STREAM_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -57,8 +58,8 @@ if redis.call('GET', KEYS[1]) ~= ARGV[1] then return 0 end
 return redis.call('DEL', KEYS[1])
 """
 
-# The id of the last frame is the number of the next. A write whose answer was lost is sent again by the client: the
-# same last frame under the same lease is that write.
+# The id of the last frame gives the number of the next. The client repeats a write whose answer was lost: the same last
+# frame under the same lease is that write.
 _WRITE = """
 if redis.call('GET', KEYS[1]) ~= ARGV[1] then return {'lost', 0} end
 local first, count = tonumber(ARGV[4]), #ARGV - 4
@@ -87,8 +88,8 @@ class Lease:
 
     Attributes:
         fence: goes up with every lease of the stream.
-        token: tells two leases of the same number apart.
-        next_frame: number that the next frame of the stream has; 0 when it has none here.
+        token: distinguishes two leases of the same number.
+        next_frame: number of the stream's next frame; 0 if Redis has none.
     """
 
     fence: int
@@ -121,12 +122,12 @@ class FrameStream:
     """The frames of one stream.
 
     Args:
-        client: answers in bytes (`decode_responses` off), with timeouts (`marey.runtime.queue.redis_client`).
+        client: returns bytes (`decode_responses` off), with timeouts (`marey.runtime.queue.redis_client`).
         stream: its id, 1 to 64 letters, digits, `_` and `-`.
-        lease_ms, kept, keep_ms: how long a lease lasts, how many frames are kept, how long an idle stream is.
+        lease_ms, kept, keep_ms: duration of a lease, number of kept frames, lifetime of an idle stream.
 
     Raises:
-        InvalidInput: the id is none.
+        InvalidInput: an invalid id.
     """
 
     def __init__(
@@ -153,10 +154,10 @@ class FrameStream:
         """Acquire the lease of the stream, if it is free.
 
         Args:
-            above: the highest fencing number that is known of it elsewhere; the new one is higher.
+            above: highest known fencing number; the new one is higher.
 
         Returns:
-            None while another lease runs.
+            None while another lease is valid.
         """
         token = secrets.token_hex(8)
         with reached(self.stream):
@@ -170,7 +171,7 @@ class FrameStream:
         """Extend the lease by 1.5 s; call it every 0.4 s.
 
         Raises:
-            LeaseLost: it is another's, or ran out.
+            LeaseLost: another worker has it, or it expired.
         """
         with reached(self.stream):
             kept = self._renew(keys=[self.lease_key], args=[lease.value, self._lease_ms])
@@ -186,9 +187,9 @@ class FrameStream:
         """Append frames, all or none. Idempotent.
 
         Raises:
-            LeaseLost: the lease is another's, or ran out.
-            Conflict: they do not follow the last frame of the stream.
-            InvalidInput: their numbers do not go up by one, or one cannot be encoded.
+            LeaseLost: another worker has it, or it expired.
+            Conflict: the frames do not follow the last frame of the stream.
+            InvalidInput: their numbers are not consecutive, or one cannot be encoded.
         """
         if not frames:
             return
@@ -231,7 +232,7 @@ class FrameReader:
     """One client's position in a stream: every frame once and in order, gaps reported with their size.
 
     Attributes:
-        at: number of the next frame to read; what a client that comes back gives.
+        at: number of the next frame to read; a client sends it to resume.
     """
 
     def __init__(self, client: Any, stream: FrameStream, at: int) -> None:
@@ -245,8 +246,8 @@ class FrameReader:
         """Return the next frames, a gap before those that follow it.
 
         Args:
-            count: at most so many frames.
-            block_ms: how long to wait when there is none, at most 1 s; 0 does not wait.
+            count: maximum number of frames.
+            block_ms: time to wait if there is none, at most 1 s; 0 does not wait.
         """
         block = min(block_ms, BLOCK_MS) if block_ms > 0 else None
         with reached(self._stream.stream):
@@ -272,7 +273,7 @@ def stream_key(stream: str, part: str) -> str:
     """Return a key of a stream; the braces put all of them in one hash slot.
 
     Raises:
-        InvalidInput: the id is none.
+        InvalidInput: an invalid id.
     """
     if not STREAM_ID.fullmatch(stream):
         raise InvalidInput("the id of a stream is 1 to 64 letters, digits, `_` and `-`", where=repr(stream[:80]))

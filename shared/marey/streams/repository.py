@@ -1,7 +1,7 @@
 """Live streams: rows with the state of each, and chunks of tokens from which it resumes after its worker died.
 
-Who may write a stream is decided on Redis (`marey.streams.redis`): a lease of 1.5 s with a fencing number. Every write
-of a worker here names that number, and changes nothing once a newer lease has written.
+Redis decides which worker writes a stream (`marey.streams.redis`): a lease of 1.5 s with a fencing number. Every
+write of a worker here names that number, and changes nothing once a newer lease has written.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ from marey.webhooks.types import EventKind
 
 OPEN = tuple(str(state) for state in OPEN_STREAMS)
 RETRY_SECONDS = 10
-"""When to ask again for a stream beyond the limit: it frees when one of the caller's own ends."""
+"""Retry delay above the limit: a slot is freed when one of the caller's own streams ends."""
 
 
 def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID:
     """Create a stream that waits for a worker.
 
     Args:
-        limit: how many may be open at once under one API key, where its tenant has no quota of its own.
+        limit: maximum of open streams per API key, if its tenant has no quota.
 
     Raises:
-        Busy: the key has that many.
+        Busy: the key has reached its limit.
         InvalidInput: text that the database cannot hold.
     """
     check_text(stream.prompt, "prompt")
     check_text(stream.name, "name")
     table = tables.stream
-    # The key's row is the lock: two requests at once count one after the other.
+    # The key's row is the lock: concurrent requests count one after the other.
     conn.execute(
         sa.select(tenant_tables.api_key.c.id).where(tenant_tables.api_key.c.id == stream.key).with_for_update()
     )
@@ -132,7 +132,7 @@ def stream_acts(conn: sa.Connection, stream: UUID) -> list[ActionStart]:
     return [ActionStart(*act) for acts in conn.execute(query).scalars() for act in acts]
 
 
-# --- what a worker does ---
+# --- functions for workers ---
 
 
 def open_streams(conn: sa.Connection, bundle: str, limit: int = 200) -> list[StreamRow]:
@@ -204,12 +204,12 @@ def end_stream(
     """End a stream; its clip, if it has one, becomes a job of one item.
 
     Args:
-        fence: number of the worker's lease; None = nobody holds it (the scheduler).
-        problem: it failed.
+        fence: number of the worker's lease; None = no worker holds it (the scheduler).
+        problem: reason of a failure.
         clip: the item, and the recording that its `text_key` names.
 
     Returns:
-        False when it was over before, or a newer lease was here.
+        False if it had ended before, or a newer lease exists.
     """
     table = tables.stream
     ours = (table.c.id == stream) & table.c.state.in_(OPEN)

@@ -9,6 +9,6 @@ class PromptRewrite(NamedTuple):
     """Text that the model received for a prompt."""
 
     rewritten: str
-    """The prompt itself where no rewriter changed it."""
+    """The prompt itself if no rewriter changed it."""
     not_rewritten: str | None = None
-    """Why what a rewriter made of it was not used."""
+    """Reason why a rewrite was not used."""

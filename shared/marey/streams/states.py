@@ -22,6 +22,6 @@ STREAM_TRANSITIONS: dict[StreamState, frozenset[StreamState]] = {
     StreamState.ENDED: frozenset(),
     StreamState.FAILED: frozenset(),
 }
-"""Allowed transitions of streams; the trigger `stream_transition` is the same table."""
+"""Allowed transitions of streams; the trigger `stream_transition` has the same table."""
 OPEN_STREAMS = frozenset({StreamState.WAITING, StreamState.LIVE, StreamState.PAUSED})
-"""States of streams that are not over."""
+"""States of open streams."""

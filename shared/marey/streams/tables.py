@@ -15,7 +15,7 @@ stream = sa.Table(
     sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
     sa.Column("key_id", Id, sa.ForeignKey("api_key.id"), nullable=False),
     sa.Column("name", sa.Text),
-    sa.Column("prompt", sa.Text, nullable=False),  # the first; later ones stand in chunks
+    sa.Column("prompt", sa.Text, nullable=False),  # the first prompt; later ones are in chunks
     sa.Column("model", sa.Text, nullable=False),
     sa.Column("bundle", sa.Text, nullable=False),
     sa.Column("seed", sa.Integer, nullable=False),
@@ -23,14 +23,14 @@ stream = sa.Table(
     sa.Column("state", sa.Text, nullable=False, server_default="waiting"),
     sa.Column("reason", sa.Text),
     sa.Column("problem", JSONB),
-    sa.Column("fence", sa.BigInteger, nullable=False, server_default="0"),  # number of the newest lease that wrote here
+    sa.Column("fence", sa.BigInteger, nullable=False, server_default="0"),  # number of the newest lease that wrote
     sa.Column("worker", sa.Text),
-    sa.Column("control", sa.Text, nullable=False, server_default="0-0"),  # id of the last message that was obeyed
-    sa.Column("frames", sa.Integer, nullable=False, server_default="0"),  # those whose tokens stand in chunks
-    sa.Column("job_id", Id, sa.ForeignKey("job.id", ondelete="SET NULL")),  # makes the clip, once it has ended
+    sa.Column("control", sa.Text, nullable=False, server_default="0-0"),  # id of the last applied message
+    sa.Column("frames", sa.Integer, nullable=False, server_default="0"),  # number of frames whose tokens are in chunks
+    sa.Column("job_id", Id, sa.ForeignKey("job.id", ondelete="SET NULL")),  # job of the clip, once the stream has ended
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.Column("started_at", Time),
-    sa.Column("seen_at", Time, nullable=False, server_default=NOW),  # its worker last wrote here
+    sa.Column("seen_at", Time, nullable=False, server_default=NOW),  # time of the worker's last write
     sa.Column("ended_at", Time),
     sa.CheckConstraint(one_of("state", list(StreamState)), name="state"),
     sa.CheckConstraint("(ended_at IS NULL) = (state IN ('waiting', 'live', 'paused'))", name="ended"),
@@ -51,7 +51,7 @@ stream_chunk = sa.Table(
     sa.Column("stream_id", Id, sa.ForeignKey("stream.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("first", sa.Integer, primary_key=True, autoincrement=False),  # number of its first frame
     sa.Column("tokens", BYTEA, nullable=False),  # int16, little-endian, a column of V levels a frame
-    sa.Column("prompts", JSONB, nullable=False),  # those that came into force in it: [[frame, text], ...]
-    sa.Column("reads", JSONB),  # how each of these was read: [[rewritten, why not], ...]; NULL: not written down
-    sa.Column("acts", JSONB),  # those that began in it: [[frame, number in its prompt], ...]; NULL: not written down
+    sa.Column("prompts", JSONB, nullable=False),  # prompts that came into force: [[frame, text], ...]
+    sa.Column("reads", JSONB),  # their rewrites: [[rewritten, reason why not], ...]; NULL: not recorded
+    sa.Column("acts", JSONB),  # action starts: [[frame, number in its prompt], ...]; NULL: not recorded
 )

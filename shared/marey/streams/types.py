@@ -20,10 +20,10 @@ class NewStream:
 
     Args:
         key: the caller's API key.
-        prompt: the first.
+        prompt: the first prompt.
         bundle: the exact bundle.
         seed: 0 … 2³¹ − 1.
-        max_frames: after which it ends by itself.
+        max_frames: number of frames after which it ends.
     """
 
     tenant: str
@@ -50,16 +50,16 @@ class StreamRow:
     max_frames: int
     state: StreamState
     position: int | None
-    """How many wait before it; None when it does not wait."""
+    """Number of streams that wait before it; None if it does not wait."""
     reason: str | None
     problem: Problem | None
     fence: int
     worker: str | None
     control: str
     frames: int
-    """How many are on record; a second less than were shown, at most."""
+    """Number of recorded frames; at most a second less than shown."""
     job: UUID | None
-    """Makes its clip."""
+    """Job of the clip."""
     created: datetime
     started: datetime | None
     ended: datetime | None
@@ -69,10 +69,10 @@ class StreamPrompt(NamedTuple):
     """A prompt of a stream as viewers receive it."""
 
     frame: int
-    """From which it was in force."""
+    """First frame."""
     prompt: str
     read: PromptRewrite | None = None
-    """None where that is not on record."""
+    """None if not recorded."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class StreamPast:
 
     Attributes:
         tokens: int16, little-endian, a column of V levels for each of `row.frames`.
-        prompts: every prompt with the frame from which it was in force; none before the first frame.
-        acts: the acts of all these prompts that began.
+        prompts: every prompt with its first frame; none before the first frame.
+        acts: starts of actions of all these prompts.
     """
 
     row: StreamRow
@@ -99,10 +99,10 @@ class StreamChunk:
         first: number of its first frame.
         frames: how many.
         tokens: int16, little-endian, a column of V levels a frame.
-        prompts: those that came into force in it; `reads`, of as many, says how each was read.
-        control: id of the last message that was obeyed.
-        state: live or paused; None = as before.
-        acts: those that began in it.
+        prompts: prompts that came into force; `reads`, of the same length, has their rewrites.
+        control: id of the last applied message.
+        state: live or paused; None = unchanged.
+        acts: starts of actions.
     """
 
     first: int

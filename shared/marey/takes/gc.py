@@ -36,8 +36,8 @@ class ObjectStore(Protocol):
 def collect_garbage(engine: sa.Engine, store: ObjectStore) -> GarbageReport:
     """Remove unreferenced assets (unless a live lease announced them), and objects without a row.
 
-    Each removal holds the lock of its asset row, so that a worker about to write the same content waits and writes it
-    anew. Keys outside `t/` are not ours and stay.
+    Each removal holds the lock of its asset row, so that a worker about to write the same content waits and writes
+    it again. Keys outside `t/` belong to other programs and stay.
 
     Raises:
         Unreachable: the store or the database does not answer; what was removed until then stays removed.
@@ -71,7 +71,7 @@ def remove_unused_assets(engine: sa.Engine, store: ObjectStore) -> int:
     `collect_garbage`.
 
     Raises:
-        Unreachable: the store or the database does not answer; what is left goes the next time.
+        Unreachable: the store or the database does not answer; the rest is removed the next time.
     """
     return _remove_unreferenced(engine, store, _unreferenced() & (job_tables.asset.c.state == "stored"))
 
@@ -92,7 +92,7 @@ def _remove_unreferenced(engine: sa.Engine, store: ObjectStore, condition: sa.Co
     removed = 0
     for candidate in candidates:
         with transaction(engine, MAINTENANCE) as conn:
-            # The row first, then the question: whoever announced it meanwhile is seen now, who comes later waits.
+            # Lock the row first, then check: earlier announcements are seen now, later ones wait.
             row = conn.execute(
                 sa.select(table.tenant_id, table.sha256).where(table.id == candidate).with_for_update()
             ).one_or_none()
@@ -147,4 +147,4 @@ def _missing(engine: sa.Engine, store: ObjectStore, found: set[str]) -> tuple[st
     lacking = {asset_key(row.tenant_id, row.sha256) for row in rows} - found
     if not lacking:
         return ()
-    return tuple(sorted(lacking - set(store.keys("t/"))))  # stored after the listing: no loss
+    return tuple(sorted(lacking - set(store.keys("t/"))))  # stored after the listing: not lost

@@ -31,7 +31,7 @@ def list_motions(
 
     Raises:
         NotFound: the tenant has no such job.
-        InvalidInput: a filter that holds what no text can.
+        InvalidInput: a filter with forbidden characters.
     """
     if job is not None:
         get_job(conn, tenant, job)
@@ -39,7 +39,7 @@ def list_motions(
         ids = find_motions(conn, tenant, found, job=job, cursor=cursor, limit=page_limit(limit) + 1)
         with fetching_by_id(conn):
             rows = {row.id: row for row in read_motions(conn, among(tables.motion.c.id, ids))}
-        # Between the two statements another transaction may have deleted some: that is not the end of the listing.
+        # Another transaction may have deleted some in between: that is not the end of the listing.
         kept = tuple(rows[each] for each in ids[:limit] if each in rows)
         if len(ids) <= limit:
             return Page(kept, None)

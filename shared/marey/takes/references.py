@@ -1,8 +1,8 @@
 """Short references: the last digits of an id, a name, `last`, a motion's place in its job.
 
-All readings of a reference are looked up, each by an index, within one tenant. Readings that agree are one match; where
-they do not, every match is answered and the caller says that the reference is ambiguous. None wins over another, but
-a whole id, which has no other reading.
+All readings of a reference are looked up, each by an index, within one tenant. Equal readings are one match;
+otherwise all matches are returned and the caller reports the reference as ambiguous. No reading has precedence,
+except a whole id, which has no other reading.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from marey.webhooks.repository import get_webhook
 
 LAST = "last"
 SHORT = 8
-"""Digits of a short id: the last of a UUIDv7, which are random; the first are those of all its batch."""
+"""Digits of a short id: the last of a UUIDv7, which are random; the first are shared by all ids of a batch."""
 MOST = 10
-"""Matches that are answered."""
+"""Maximum number of returned matches."""
 MAX_REFERENCE = 300
 _DIGITS = re.compile(rf"[0-9a-f]{{{SHORT},31}}", re.IGNORECASE)
 _WHOLE = re.compile(r"[0-9a-f]{8}-?([0-9a-f]{4}-?){3}[0-9a-f]{12}", re.IGNORECASE)
@@ -62,9 +62,9 @@ class ReferenceMatch:
     created: datetime
     state: str | None = None
     items: int | None = None
-    """Of a job."""
+    """Job of a motion."""
     job: UUID | None = None
-    """Of a motion; with its place there."""
+    """Index of a motion in its job."""
     index: int | None = None
     variant: int | None = None
 
@@ -96,10 +96,10 @@ def resolve_reference(
     Args:
         reference: a whole id; its last 8 to 31 digits; a name; `last` for the newest; of a motion also `JOB:INDEX` or
             `JOB:INDEX.VARIANT`, where JOB is any reference to a job.
-        webhook: whose delivery; a delivery is known by its event.
+        webhook: the webhook of a delivery; a delivery is named by its event.
 
     Raises:
-        InvalidInput: a text that is no reference, or a delivery without its webhook.
+        InvalidInput: not a reference, or a delivery without its webhook.
         NotFound: the tenant has no such webhook.
     """
     check_text(reference, "reference")
@@ -148,7 +148,7 @@ def _read(
     """Return the newest rows of each reading, and the newest of all for `last`."""
     rows: list[Sequence[Any]] = []
     for reading in readings:
-        # A fence: by the order of creation the planner would walk the whole listing for what is rare.
+        # Optimization fence: in creation order the planner would walk the whole listing for rare matches.
         fitting = query.where(reading).offset(0).subquery("fitting")
         newest = fitting.c[created.name].desc(), fitting.c[identifier.name].desc()
         rows += conn.execute(sa.select(fitting).order_by(*newest).limit(MOST)).all()
@@ -179,7 +179,7 @@ def _motions(conn: sa.Connection, tenant: str, reference: str) -> list[Reference
     if place := _PLACE.fullmatch(reference):
         jobs = _newest(_rows(conn, tenant, ReferenceKind.JOB, place["job"]))
         if len(jobs) > 1:
-            return jobs  # which of them is meant comes first
+            return jobs  # the intended one comes first
         ids += [motion for job in jobs for motion in motions_at(conn, job.id, int(place["index"]))]
     variant = None if place is None or place["variant"] is None else int(place["variant"])
     motion, item = job_tables.motion.c, job_tables.item.c

@@ -28,12 +28,13 @@ from marey.takes.gc import ObjectStore, remove_unused_assets
 from marey.takes.types import Erasure
 
 ROUND = 200
-"""Jobs or files of one round."""
+"""Jobs or files per round."""
 KEPT = (
     *("model", "bundle", "weights_sha256", "random_weights", "licence", "seed", "settings", "software"),
     *("feet_cleaned", "stream"),
 )
-"""What a manifest says besides its prompt. All else goes: what is added later is gone until it is named here."""
+"""Manifest keys other than the prompt that are kept. All others are removed: a new key is removed until it is listed
+here."""
 
 LATE = sa.text("""
     SELECT id, tenant_id FROM job
@@ -66,7 +67,7 @@ FORGET = (
     "DELETE FROM idempotency WHERE job_id = :job",
     "UPDATE job SET erased_at = clock_timestamp() WHERE id = :job",
 )
-"""Everything of the database that holds words of a prompt, or a hash by which they could be guessed."""
+"""All columns of the database with words of a prompt, or a hash from which they could be guessed."""
 
 FORGET_TEXTS = sa.text("""
     DELETE FROM text_features
@@ -113,7 +114,7 @@ def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
             with transaction(engine, BULK) as conn:
                 refuse_needed(conn, tenant, job)
                 lock_job_of(conn, tenant, job)
-                if conn.execute(LATE, {"job": job, "limit": 1}).one_or_none() is not None:  # not gone on meanwhile
+                if conn.execute(LATE, {"job": job, "limit": 1}).one_or_none() is not None:  # still expired
                     delete(conn, tenant, job)
                     deleted += 1
         except (Conflict, NotFound):
@@ -131,7 +132,7 @@ def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
 
     Raises:
         NotFound: the tenant has no such job.
-        Conflict: it has open items, or an evaluation made it, whose prompts and report stand elsewhere.
+        Conflict: it has open items, or an evaluation made it, whose prompts and report are stored separately.
     """
     _refuse_evaluations(conn, tenant, job)
     locked = lock_job_of(conn, tenant, job)
@@ -150,10 +151,10 @@ def rewrite_files(engine: sa.Engine, store: FileStore, scrub: Callable[[bytes], 
     """Rewrite the files of erased jobs, and remove the old ones; return their number.
 
     Args:
-        scrub: a file's bytes without its prompt; a file that it cannot read (`InvalidFile`) is removed.
+        scrub: returns a file's bytes without its prompt; a file that it cannot read (`InvalidFile`) is removed.
 
     Raises:
-        Unreachable: the store or the database does not answer; what was not done is done the next time.
+        Unreachable: the store or the database does not answer; the rest is done the next time.
     """
     with transaction(engine, MAINTENANCE) as conn:
         waiting = _waiting(conn)
@@ -193,7 +194,7 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     for statement in FORGET:
         values = {"job": job.id} | ({"kept": list(KEPT)} if ":kept" in statement else {})
         conn.execute(sa.text(statement), values)
-    # Whoever is submitting just now may have seen these features and counts on them: wait for it, and look then.
+    # A concurrent submit may have seen these features and rely on them: wait for it, then check.
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
     conn.execute(FORGET_TEXTS, {"keys": list(keys)})
     record(conn, job, [NewEvent("erased", f"prompts erased by {by}")])

@@ -26,7 +26,7 @@ from marey.takes.types import Reroll
 from marey.tenants.quotas import reserve_quotas
 
 MAX_REVIEWED = 1000
-"""Motions of one call."""
+"""Motions per call."""
 
 
 def review(
@@ -41,15 +41,15 @@ def review(
     """Set the verdict on motions; None removes it. An equal verdict changes nothing.
 
     Args:
-        by: who says it.
-        comment: why; None leaves the one that stands there, where the verdict stands too.
+        by: name of the reviewer.
+        comment: reason; None keeps the stored one if the verdict is unchanged.
 
     Returns:
         The motions, in the order given.
 
     Raises:
         NotFound: the tenant lacks one of them; nothing is written.
-        InvalidInput: none, too many, or a verdict that is no verdict (see `reroll`).
+        InvalidInput: none, too many, or an invalid verdict (see `reroll`).
     """
     if verdict is Review.REROLLED:
         raise InvalidInput("a motion is re-rolled by `reroll`", where="verdict")
@@ -76,21 +76,21 @@ def reroll(
 ) -> list[Reroll]:
     """Request another take of motions: each a new item of the same job, with the next seed of its prompt.
 
-    A motion has one take after it: asked again, the same item is answered. To go on, re-roll that take.
+    A motion has at most one re-roll: a repeated request returns the same item. To continue, re-roll that take.
 
     Args:
-        make: the item to make again, as a row of a job; number, seed and variant are filled in here.
+        make: returns the item to repeat, as a row of a job; number, seed and variant are filled in here.
         by, comment: as in `review`; the motions are marked re-rolled.
 
     Returns:
-        One a motion, in the order given.
+        One take per motion, in the order given.
 
     Raises:
         NotFound: the tenant lacks one of them; nothing is written.
-        InvalidInput: none, too many, or what `make` raises.
-        Conflict: prompts were erased, an evaluation that is not over counts the job's items, or a motion is the clip of
-            a live stream.
-        QuotaUsedUp: the tenant's quotas have no room for them.
+        InvalidInput: none, too many, or an error of `make`.
+        Conflict: prompts were erased, an open evaluation counts the job's items, or a motion is the clip of a live
+            stream.
+        QuotaUsedUp: the tenant's quotas do not allow them.
     """
     _check(motions, comment)
     rows = motions_of(conn, tenant, motions)
@@ -150,7 +150,7 @@ def _roll_again(
     ]
     lanes = write_items(conn, job.id, takes, first=numbers.position)
     told = f"{len(takes)} motions re-rolled by {by}" + (f": {comment}" if comment else "")
-    # What had ended goes on now; a pause of what is still open holds.
+    # Ended jobs continue; the pause of a job with open items stays.
     control = JobControl.RUN if job.state in ENDED else None
     record(conn, job, [NewEvent("rerolled", told, data={"items": len(takes)})], added=len(takes), control=control)
     change_lanes(conn, job.id, {lane: LaneChange(ready=count) for lane, count in lanes.items()})

@@ -1,14 +1,14 @@
 """Search among a million motions: two query plans, each forced, since the planner would choose badly.
 
-`motion_search` holds a row of each motion, and its `terms` all that a filter names. A page is looked for
+`motion_search` has a row per motion, and its `terms` cover all filters. A page is searched
 
-1. newest first, among the `WALKED` motions that come next: a filter that much fits is satisfied at once;
-2. through the index of terms, which intersects all conditions of the filter and answers what fits, however old; those
-   rows alone are sorted. What comes here is either rare, or older than all that was walked.
+1. newest first, among the next `WALKED` motions: fast for a filter that matches often;
+2. through the index of terms, which intersects all conditions of the filter, however old the matches; only those
+   rows are sorted. The matches are either rare, or older than all walked ones.
 
-The cost is bounded by the walk plus the rows that fit, never by the rows that there are. Without statistics (after a
-bulk load), or with those of another day, the planner would walk the primary key or read the whole table instead: so
-each statement runs with settings that leave it one plan.
+The cost is bounded by the walk plus the matching rows, independent of the table size. Without statistics (after a
+bulk load), or with old ones, the planner would walk the primary key or read the whole table instead: so each
+statement runs with settings that leave it one plan.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from marey.jobs import tables
 from marey.takes.types import MotionFilter
 
 WALKED = 20_000
-"""Motions that are looked at in order before the index is asked: some 10 ms."""
+"""Motions walked in order before the index is used: about 10 ms."""
 UNREVIEWED = "new"
 VARIANTS = 1000
-"""Motions of one prompt that are looked at, by its index."""
+"""Maximum motions of one prompt, by its index."""
 
 _PLAIN = {"jit": "off", "max_parallel_workers_per_gather": "0", "work_mem": "32MB"}
 _SWITCHES = ("seqscan", "indexscan", "indexonlyscan", "bitmapscan", "sort", "hashjoin", "mergejoin")
@@ -45,7 +45,7 @@ def find_motions(
     """Return ids of the motions that match a filter: of a job in creation order; of the whole tenant newest first.
 
     Raises:
-        InvalidInput: a filter that holds what no text can, or a cursor of something else.
+        InvalidInput: a filter with forbidden characters, or a cursor of another listing.
     """
     table = tables.motion_search.c
     order = Order(table.created_at, table.motion_id, descending=job is None)
@@ -67,7 +67,7 @@ def find_motions(
     matches = (
         sa.select(table.motion_id, table.created_at)
         .where(_has(table.terms, scope), *_conditions(found, table.terms))
-        .offset(0)  # a fence: neither the order nor the page's condition gets into it
+        .offset(0)  # optimization fence: order and page condition stay outside
         .subquery("matches")
     )
     order = Order(matches.c.created_at, matches.c.motion_id, descending=job is None)
@@ -99,7 +99,7 @@ def _plan(conn: sa.Connection, allowed: Sequence[str]) -> Generator[None]:
     """Restrict the planner to these scan types until the end of the block."""
     wanted = {**_PLAIN, **{f"enable_{name}": "on" if name in allowed else "off" for name in _SWITCHES}}
     conn.exec_driver_sql("; ".join(f"SET LOCAL {name} = '{value}'" for name, value in wanted.items()))
-    yield  # after an error the transaction is over, and with it the settings
+    yield  # after an error the transaction has ended, and with it the settings
     conn.exec_driver_sql("; ".join(f"SET LOCAL {name} TO DEFAULT" for name in wanted))
 
 

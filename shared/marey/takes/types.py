@@ -15,15 +15,15 @@ class MotionFilter:
     """Filter of a motion listing: all given conditions must match."""
 
     tags: Sequence[str] = ()
-    """All of them, as written."""
+    """All of these tags."""
     name: str | None = None
-    """How the name begins, in any case."""
+    """Prefix of the name, case-insensitive."""
     text: str | None = None
-    """Words of the prompt in any form and order; "a phrase", or, -not as on the web."""
+    """Words of the prompt in any form and order; "a phrase", or, -not as in web search."""
     reviews: Sequence[Review] = ()
-    """One of these."""
+    """One of these verdicts."""
     unreviewed: bool = False
-    """Or not looked at yet."""
+    """Or not reviewed yet."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Reroll:
     seed: int
     state: ItemState
     made: bool
-    """Now; else it was asked for before."""
+    """True if created now; else it existed before."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class GarbageReport:
     """Result of a garbage collection."""
 
     rows: int
-    """Asset rows that nothing refers to, with their objects."""
+    """Unreferenced asset rows, with their objects."""
     orphans: int
     """Objects without a row."""
     missing: tuple[str, ...]
-    """Keys of rows whose object is not in the store: data loss, told, never hidden."""
+    """Keys of rows whose object is missing in the store: data loss, always reported."""
 
 
 @dataclass(frozen=True)
@@ -58,4 +58,4 @@ class Erasure:
     job: UUID
     erased: datetime
     files_left: int
-    """Files that are still to be written anew; nobody gets them before."""
+    """Files that still wait to be rewritten; they are not served before."""

@@ -21,8 +21,8 @@ def audit(conn: sa.Connection, tenant: str, actor: Actor, verb: str, target: obj
 
     Args:
         verb: noun and verb: "job.cancel".
-        target: identifier of what it was done to.
-        data: what tells it apart (a count, a priority); never a prompt, never a secret.
+        target: identifier of the changed object.
+        data: details (a count, a priority); never a prompt, never a secret.
     """
     conn.execute(
         sa.insert(tables.audit_event).values(

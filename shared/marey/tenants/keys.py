@@ -23,14 +23,14 @@ from marey.tenants.repository import get_tenant
 from marey.tenants.types import DEFAULT_TENANT, ApiKey, NewApiKey
 
 SCOPES = frozenset({"read", "submit", "operate", "admin", "metrics"})
-"""`admin` holds the first three; none of them holds `metrics`, which tells of all tenants."""
+"""`admin` includes the first three scopes; none includes `metrics`, which covers all tenants."""
 FORM = re.compile(r"marey_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 NOTE_USE_EVERY = 60.0  # seconds; a write per request would be a hot row
 UNUSED = tables.api_key.c.last_used_at.is_(None) | (tables.api_key.c.last_used_at < CLOCK - interval(NOTE_USE_EVERY))
 NEW = "Make one: `marey admin keys create`."
 LONGEST_LIFE = 100 * 365 * 86_400.0
 OVERLAP = 86_400.0
-"""Seconds that a rotated key still works: a day to bring the new one everywhere."""
+"""Seconds that a rotated key stays valid: a day to distribute the new one."""
 
 
 def create_key(
@@ -44,14 +44,15 @@ def create_key(
 ) -> NewApiKey:
     """Create a key `marey_<prefix>_<secret>`.
 
-    A plain SHA-256 is enough for it: the secret has 256 random bits, nothing to guess from a list.
+    A plain SHA-256 is sufficient: the secret has 256 random bits and cannot be guessed.
 
     Args:
         lifetime: seconds until it expires; None = never.
-        rates: its own rate limits, by class of request (`marey.core.rates`), before those of the server.
+        rates: the key's own rate limits, by class of request (`marey.core.rates`), which override those of the
+            server.
 
     Raises:
-        InvalidInput: control characters in the name; an unknown scope, or none; a lifetime or rate that cannot be.
+        InvalidInput: control characters in the name; an unknown scope, or none; an invalid lifetime or rate.
         NotFound: no such tenant.
     """
     check_text(name, where="name")
@@ -111,7 +112,7 @@ def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
     if not row["unused"]:
         return key
     note = sa.update(tables.api_key).where(table.id == key.id, UNUSED).values(last_used_at=CLOCK)
-    used = conn.execute(note.returning(table.last_used_at)).scalar_one_or_none()  # none: another request was first
+    used = conn.execute(note.returning(table.last_used_at)).scalar_one_or_none()  # or a concurrent request
     return key if used is None else replace(key, last_used=used)
 
 
@@ -152,12 +153,12 @@ def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = 
     """Replace a key by a new one with its name, scopes, rates and lifetime; the old one works until the overlap ends.
 
     Args:
-        overlap: seconds; 0 = the old one is invalid from now on. Never longer than it would have lived.
+        overlap: seconds; 0 = the old key is invalid at once. Never longer than its own lifetime.
 
     Raises:
         NotFound: the tenant has no such key.
         Conflict: it is revoked, expired, or was rotated before.
-        InvalidInput: an overlap that cannot be.
+        InvalidInput: an invalid overlap.
     """
     if not 0 <= overlap <= LONGEST_LIFE:
         raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap")
@@ -177,7 +178,7 @@ def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = 
             raise Conflict(f"this key {what}", where=f"key {key}", hint=NEW)
     lifetime = None if old.expires is None else (old.expires - old.created).total_seconds()
     new = _make_key(conn, old.name, old.scopes, tenant=tenant, lifetime=lifetime, rates=old.rates)
-    ends = sa.func.least(table.expires_at, CLOCK + interval(overlap))  # least() leaves out what is null
+    ends = sa.func.least(table.expires_at, CLOCK + interval(overlap))  # least() ignores null
     conn.execute(sa.update(tables.api_key).where(ours).values(expires_at=ends, replaced_by=new.key.id))
     return new
 
@@ -240,7 +241,7 @@ FIELDS = {
     "replaced_by": "replaced_by",
     "rates": "rates",
 }
-"""Columns, and what they are called in `ApiKey`."""
+"""Columns by field of `ApiKey`."""
 
 
 def _keys() -> sa.Select[*tuple[Any, ...]]:

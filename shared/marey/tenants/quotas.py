@@ -1,9 +1,9 @@
 """Use of a tenant's quotas, and checks against them.
 
-No counter is kept for this, so none can drift: queued and running items are those of the counters on the tenant's open
-jobs, which change in the transactions of the items themselves; bytes are summed over the rows of the files. Who needs
-room takes the lock of the tenant's row, counts, and commits what it takes: two at once count one after the other.
-Tenants without quotas pay nothing of that.
+Nothing is counted separately, so no counter can drift: queued and running items are those of the counters on the
+tenant's open jobs, which change in the transactions of the items themselves; bytes are summed over the rows of
+the files. A transaction that needs quota locks the tenant's row, counts, and commits: concurrent ones count one
+after the other. Tenants without quotas have no overhead.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from marey.tenants.repository import get_tenant
 from marey.tenants.types import QuotaHeadroom, Usage
 
 EXPECTED_BYTES = 512 * 2**10
-"""Of a motion's files where the tenant has none yet: five seconds as npz and BVH."""
-MEASURED = 200  # newest motions that say what the next will take
+"""Estimated file size of a motion for a tenant without any: five seconds as npz and BVH."""
+MEASURED = 200  # newest motions used to estimate the size of the next
 QUEUE_SECONDS, BYTES_SECONDS = 30, 3600
-"""When to ask again: the queue moves by itself, files go when somebody deletes them."""
+"""Retry delays: the queue moves by itself, bytes are freed by deletions."""
 
 OPEN_ITEMS = sa.text("""
     SELECT coalesce(sum(ready + leased), 0)::bigint AS queued, coalesce(sum(leased), 0)::bigint AS running
@@ -57,7 +57,7 @@ def check_queue(conn: sa.Connection, tenant: str, items: int) -> None:
     checked, and concurrent requests may take the same capacity.
 
     Raises:
-        QuotaUsedUp: it has not.
+        QuotaUsedUp: the queue is full.
         NotFound: there is no such tenant.
     """
     quotas = get_tenant(conn, tenant).quotas
@@ -69,7 +69,7 @@ def check_quotas(conn: sa.Connection, tenant: str, items: int) -> tuple[QuotaHea
     """Return the demand of more items on each quota of a tenant; concurrent requests may take the same capacity.
 
     Raises:
-        QuotaUsedUp: one has no room for them.
+        QuotaUsedUp: a quota is exhausted.
         NotFound: there is no such tenant.
     """
     quotas = get_tenant(conn, tenant).quotas
@@ -91,7 +91,7 @@ def reserve_quotas(conn: sa.Connection, tenant: str, items: int) -> None:
     """Run `check_quotas`, and reserve the capacity until the transaction ends.
 
     Raises:
-        QuotaUsedUp, NotFound: as it.
+        QuotaUsedUp, NotFound: as `check_quotas`.
     """
     quotas = get_tenant(conn, tenant).quotas
     if quotas.queued is None and quotas.bytes is None:

@@ -24,11 +24,11 @@ def create_tenant(conn: sa.Connection, tenant: str, quotas: Quotas | None = None
     """Create a tenant.
 
     Args:
-        tenant: its name, which stands in the keys of its files.
+        tenant: its name, part of its files' keys.
 
     Raises:
-        InvalidInput: a name or quota that cannot be.
-        Conflict: there is one of that name.
+        InvalidInput: an invalid name or quota.
+        Conflict: the name is taken.
     """
     if not FORM.fullmatch(tenant):
         raise InvalidInput(
@@ -65,7 +65,7 @@ def set_quotas(conn: sa.Connection, tenant: str, changes: Mapping[str, int | Non
 
     Raises:
         NotFound: there is no such tenant.
-        InvalidInput: of a quota.
+        InvalidInput: an invalid quota.
     """
     get_tenant(conn, tenant)
     values = _columns(changes)

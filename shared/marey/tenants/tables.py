@@ -12,13 +12,13 @@ tenant = sa.Table(
     metadata,
     sa.Column("id", sa.Text, primary_key=True),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
-    sa.Column("suspended_at", Time),  # set = no request is answered, nothing is claimed
-    # Quotas; null = none. What is used of them is counted where it stands: a counter of its own could drift.
+    sa.Column("suspended_at", Time),  # set = requests are refused, items are not claimed
+    # Quotas; null = none. Their use is computed from the items and files: a separate counter could drift.
     sa.Column("max_queued", sa.Integer),
     sa.Column("max_running", sa.Integer),
     sa.Column("max_bytes", sa.BigInteger),
     sa.Column("max_streams", sa.Integer),  # open ones of one key; null = MAREY_STREAMS_PER_KEY
-    sa.CheckConstraint("id ~ '^[a-z0-9][a-z0-9_-]{0,62}$'", name="id"),  # it stands in the keys of the asset store
+    sa.CheckConstraint("id ~ '^[a-z0-9][a-z0-9_-]{0,62}$'", name="id"),  # part of the keys of the asset store
     sa.CheckConstraint("least(max_queued, max_running, max_bytes, max_streams) >= 0", name="quotas"),
 )
 
@@ -32,24 +32,24 @@ api_key = sa.Table(
     sa.Column("secret_sha256", BYTEA, nullable=False),
     sa.Column("scopes", ARRAY(sa.Text), nullable=False),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
-    sa.Column("last_used_at", Time),  # within a minute
+    sa.Column("last_used_at", Time),  # precise to a minute
     sa.Column("expires_at", Time),
     sa.Column("revoked_at", Time),
-    sa.Column("replaced_by", Id, sa.ForeignKey("api_key.id")),  # it was rotated
-    sa.Column("rates", JSONB, nullable=False, server_default=sa.text("'{}'")),  # {"submit": "60/minute"}: its own
+    sa.Column("replaced_by", Id, sa.ForeignKey("api_key.id")),  # the key it was rotated to
+    sa.Column("rates", JSONB, nullable=False, server_default=sa.text("'{}'")),  # {"submit": "60/minute"}
     sa.Index("ix_api_key_tenant_id_id", "tenant_id", "id"),
     sa.Index("ix_api_key_short_id", "tenant_id", short_id()),
 )
 
-# Who did what, when. Refers to nothing: it outlives what it is about.
+# The audit log. Without foreign keys: it outlives its subjects.
 audit_event = sa.Table(
     "audit_event",
     metadata,
     sa.Column("id", Id, primary_key=True),
     sa.Column("at", Time, nullable=False),
     sa.Column("tenant_id", sa.Text, nullable=False),
-    sa.Column("key_id", Id),  # null = somebody beside the database (`marey admin`)
-    sa.Column("actor", sa.Text, nullable=False),  # name of the key, or who ran the command
+    sa.Column("key_id", Id),  # null = an operator at the database (`marey admin`)
+    sa.Column("actor", sa.Text, nullable=False),  # name of the key, or of the user who ran the command
     sa.Column("verb", sa.Text, nullable=False),
     sa.Column("target", sa.Text, nullable=False),
     sa.Column("data", JSONB, nullable=False),  # no prompts, no secrets

@@ -15,11 +15,11 @@ class Quotas:
     """Quotas of a tenant; None = unlimited."""
 
     queued: int | None = None
-    """Items that are not done yet: waiting or being made."""
+    """Open items: queued or running."""
     running: int | None = None
-    """Items being made."""
+    """Running items."""
     bytes: int | None = None
-    """Of its files in the asset store, with those that are expected of its queued items."""
+    """Bytes of its files in the asset store, including the expected files of queued items."""
     streams: int | None = None
     """Open live streams of one key; None = `MAREY_STREAMS_PER_KEY`."""
 
@@ -31,11 +31,11 @@ class Usage:
     queued: int
     running: int
     bytes: int
-    """Stored."""
+    """Stored bytes."""
     expected: int
-    """Bytes that its queued items will likely leave."""
+    """Expected bytes of queued items."""
     streams: int
-    """Open ones, of all its keys."""
+    """Open streams of all its keys."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class QuotaHeadroom:
     """`queued` or `bytes`."""
     limit: int
     stands: int
-    """Queued, or stored."""
+    """Queued items, or stored bytes."""
     expected: int
-    """Bytes that the queued items will likely leave."""
+    """Expected bytes of queued items."""
     asked: int
 
     @property
@@ -83,11 +83,11 @@ class ApiKey:
     scopes: tuple[str, ...]
     created: datetime
     last_used: datetime | None
-    """Within a minute."""
+    """Precise to a minute."""
     expires: datetime | None
     revoked: datetime | None
     replaced_by: UUID | None
-    """The key it was rotated to."""
+    """The key that replaced it."""
     rates: Mapping[str, str]
     """Rate limits of its own, by class of request: {"submit": "60/minute"}."""
 
@@ -105,7 +105,7 @@ class Actor:
     """The originator of an action."""
 
     name: str
-    """Of the API key, or of the person at the command line."""
+    """Name of the API key, or of the user at the command line."""
     key: UUID | None = None
 
 
@@ -121,5 +121,5 @@ class AuditRow:
     verb: str
     """Noun and verb: "job.cancel"."""
     target: str
-    """What it was done to: the identifier of a job, a key, a tenant."""
+    """Identifier of the changed object: a job, a key, a tenant."""
     data: Mapping[str, object]

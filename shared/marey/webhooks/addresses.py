@@ -1,7 +1,8 @@
 """Addresses that webhooks may reach: public ones, unless `MAREY_WEBHOOK_ALLOW` allows others.
 
-A webhook is a request that somebody else chose and this machine sends: without a rule it reaches what only this machine
-may reach. What counts is the address that is connected to, never how it was written or what a name led to earlier.
+A webhook is a request that a tenant chose and this machine sends: without a policy it could reach internal services.
+The policy applies to the address that is connected to, never to how it was written or what a name resolved to
+earlier.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."
 def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
     """Return the address to connect to, from the addresses of a name.
 
-    One that may not be told spoils them all: a name that leads inside and outside is a trick or a mistake.
+    One forbidden address rejects all: a name with public and private addresses is an attack or a mistake.
 
     Raises:
-        Refused: none, or one of them may not be told, or not over plain http.
+        Refused: there is none, one of them is forbidden, or plain http is not allowed for it.
     """
     addresses = [parse_address(each) for each in found]
     if not addresses:
@@ -40,7 +41,7 @@ def check_url(text: str, allowed: Allowed) -> str:
     """Validate the URL of a receiver and return its normal form. Names are resolved at delivery.
 
     Raises:
-        InvalidInput: it is none, or one that may not be told.
+        InvalidInput: not a URL, or one with a forbidden address.
     """
     try:
         url = httpx2.URL(text)
@@ -65,7 +66,7 @@ def check_url(text: str, allowed: Allowed) -> str:
 
 def _literal(host: str) -> str | None:
     """Return the address in a host, in any notation (`2130706433`, `0x7f.1`); None for a name."""
-    host = host.rstrip(".")  # which names the same
+    host = host.rstrip(".")  # resolves to the same addresses
     if host == "localhost" or host.endswith(".localhost"):
         return "127.0.0.1"
     try:

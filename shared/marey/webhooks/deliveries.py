@@ -1,7 +1,7 @@
 """Deliveries of events to webhooks: claimed, attempted, recorded, replayed. At least once, under one id.
 
-A claim is a lease by time: who dies with one loses it after `HOLD` seconds, and the next one tries again. It fences
-the record of the try, so that of two who both tried one writes.
+A claim is a lease by time: a process that dies loses it after `HOLD` seconds, and another one tries again. It fences
+the record of the attempt, so that of two concurrent attempts one is recorded.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from marey.webhooks.types import (
 )
 
 DELAYS = (5, 60, 600, 3600, 12_600, 25_200, 43_200)
-"""Seconds between the eight tries: 23.7 hours in all."""
+"""Seconds between the eight attempts: 23.7 hours in total."""
 JITTER = 0.1
-"""Share by which a delay is longer or shorter, so that a receiver that comes back is not met by all at once."""
+"""Jitter of delays, so that a recovering receiver is not hit by all at once."""
 HOLD = 60.0
-"""Seconds of a claim: well beyond the longest try."""
+"""Seconds of a claim: well beyond the longest attempt."""
 MAX_WAIT = 43_200.0
-"""Seconds: a receiver may put off the next try by no more than the longest delay."""
+"""Limit of the delay that a receiver may ask for: the longest delay."""
 GONE = 410
-"""Status by which a receiver says that it will never listen again."""
+"""Status by which a receiver unsubscribes for good."""
 DELIVERER = Actor("webhooks")
-"""Who pauses such a webhook, in the audit log."""
+"""Actor of such a pause in the audit log."""
 MAX_ERROR = 300
 """Characters of an error in the log."""
 KEPT = 30 * 86_400.0
-"""Seconds for which events are kept, delivered or not."""
+"""Retention of events in seconds, delivered or not."""
 
-# From each webhook a few, so that one with thousands does not stand before all others. Locked are those alone that are
-# taken; one that somebody else took since the first look is no longer due in the second.
+# A few from each webhook, so that one with thousands does not block the others. Only the claimed rows are locked; a row
+# that another process claimed since the first read is no longer due in the second.
 CLAIM = sa.text("""
     WITH wanted AS MATERIALIZED (
         SELECT due.webhook_id, due.event_id
@@ -94,11 +94,11 @@ def record_attempt(conn: sa.Connection, due: DueDelivery, attempt: Attempt) -> D
     """Record the result of an attempt and return the delivery's new state; None if the claim was lost and nothing was
     written.
 
-    A receiver that is gone is told nothing more: its webhook is paused, which the audit log says.
+    A receiver that is gone gets no more messages: its webhook is paused, which the audit log records.
     """
     tries = due.tries + 1
     gone = attempt.status == GONE
-    if gone:  # before its deliveries, as whoever removes it
+    if gone:  # before its deliveries, in the same order as a deletion
         conn.execute(sa.select(webhook.c.id).where(webhook.c.id == due.webhook).with_for_update(key_share=True))
     values: dict[str, Any] = {"claim": None, "tries": tries, "attempts": webhook_delivery.c.attempts + 1}
     if attempt.error is None:
@@ -168,7 +168,7 @@ def replay_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID
     """Deliver again, from now, with all attempts; a pending delivery becomes due now.
 
     Raises:
-        NotFound: the tenant has no such webhook, or that no such delivery.
+        NotFound: the tenant has no such webhook, or the webhook no such delivery.
         Conflict: the webhook is paused.
     """
     _refuse_paused(get_webhook(conn, tenant, webhook))
@@ -181,7 +181,7 @@ def get_delivery(conn: sa.Connection, tenant: str, webhook: UUID, event: UUID) -
     """Return one delivery.
 
     Raises:
-        NotFound: the tenant has no such webhook, or that no such delivery.
+        NotFound: the tenant has no such webhook, or the webhook no such delivery.
     """
     get_webhook(conn, tenant, webhook)
     row = conn.execute(_deliveries().where(_is(webhook, event))).mappings().one_or_none()

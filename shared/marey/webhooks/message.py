@@ -18,7 +18,7 @@ NOUNS = {
     "schedule": "/v1/schedules/{}",
     "webhook": "/v1/webhooks/{}",
 }
-"""Where the API shows what an event names."""
+"""API path of the object that an event names."""
 
 
 def message_of(due: DueDelivery, api: str) -> bytes:

@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from marey.db.ids import new_id
 from marey.webhooks.types import EventKind
 
-# A webhook that is just being deleted is waited for, and then not there: its deliveries could not refer to it.
+# A webhook that is being deleted is waited for, and then gone: its deliveries could not refer to it.
 WRITE = sa.text("""
     WITH wanted AS MATERIALIZED (
         SELECT id FROM webhook WHERE tenant_id = :tenant AND :kind = ANY(events) ORDER BY id FOR KEY SHARE

@@ -17,9 +17,9 @@ from marey.webhooks.tables import webhook, webhook_delivery
 from marey.webhooks.types import DeliveryState, EventKind, NewWebhook, WebhookChange, WebhookRow
 
 MAX_WEBHOOKS = 20
-"""Of a tenant: each of its events is written once for each that wants it."""
+"""Limit per tenant: each event is written once for each subscribed webhook."""
 OVERLAP, LONGEST_OVERLAP = 86_400.0, 30 * 86_400.0
-"""Seconds that a rotated signing secret still signs: a day to bring the new one to the receiver."""
+"""Seconds that a rotated signing secret is still used: a day to update the receiver."""
 
 
 def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
@@ -27,11 +27,11 @@ def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
 
     Raises:
         InvalidInput: no events, or text that the database cannot hold.
-        Conflict: the tenant has as many as it may.
+        Conflict: the tenant has the maximum number of webhooks.
     """
     check_text(new.name, "name")
     check_text(new.url, "url")
-    # The tenant's row is the lock: two requests at once count one after the other.
+    # The tenant's row is the lock: concurrent requests count one after the other.
     tenant = tables.tenant.c
     conn.execute(sa.select(tenant.id).where(tenant.id == new.tenant).with_for_update(key_share=True))
     mine = sa.select(sa.func.count()).select_from(webhook).where(webhook.c.tenant_id == new.tenant)
@@ -105,11 +105,11 @@ def rotate_secret(
 
     Args:
         secret: encrypted.
-        overlap: seconds; 0 = the new one alone from now on.
+        overlap: seconds; 0 = only the new secret is used from now on.
 
     Raises:
         NotFound: the tenant has no such webhook.
-        InvalidInput: an overlap that cannot be.
+        InvalidInput: an invalid overlap.
     """
     if not 0 <= overlap <= LONGEST_OVERLAP:
         raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap", hint="Up to 30 days.")

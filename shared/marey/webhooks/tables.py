@@ -1,7 +1,7 @@
 """Tables of webhooks: subscriptions, the outbox of events, deliveries and attempts.
 
-Who writes an event holds the lock of the row that it is about, and takes webhook rows (KEY SHARE) after it; nobody
-goes from a webhook to such a row.
+A transaction that writes an event holds the lock of the event's row, and takes webhook rows (KEY SHARE) after it; no
+transaction locks them in the opposite order.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ webhook = sa.Table(
     sa.Column("url", sa.Text, nullable=False),
     sa.Column("events", ARRAY(sa.Text), nullable=False),
     sa.Column("secret", BYTEA, nullable=False),  # encrypted: `marey.webhooks.vault`
-    sa.Column("previous_secret", BYTEA),  # signs beside it until then
+    sa.Column("previous_secret", BYTEA),  # also signs until then
     sa.Column("previous_until", Time),
     sa.Column("paused", sa.Boolean, nullable=False, server_default=sa.false()),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
@@ -31,11 +31,11 @@ webhook = sa.Table(
     sa.Index("ix_webhook_short_id", "tenant_id", short_id()),
 )
 
-# One row an event, however many webhooks want it; none where nobody does.
+# One row per event, independent of the number of webhooks; none without a subscriber.
 webhook_event = sa.Table(
     "webhook_event",
     metadata,
-    sa.Column("id", Id, primary_key=True),  # what receivers know the message by, in every try
+    sa.Column("id", Id, primary_key=True),  # message id for receivers, the same in every attempt
     sa.Column("tenant_id", sa.Text, sa.ForeignKey("tenant.id"), nullable=False),
     sa.Column("kind", sa.Text, nullable=False),
     sa.Column("data", JSONB, nullable=False),
@@ -49,10 +49,10 @@ webhook_delivery = sa.Table(
     sa.Column("webhook_id", Id, sa.ForeignKey("webhook.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("event_id", Id, sa.ForeignKey("webhook_event.id", ondelete="CASCADE"), primary_key=True),
     sa.Column("state", sa.Text, nullable=False, server_default="pending"),
-    sa.Column("tries", sa.Integer, nullable=False, server_default="0"),  # since it was written, or replayed
-    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  # in all
-    sa.Column("next_at", Time),  # when it is tried; while it is claimed, when it counts as abandoned
-    sa.Column("claim", Id),  # fences the record of a try
+    sa.Column("tries", sa.Integer, nullable=False, server_default="0"),  # attempts since it was written, or replayed
+    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  # attempts in total
+    sa.Column("next_at", Time),  # time of the next attempt; while claimed, when the claim expires
+    sa.Column("claim", Id),  # fences the record of an attempt
     sa.Column("ended_at", Time),
     sa.Column("created_at", Time, nullable=False, server_default=NOW),
     sa.CheckConstraint("state IN ('pending', 'delivered', 'failed')", name="state"),
@@ -72,8 +72,8 @@ webhook_attempt = sa.Table(
     sa.Column("webhook_id", Id, primary_key=True),
     sa.Column("event_id", Id, primary_key=True),
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("at", Time, nullable=False),  # its end
-    sa.Column("status", sa.Integer),  # of the answer; null = there was none
+    sa.Column("at", Time, nullable=False),  # end of the attempt
+    sa.Column("status", sa.Integer),  # status of the answer; null = there was none
     sa.Column("seconds", sa.Double, nullable=False),
     sa.Column("error", sa.Text),  # null = delivered
     sa.ForeignKeyConstraint(

@@ -16,15 +16,15 @@ class EventKind(StrEnum):
     """A job has no open items any more; again after each retry."""
     JOB_PAUSED = "job.paused"
     STREAM_ENDED = "stream.ended"
-    """A live stream is over, or failed."""
+    """A live stream has ended, or failed."""
     EVALUATION_ENDED = "evaluation.ended"
     """An evaluation is done, failed or cancelled."""
     EVALUATION_REGRESSED = "evaluation.regressed"
-    """An evaluation is done, and worse than what it was compared with."""
+    """An evaluation is done, and worse than its baseline."""
 
 
 TEST_KIND = "webhook.test"
-"""Kind of the event that somebody asks for to see whether the way is open; nobody subscribes to it."""
+"""Kind of the test event that a user requests; no webhook subscribes to it."""
 
 
 class DeliveryState(StrEnum):
@@ -34,7 +34,7 @@ class DeliveryState(StrEnum):
     DELIVERED = "delivered"
     """The receiver answered 2xx."""
     FAILED = "failed"
-    """Its tries are used up."""
+    """All attempts are used up."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ class WebhookRow:
     events: tuple[EventKind, ...]
     paused: bool
     pending: int
-    """Deliveries that wait."""
+    """Pending deliveries."""
     failed: int
-    """Deliveries whose tries are used up."""
+    """Deliveries without attempts left."""
     created: datetime
 
 
@@ -86,13 +86,13 @@ class DeliveryRow:
     state: DeliveryState
     attempts: int
     next: datetime | None
-    """When it is tried; None once it has ended."""
+    """Time of the next attempt; None once it has ended."""
     created: datetime
     ended: datetime | None
     status: int | None
-    """Of the last try; None = no answer, or not tried yet."""
+    """Status of the last attempt; None = no answer, or not attempted yet."""
     error: str | None
-    """Of the last try."""
+    """Error of the last attempt."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class DueDelivery:
     data: Mapping[str, object]
     url: str
     secrets: Sequence[bytes]
-    """Encrypted: the newest first, then the one before it while both work."""
+    """Encrypted: the newest first, then the previous one while both are used."""
     tries: int
 
 
@@ -131,4 +131,4 @@ class Attempt:
     error: str | None
     """None = delivered."""
     wait: float = 0.0
-    """Seconds that the receiver asked for before the next try."""
+    """Seconds that the receiver asked for before the next attempt."""

@@ -1,8 +1,8 @@
 """Signing secrets at rest, encrypted under a key that is not in the database: a copy of the database alone signs
 nothing.
 
-`MAREY_WEBHOOK_KEY` may hold several keys: the first encrypts, all decrypt, so that keys can be changed. `marey serve`
-draws one into a file of its home.
+`MAREY_WEBHOOK_KEY` may hold several keys: the first encrypts, all decrypt, so that keys can be rotated. `marey
+    serve` creates one in a file of its home.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Vault:
             keys: Fernet keys, separated by white space or commas.
 
         Raises:
-            InvalidInput: none, or no such keys.
+            InvalidInput: no keys, or invalid ones.
         """
         try:
             self._fernet = MultiFernet([Fernet(key) for key in keys.replace(",", " ").split()])
@@ -45,8 +45,8 @@ class Vault:
         """Return the vault of this installation.
 
         Raises:
-            Refused: it has no key.
-            InvalidInput: its key is none.
+            Refused: no key is configured.
+            InvalidInput: the key is invalid.
         """
         if config.webhook_key is None:
             raise Refused(

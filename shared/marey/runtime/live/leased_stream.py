@@ -26,20 +26,20 @@ class LeasedStream:
     """State of one stream.
 
     Attributes:
-        text: of the prompt in force.
-        opening: of the first prompt.
-        session: its name in the pool; None before it joined and after it left.
-        read: id of the last message that was read; `obeyed` of the last that is in force.
-        heard: messages to obey, each with its id, in order; `reading` is of the first, where that is a steer.
-        acts: those that began, of all prompts; `recorded_acts` of them are written down.
-        unwritten: frames that Redis has not got yet.
-        delayed: messages to obey when the frames that another worker showed are drawn again.
-        reads: how the prompts were read that are not written down yet.
-        shown: how many frames Redis has got, before and now: no token beyond them is written down.
-        recorded: how many frames are written down, with `recorded_prompts` of the prompts.
-        ending: why it ends; None while it goes on.
-        seen: when somebody last watched, by the monotonic clock; `moved` when it was last not paused.
-        lost: another worker has it.
+        text: features of the prompt in force.
+        opening: features of the first prompt.
+        session: its id in the pool; None before it joined and after it left.
+        read: id of the last read message; `obeyed`: of the last applied one.
+        heard: messages to apply, each with its id, in order; `reading`: parsing of the first, if that is a steer.
+        acts: starts of actions, of all prompts; `recorded_acts`: number of recorded ones.
+        unwritten: frames to write to Redis.
+        delayed: messages to apply after the replay of frames that another worker showed.
+        reads: rewrites of prompts that are not recorded yet.
+        shown: number of frames in Redis, including earlier ones: no token beyond them is recorded.
+        recorded: number of recorded frames; `recorded_prompts`: of recorded prompts.
+        ending: reason of its end; None while it continues.
+        seen: time of the last viewer, by the monotonic clock; `moved`: time when it was last not paused.
+        lost: True if another worker has it.
     """
 
     row: StreamRow
@@ -118,7 +118,7 @@ class LeasedStream:
             if not tokens and not changed:
                 return None
             content = np.stack(tokens).astype("<i2").tobytes() if tokens else b""
-            # The message of a prompt that waits for its first frame is read again by whoever goes on from here.
+            # A successor reads the message again whose prompt waits for its first frame.
             waits = len(self.prompts) > self.recorded_prompts + len(prompts)
             control = self.recorded_control if waits else self.obeyed
             state = self.state if changed else None

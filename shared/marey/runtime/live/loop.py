@@ -22,11 +22,11 @@ from marey.text.features import TextFeatures
 log = logger(__name__)
 
 CATCH_UP = 4
-"""Frames a tick that a session makes beside the others' one, until it is where another worker left it."""
+"""Extra frames per tick for a session that replays frames of another worker."""
 BEHIND_SECONDS = 0.5
-"""Later than this, frames that were missed are not made faster: the clock is set anew."""
+"""Beyond this delay missed frames are not caught up: the clock is reset."""
 MOST_UNWRITTEN = 1200
-"""Frames kept for a Redis that does not answer: as many as it would keep itself."""
+"""Frames buffered while Redis does not answer: as many as Redis keeps."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,11 @@ class StreamFinished:
 class LiveLoop:
     """Makes the frames of all streams of this worker, on the thread that calls `run`.
 
-    Everything else is asked of it by `put`: a call is made between two frames, on its thread.
+    All other methods queue a call, which runs on that thread between two frames.
 
     Args:
-        open_pool: makes an empty pool.
-        over: told of each stream that has ended, failed or went to another worker.
+        open_pool: returns an empty pool.
+        over: called with each stream that has ended, failed or lost its lease.
         clock: seconds, monotonic.
     """
 
@@ -64,9 +64,9 @@ class LiveLoop:
         self.pool = open_pool()
         self.ticked = clock()
         self._away: Unreachable | None = None
-        """Why Redis did not take the frames of this tick: the other streams do not wait for it again."""
+        """Redis outage in this tick: the other streams do not wait for it again."""
         self.finished = threading.Event()
-        """Set when `run` has returned: nobody will show a frame any more."""
+        """Set when `run` has returned: no more frames will be shown."""
 
     def run(self, stopping: threading.Event) -> None:
         """Make frames until `stopping`."""
@@ -100,7 +100,7 @@ class LiveLoop:
             log.exception("room_broke", streams=len(self._leased))
             self._rebuild(error)
 
-    # --- what is asked of it, from other threads ---
+    # --- called from other threads ---
 
     def join(self, leased: LeasedStream) -> None:
         """Start a stream."""
@@ -124,11 +124,11 @@ class LiveLoop:
         """Show one more frame, the last, and end."""
         self._calls.put(lambda: self._guarded(leased, lambda: self._end(leased, reason)))
 
-    def leave(self, leased: LeasedStream) -> None:
+    def drop(self, leased: LeasedStream) -> None:
         """Drop a stream whose lease is lost."""
         self._calls.put(lambda: self._forget(leased))
 
-    # --- on its own thread ---
+    # --- on the loop's thread ---
 
     def _guarded(self, leased: LeasedStream, action: Callable[[], None]) -> None:
         """Run an action; an error ends this stream alone."""
@@ -178,7 +178,7 @@ class LiveLoop:
 
     def _end(self, leased: LeasedStream, reason: str) -> None:
         leased.ending = reason
-        if leased.state is StreamState.PAUSED:  # it shows nothing more
+        if leased.state is StreamState.PAUSED:  # it shows no more frames
             self._close(leased, reason)
 
     def _step(self) -> dict[int, list[LiveFrame]]:
@@ -239,7 +239,7 @@ class LiveLoop:
         """Replace a failed session pool. Each stream is tried in an empty pool: the one that breaks it fails, the
         others continue.
 
-        Raises: the error, where no stream did it.
+        Raises: the error, if no stream caused it.
         """
         streams, self._leased = list(self._leased.values()), {}
         for leased in streams:

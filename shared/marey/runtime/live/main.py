@@ -27,7 +27,7 @@ log = logger(__name__)
 
 STOP_SECONDS = 10.0
 REDIS_SECONDS = 1.0
-"""Deadline of a call: frames stand still for so long when a connection falls silent, and a lease lasts 1.5 s."""
+"""Deadline of a Redis call: frames stall for this long when a connection falls silent, and a lease lasts 1.5 s."""
 
 
 def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | None = None) -> int:
@@ -38,7 +38,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
 
     Raises:
         InvalidInput: a setting is missing.
-        NotFound, InvalidBundle: there is no model to model.
+        NotFound, InvalidBundle: there is no model to load.
         Unreachable: the database does not answer within a minute.
     """
     queue_url = chosen.streams_url or chosen.queue_url

@@ -24,13 +24,13 @@ class LiveFrame:
     tokens: Tokens
     """(V,): the column it was decoded from."""
     act: int
-    """Number of the act of its prompt, from 0."""
+    """Number of the action in its prompt, from 0."""
 
 
 class SessionPool(Protocol):
     """Sessions of one loaded bundle; all that are not paused advance together, one frame per step. Not thread-safe.
 
-    Every method raises `InvalidInput` for a session that is not there or not in the right state.
+    Every method raises `InvalidInput` for an unknown session or one in the wrong state.
     """
 
     @property
@@ -102,7 +102,7 @@ class SessionPool(Protocol):
 
 
 Parse: TypeAlias = Callable[[str], TextFeatures]
-"""Reads a prompt; may be called on several threads at once. Raises `InvalidInput`."""
+"""Parses a prompt; may be called on several threads at once. Raises `InvalidInput`."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +110,9 @@ class LiveModel:
     """A model that a live worker serves.
 
     Attributes:
-        open_pool: an empty pool; called again when one broke.
-        parse: reads prompts, each on a thread of its own.
-        device: for the worker's row.
+        open_pool: returns an empty pool; called again after a pool failed.
+        parse: parses prompts, each on a thread of its own.
+        device: device name for the worker's row.
     """
 
     open_pool: Callable[[int], SessionPool]

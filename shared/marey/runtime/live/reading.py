@@ -21,8 +21,8 @@ class Reading:
     """Features of some prompts, computed on a daemon thread.
 
     Args:
-        parse: reads one prompt; may be called on several threads at once.
-        prompts: in the order of the answer.
+        parse: parses one prompt; may be called on several threads at once.
+        prompts: in the order of the result.
     """
 
     def __init__(self, parse: Parse, prompts: Sequence[str]) -> None:
@@ -40,7 +40,7 @@ class Reading:
         """Return the features of each prompt, after `is_done`.
 
         Raises:
-            MareyError: one of them cannot be read.
+            MareyError: a prompt cannot be parsed.
         """
         assert self._done.is_set()
         if self._problem is not None:
@@ -63,8 +63,8 @@ class Opening:
     """A taken stream whose prompts are being parsed; its lease is renewed like any other.
 
     Attributes:
-        reading: of the first prompt, and of the one in force where that is another.
-        lost: another worker has it.
+        reading: parsing of the first prompt, and of the one in force if that is another.
+        lost: True if another worker has it.
     """
 
     past: StreamPast

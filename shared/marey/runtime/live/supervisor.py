@@ -37,11 +37,12 @@ LISTEN_SECONDS = 0.05
 TAKE_SECONDS = 0.5
 RECORD_SECONDS = 1.0
 READ_SECONDS = 0.1
-"""Prompts are mostly read in milliseconds: each is waited for so long, then looked for every `LISTEN_SECONDS`."""
+"""Seconds to wait for a prompt at once, since most are parsed in milliseconds; later it is polled every
+`LISTEN_SECONDS`."""
 CLOSE_PATIENCE = 120.0
 STALL_SECONDS = 10.0
 QUEUE = "live"
-"""What live workers are called among the workers."""
+"""Queue name of live workers in their rows."""
 
 
 class StreamSupervisor(threading.Thread):
@@ -50,8 +51,8 @@ class StreamSupervisor(threading.Thread):
     Args:
         engine, client: Postgres and Redis.
         worker: this worker's row, renewed every second.
-        parse: reads prompts, on several threads.
-        idle_seconds: a stream that nobody watched for so long ends; `paused_seconds`, one that was paused for so long.
+        parse: parses prompts, on several threads.
+        idle_seconds: time without a viewer until a stream ends; `paused_seconds`: time of pause until it ends.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class StreamSupervisor(threading.Thread):
         except Unreachable as error:
             log.warning("outage", error=error.message)
         except Exception:
-            log.exception("keeper_failed")  # without this thread nothing would be written down
+            log.exception("keeper_failed")  # without this thread nothing would be recorded
 
     # --- leases ---
 
@@ -117,7 +118,7 @@ class StreamSupervisor(threading.Thread):
         """Renew leases, on a thread of its own: a database that hangs must not cost a lease."""
         while not self._stopping.wait(RENEW_SECONDS):
             if time.monotonic() - self._loop.ticked > STALL_SECONDS:
-                continue  # the loop hangs: let another worker have its streams
+                continue  # the loop hangs: let another worker take its streams
             for leased in (*list(self._openings.values()), *list(self._leased.values())):
                 try:
                     leased.frames.renew(leased.lease)
@@ -130,7 +131,7 @@ class StreamSupervisor(threading.Thread):
         leased.lost = True
         if isinstance(leased, LeasedStream):
             self._leased.pop(str(leased.row.id), None)
-            self._loop.leave(leased)
+            self._loop.drop(leased)
         else:
             self._openings.pop(str(leased.row.id), None)
         metrics.LIVE_LOST.inc()
@@ -150,7 +151,7 @@ class StreamSupervisor(threading.Thread):
             return
         with transaction(self._engine) as conn:
             waiting = open_streams(conn, self._pool.bundle)
-        # Those that were live somewhere come first: somebody watches them.
+        # Interrupted live streams come first: they have viewers.
         for row in sorted(waiting, key=lambda row: row.state is StreamState.WAITING):
             if self._is_full():
                 return
@@ -257,7 +258,7 @@ class StreamSupervisor(threading.Thread):
             self._loop.steer(leased, message.prompt, text, identity)
         return True
 
-    # --- writing down ---
+    # --- recording ---
 
     def _record(self) -> None:
         measure_gpu()
@@ -293,7 +294,7 @@ class StreamSupervisor(threading.Thread):
         else:
             self._lose(leased)
 
-    # --- the end ---
+    # --- closing ---
 
     def _close(self, over: StreamFinished) -> None:
         leased = over.leased

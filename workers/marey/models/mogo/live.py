@@ -1,8 +1,8 @@
 """Live sessions of one bundle: prompts in, finished frames out; all sessions advance together, one frame per step.
 
-A session goes through three kinds of state, each with a row for every session: keys and values of the transformer
-(`Streams`), the past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). What a session
-must keep elsewhere, to go on after its worker died, are its tokens, its prompts and where their acts began.
+A session has three kinds of state, each with a row per session: keys and values of the transformer (`Streams`), the
+past of the causal decoder, and root, poses and feet of the body (`marey.motion.live`). To resume a session after
+its worker died, its tokens, its prompts and the starts of their actions must be kept elsewhere.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from marey.text.keys import as_served
 from marey.text.pipeline import TextPipeline
 
 WARM_CALLS = 3
-"""Compiled code watches two calls and is made ready in the third."""
+"""Compiled code records two calls and is captured in the third."""
 
 
 @dataclass
@@ -62,7 +62,7 @@ class LiveSessionPool:
         """Allocate `capacity` sessions, all sampled with the same settings.
 
         Raises:
-            InvalidBundle: a layout whose root cannot be followed frame by frame.
+            InvalidBundle: a layout whose root cannot be computed frame by frame.
             InvalidInput: settings out of range.
         """
         if not isinstance(generator.layout, HeadingLayout):
@@ -75,7 +75,7 @@ class LiveSessionPool:
         self._streams = Streams(generator.packed(capacity), capacity, inference)
         self._streams.prepare()
         self._motion = LiveMotion(generator.layout, self.skeleton)
-        self._rows: list[int] = []  # the session in each row of the two states below
+        self._rows: list[int] = []  # session of each row of the two states below
         self._decoded = generator.tokenizer.decoder.start(0)
         self._body = self._motion.start(0)
         self._sessions: dict[int, _Session] = {}
@@ -122,21 +122,21 @@ class LiveSessionPool:
         """Start a session, or resume one of another worker.
 
         Args:
-            text: of the prompt in force.
-            seed: of its random numbers.
-            past: (n, V) tokens of all its frames so far: it goes on behind them, continuous with what was shown.
+            text: features of the prompt in force.
+            seed: seed of its random numbers.
+            past: (n, V) tokens of all its frames so far: it continues behind them without a jump.
             prompt: number of the prompt in force, counted from 0.
-            began: the act of it that plays, and since when; None = the first begins now.
+            began: its current action, with its start; None = the first one starts now.
 
         Returns:
-            the session's name in all other methods.
+            the id of the session for all other methods.
 
         Raises:
-            InvalidInput: no pool, features of another encoder, a seed out of range, tokens that are none, or an act
-                that the prompt does not have.
+            InvalidInput: no free slot, features of another encoder, a seed out of range, invalid tokens, or an
+                action that the prompt does not have.
         """
         self.generator.limits.check(Request(text, seed))
-        if len(self) == self.capacity:  # paused ones keep their pool
+        if len(self) == self.capacity:  # paused ones keep their slot
             raise InvalidInput(f"all {self.capacity} sessions are taken", hint="Stop one first.")
         decoder = self.generator.tokenizer.decoder.start(1)
         body = self._motion.start(1)
@@ -167,7 +167,7 @@ class LiveSessionPool:
         """Remove a session, paused or not.
 
         Raises:
-            InvalidInput: there is none of that name.
+            InvalidInput: unknown session.
         """
         if session not in self._paused:
             self._streams.stop(self._playing(session).stream)
@@ -264,7 +264,7 @@ def create_live_model() -> LiveModel:
     """Load the live model of `marey worker mogo`: the bundle of this machine.
 
     Raises:
-        NotFound, InvalidBundle: there is none, or a damaged one.
+        NotFound, InvalidBundle: there is none, or a broken one.
     """
     chosen = configuration()
     bundle = choose_bundle(MODEL, config=chosen)
@@ -272,7 +272,7 @@ def create_live_model() -> LiveModel:
         raise InvalidBundle("it does not read prompts", where=str(bundle.path))
     generator = Generator.load(bundle, device=chosen.device, threads=chosen.threads)
     if is_small(generator.transformer):
-        torch.set_num_threads(1)  # two wait for each other longer than they work, the more so on a busy machine
+        torch.set_num_threads(1)  # two threads wait for each other longer than they work, the more so on a busy machine
     pipeline = TextPipeline.load(as_served(bundle.manifest.text))
     return LiveModel(
         open_pool=lambda slots: _warm(LiveSessionPool(generator, slots), pipeline),
