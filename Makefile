@@ -12,7 +12,7 @@ PARALLEL := -n 3 --dist loadfile
 COMPILE := $(BIN)/uv pip compile -q --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all pytest chaos soak lint docs check-deploy format bench lock wheels clean
+.PHONY: help setup demo test test-all pytest mutants chaos soak lint docs check-deploy format bench lock wheels clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F':.*## ' '{printf "  make %-10s %s\n", $$1, $$2}'
@@ -41,6 +41,9 @@ test-all: $(STAMP) ## Lint, and every test
 
 pytest: $(STAMP)
 	$(BIN)/pytest -q $(PARALLEL) $(SELECT)
+
+mutants: $(STAMP) ## 150 mutants each of models, jobs and motion; SEED=1 draws those of a seed, or goes on with them
+	$(BIN)/python -m tests.mutants $(if $(SEED),--seed $(SEED))
 
 chaos: $(STAMP) ## 10,000 items three times, whatever is killed or falls silent; prints how long recovery took
 	rm -rf out/chaos

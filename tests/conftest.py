@@ -27,7 +27,9 @@ from marey.storage.s3 import S3Store
 from tests.servers.given import GivenServer, given_server
 from tests.servers.swift import Swift
 
-os.environ["PYTHONPATH"] = str(Path(__file__).resolve().parents[1])
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    filter(None, [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH")])
+)
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
 
 TEMPLATE = "migrated"

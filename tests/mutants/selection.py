@@ -1,0 +1,149 @@
+"""The choice of tests that run against a mutant: those that cover its line, within a budget of seconds."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from functools import cached_property, lru_cache
+from itertools import chain, zip_longest
+from pathlib import Path
+
+from tests.mutants.mapping import LineMap
+from tests.mutants.operators import Mutation
+from tests.mutants.recording import SOURCES
+
+BUDGET_S = 20.0
+"""Seconds that a mutant's tests took when they were recorded: a third of the limit, so that only a hang reaches it."""
+
+
+class Selector:
+    """Choose tests for mutations of a checkout."""
+
+    def __init__(self, root: Path, known: LineMap) -> None:
+        self.root = root
+        self.map = known
+
+    def select(self, mutation: Mutation) -> list[str]:
+        """Return ids of tests, the files nearest by name first; empty if none runs the line."""
+        return self._affordable(self._covering(mutation), mutation.path)
+
+    def _covering(self, mutation: Mutation) -> set[str]:
+        tree = _parse(self.root / mutation.path)
+        chain_of_nodes = _enclosing(tree, mutation.line)
+        if chain_of_nodes and isinstance(chain_of_nodes[0], ast.FunctionDef | ast.AsyncFunctionDef):
+            return self.map.covering(mutation.path, _lines_of(tree, mutation.line))
+        # The line runs once, when its module is imported: tests that run what uses it stand in.
+        if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
+            return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
+        for names in self._stand_ins(tree, mutation, chain_of_nodes):
+            if names:
+                return names
+        return set()
+
+    def _stand_ins(self, tree: ast.Module, mutation: Mutation, around: list[ast.AST]) -> Iterator[set[str]]:
+        for name in _bound_names(tree, mutation.line):
+            yield set(chain.from_iterable(self.map.covering(path, lines) for path, lines in self._uses[name].items()))
+        for node in [*around, tree]:
+            yield self.map.covering(mutation.path, _runtime_lines(node))
+        package = str(Path(mutation.path).parent)
+        yield set(
+            chain.from_iterable(
+                self.map.covering(path, self.map.lines[path]) for path in self.map.lines if path.startswith(package)
+            )
+        )
+
+    @cached_property
+    def _uses(self) -> defaultdict[str, dict[str, set[int]]]:
+        """Lines inside functions that name something, by name and file."""
+        uses: defaultdict[str, dict[str, set[int]]] = defaultdict(dict)
+        for path in chain.from_iterable((self.root / source).rglob("*.py") for source in SOURCES):
+            file = path.relative_to(self.root).as_posix()
+            for node in ast.walk(ast.parse(path.read_bytes())):
+                name = getattr(node, "id", None) or getattr(node, "attr", None)
+                if name and isinstance(node, ast.Name | ast.Attribute):
+                    uses[name].setdefault(file, set()).add(node.lineno)
+        return uses
+
+    def _affordable(self, names: set[str], path: str) -> list[str]:
+        """Tests within the budget: half of it for files that share a word with the mutant's, the rest in turn."""
+        by_file: dict[str, list[str]] = defaultdict(list)
+        for name in sorted(names, key=lambda name: (self.map.tests[name].seconds, name)):
+            by_file[self.map.tests[name].file].append(name)
+        near = sorted(by_file, key=lambda file: (-_nearness(file, path), file))
+        close = [by_file[file] for file in near if _nearness(file, path)]
+        chosen = self._take(_in_turn(close), [], BUDGET_S / 2)
+        chosen = self._take(_in_turn(by_file[file] for file in near), chosen, BUDGET_S)
+        return sorted(chosen, key=lambda name: (near.index(self.map.tests[name].file), self.map.tests[name].seconds))
+
+    def _take(self, names: Iterable[str], chosen: list[str], budget: float) -> list[str]:
+        chosen = list(chosen)
+        for name in names:
+            if name not in chosen and (not chosen or self.map.cost([*chosen, name]) <= budget):
+                chosen.append(name)
+        return chosen
+
+
+def _in_turn(files: Iterable[list[str]]) -> list[str]:
+    return [name for names in zip_longest(*files) for name in names if name]
+
+
+@lru_cache(maxsize=100_000)
+def _nearness(test: str, path: str) -> int:
+    return len(_words(test) & _words(path))
+
+
+def _words(path: str) -> set[str]:
+    return set(re.split(r"[/_.]", path)) - {"py", "test", "tests", "unit", "marey", "shared", "workers", ""}
+
+
+@lru_cache(maxsize=64)
+def _parse(path: Path) -> ast.Module:
+    return ast.parse(path.read_bytes())
+
+
+def _enclosing(tree: ast.AST, line: int) -> list[ast.AST]:
+    """Functions and classes around a line, the inmost first; `arguments` first for a default value of a function."""
+    found: list[ast.AST] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            if node.body[0].lineno <= line <= (node.end_lineno or 0):
+                found.insert(0, node)
+            elif node.lineno <= line < node.body[0].lineno and not isinstance(node, ast.ClassDef):
+                return [node.args, node]
+    return found
+
+
+def _statement_at(tree: ast.Module, line: int) -> ast.stmt | None:
+    inmost: ast.stmt | None = None
+    for node in ast.walk(tree):
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
+            inmost = node
+    return inmost
+
+
+def _lines_of(tree: ast.Module, line: int) -> range:
+    """Lines of the statement at a line; only the head of one with a body."""
+    statement = _statement_at(tree, line)
+    if statement is None:
+        return range(line, line + 1)
+    body: list[ast.stmt] = getattr(statement, "body", [])
+    last = max(body[0].lineno - 1, statement.lineno) if body else statement.end_lineno or line
+    return range(statement.lineno, last + 1)
+
+
+def _bound_names(tree: ast.Module, line: int) -> list[str]:
+    match _statement_at(tree, line):
+        case ast.Assign(targets=targets):
+            return [target.id for target in targets if isinstance(target, ast.Name)]
+        case ast.AnnAssign(target=ast.Name(id=name)):
+            return [name]
+        case _:
+            return []
+
+
+def _runtime_lines(node: ast.AST) -> set[int]:
+    """Lines in the bodies of the functions of a node."""
+    functions = [each for each in ast.walk(node) if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return {line for each in functions for line in range(each.body[0].lineno, (each.end_lineno or 0) + 1)}

@@ -1,0 +1,160 @@
+"""A small product with tests of its own: recorded, mutated and judged by real processes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.mutants.__main__ import Slot, _Baseline, _judge
+from tests.mutants.drawing import Mutant
+from tests.mutants.mapping import LineMap, current_map, record_map
+from tests.mutants.operators import mutations
+from tests.mutants.selection import Selector
+
+PRODUCT = "shared/marey/toy.py"
+SOURCE = """\
+LIMIT = 10
+
+
+def double(x, times=2):
+    return x * times
+
+
+def capped(x):
+    return min(x, LIMIT)
+
+
+def waits(x):
+    while not x:
+        x = True
+    return x
+
+
+def unused(x):
+    return x + 1
+"""
+TESTS = """\
+import os
+import pytest
+import shared.marey.toy as toy
+
+@pytest.fixture(scope="module")
+def wide():
+    return toy.double(3)
+
+def test_wide(wide):
+    assert wide == 6
+
+def test_capped():
+    assert toy.capped(11) == 10
+
+def test_waits():
+    assert toy.waits(False)
+
+def test_broken():
+    assert toy.capped(0) == 1
+
+def test_only_elsewhere():
+    assert toy.double(1) == (99 if "TOY_HERE" in os.environ else 2)
+"""
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("toy")
+    (root / "shared/marey").mkdir(parents=True)
+    (root / PRODUCT).write_text(SOURCE)
+    (root / "tests/unit").mkdir(parents=True)
+    (root / "tests/unit/test_toy.py").write_text(TESTS)
+    (root / "pytest.ini").write_text("[pytest]\naddopts = --import-mode=importlib\npythonpath = .\n")
+    (root / ".gitignore").write_text("out/\n__pycache__/\n")
+    author = ("-c", "user.name=a", "-c", "user.email=a@example.org")
+    for command in (("init", "-q"), ("add", "."), (*author, "commit", "-qm", "toy")):
+        subprocess.run(["git", *command], cwd=root, check=True)
+    return root
+
+
+@pytest.fixture(scope="module")
+def known(root: Path) -> LineMap:
+    return record_map(root, root / "out", 1, ["tests/unit"])
+
+
+@pytest.fixture(scope="module")
+def slot(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slot]:
+    scratch = tmp_path_factory.mktemp("scratch")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAREY_TEST_")}
+    environment |= {"MAREY_MUTANTS_SCRATCH": str(scratch), "TOY_HERE": "1", "PYTEST_ADDOPTS": ""}
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.mutants.slot", "hypothesis", "schemathesis"],
+        cwd=root,
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        yield Slot(process, limit=6)
+        assert process.stdin
+        process.stdin.close()
+
+
+def mutant(root: Path, after: str) -> Mutant:
+    """The mutant whose changed line reads so."""
+    source = (root / PRODUCT).read_bytes()
+    mutants = [Mutant("jobs", one, source, one.apply(source)) for one in mutations(PRODUCT, source)]
+    return next(one for one in mutants if one.diff[1] == after)
+
+
+def names(*tests: str) -> set[str]:
+    return {f"tests/unit/test_toy.py::{test}" for test in tests}
+
+
+def test_a_line_knows_its_tests_also_those_that_reach_it_by_a_shared_fixture(root: Path, known: LineMap) -> None:
+    select = Selector(root, known).select
+    assert set(select(mutant(root, "return x / times").mutation)) == names("test_wide", "test_only_elsewhere")
+    assert select(mutant(root, "return x - 1").mutation) == []
+
+
+def test_a_line_that_runs_on_import_gets_the_tests_of_its_users(root: Path, known: LineMap) -> None:
+    select = Selector(root, known).select
+    assert set(select(mutant(root, "LIMIT = 11").mutation)) == names("test_capped")
+    assert set(select(mutant(root, "def double(x, times=3):").mutation)) == names("test_wide", "test_only_elsewhere")
+
+
+def test_the_map_is_read_as_it_was_written(tmp_path: Path, known: LineMap) -> None:
+    known.save(tmp_path / "map.json")
+    again = LineMap.load(tmp_path / "map.json")
+    assert vars(again) == vars(known)
+
+
+def test_mutants_are_judged_by_tests_that_pass_without_them(root: Path, slot: Slot, tmp_path: Path) -> None:
+    passes = _Baseline(tmp_path / "baseline.json", root)
+
+    def judge(after: str, *tests: str) -> tuple[str, str | None]:
+        answer = _judge(slot, mutant(root, after), sorted(names(*tests)), passes)
+        return answer["verdict"], answer["by"]
+
+    capped = "tests/unit/test_toy.py::test_capped"
+    assert judge("LIMIT = 11", "test_capped", "test_waits") == ("killed", capped)
+    assert judge("return x + 2", "test_capped") == ("survived", None)
+    assert judge("pass", "test_waits") == ("timeout", None)
+    # It fails here without a mutant too, so it kills none.
+    assert judge("return x + 2", "test_only_elsewhere", "test_wide") == ("survived", None)
+    assert (root / PRODUCT).read_text() == SOURCE
+
+
+def test_a_new_file_of_tests_is_recorded_on_its_own(root: Path, known: LineMap) -> None:
+    known.save(root / "out/map.json")
+    new = root / "tests/unit/test_new.py"
+    new.write_text("import shared.marey.toy as toy\n\ndef test_unused():\n    assert toy.unused(1) == 2\n")
+    try:
+        updated = current_map(root, root / "out", 1)
+    finally:
+        new.unlink()
+    assert updated.covering(PRODUCT, [19]) == {"tests/unit/test_new.py::test_unused"}
+    assert updated.covering(PRODUCT, [9]) == names("test_capped")
+    assert len(updated.tests) == len(known.tests) + 1
