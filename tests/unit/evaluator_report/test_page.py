@@ -27,7 +27,7 @@ from marey.evaluator.report import (
     to_html,
     to_json,
 )
-from marey.evaluator.report.page import PACKAGE
+from marey.evaluator.report.templates import PACKAGE
 from marey.viz.pages import asset
 from tests.support.reports import UNMEASURED, sample_report
 from tests.support.walker import walker
@@ -126,6 +126,7 @@ def test_a_text_stays_a_text_whatever_is_in_it(report: Report, page: Page) -> No
     assert attacked.code == page.code
     assert attacked.policy == page.policy
     assert attacked.text.count("<img src=x onerror=alert(1)>") > 30
+    assert "\u202e" not in attacked.html
 
 
 def test_no_attribute_runs_code_and_nothing_is_fetched(report: Report) -> None:

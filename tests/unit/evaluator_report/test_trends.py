@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.evaluator.report import TrendPoint
-from marey.evaluator.report.trends import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, describe, plot, ticks_of
+from marey.evaluator.report.templates import render
+from marey.evaluator.report.trends import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, describe, plot_of, ticks_of
 from tests.support.reports import METRICS, MONDAY
 
 R1 = METRICS[0]
@@ -25,7 +26,7 @@ def runs(*values: float | None, bundle: str = "b@1") -> list[TrendPoint]:
 
 
 def drawn(points: list[TrendPoint]) -> ElementTree.Element:
-    return ElementTree.fromstring(plot("t", R1, points))
+    return ElementTree.fromstring(render("plot.svg.jinja", plot=plot_of("t", R1, points)))
 
 
 def dots(picture: ElementTree.Element) -> list[tuple[float, float]]:
@@ -86,7 +87,7 @@ def test_a_single_run_is_told_as_one() -> None:
 @settings(deadline=None)
 @given(st.lists(st.none() | st.floats(-1e12, 1e12, allow_nan=False), min_size=1, max_size=30))
 def test_whatever_the_values_every_dot_is_inside_the_plot(values: list[float | None]) -> None:
-    text = plot("t", R1, runs(*values))
+    text = render("plot.svg.jinja", plot=plot_of("t", R1, runs(*values)))
     known = [value for value in values if value is not None]
     assert bool(text) is bool(known)
     if known:

@@ -5,12 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from marey.evaluator.report.exhibits import score_of
 from marey.evaluator.report.model import Report
 from marey.evaluator.report.parts import Exhibit, HeatCell
-from marey.evaluator.report.sections import plain, speed_of
 from marey.evaluator.report.tables import Cell, Heat, Line, Table, heat_of, in_percent, tables_of, trended, weakest_of
-from marey.evaluator.report.words import CHANGES, LEGEND, day, headline, intervals_of, moment, number
+from marey.evaluator.report.words import (
+    CHANGES,
+    LEGEND,
+    day,
+    headline,
+    intervals_of,
+    moment,
+    number,
+    plain,
+    score_of,
+    speed_of,
+)
 from marey.viz.paper import one_line
 
 ROWS_OF_TREND = 8  # the page has the rest

@@ -6,16 +6,16 @@ hashes and lets it fetch nothing; every text is escaped: a prompt is data, whate
 
 from __future__ import annotations
 
-from marey.evaluator.report.exhibits import clips_of, exhibits
-from marey.evaluator.report.markup import Markup, element, join
+import itertools
+
+from markupsafe import Markup
+
 from marey.evaluator.report.model import Report
-from marey.evaluator.report.sections import heat, numbers, repeat, speed, top, verdict
-from marey.evaluator.report.trends import trends
-from marey.viz.pages import asset, fill, script_json, whole_page
+from marey.evaluator.report.templates import PACKAGE, render
+from marey.motion.clip import MotionClip
+from marey.viz.pages import asset, script_json, whole_page
 from marey.viz.paper import one_line
 from marey.viz.player import motion_document
-
-PACKAGE = "marey.evaluator.report"
 
 
 def to_html(report: Report) -> bytes:
@@ -23,21 +23,24 @@ def to_html(report: Report) -> bytes:
 
     It holds three.js only when an exhibit has its clip: 0.6 MB then, and 0.05 MB for each clip of 10 s.
     """
-    parts = (top(report), verdict(report), numbers(report), heat(report))
-    main = join(*parts, exhibits(report), trends(report), speed(report), repeat(report))
-    body = fill(asset("report.html", PACKAGE), {"%REPORT%": main, "%SCRIPTS%": _scripts(report)})
+    numbers = itertools.count()
+    body = render("report.html.jinja", report=report, scripts=_scripts(report), next_clip=lambda: next(numbers))
     styles = (asset("small_players.css"), asset("report.css", PACKAGE))
     return whole_page(body, title=one_line(f"{report.title} · Marey"), styles=styles).encode()
 
 
 def _scripts(report: Report) -> Markup:
-    theme = Markup(f"<script>\n{asset('report.js', PACKAGE)}</script>")
-    clips = clips_of(report)
-    if not clips:
-        return theme
-    document = motion_document(clips, [""] * len(clips))
-    code = [f"<script>{asset('three.min.js')}</script>"]
-    code += [f"<script>\n{asset(name)}</script>" for name in ("scene.js", "clip.js", "small_players.js")]
-    motion = element("script", Markup(script_json(document)), type="application/json", id="motion")
-    licence = Markup(f"<!--\n{asset('three.LICENSE.txt')}\n-->")
-    return join(theme, motion, licence, *(Markup(each) for each in code))
+    """Every script of the page. All of it is the product's own but the motions, which are JSON that ends no element."""
+    code = f"<script>\n{asset('report.js', PACKAGE)}</script>"
+    if clips := _clips_of(report):
+        motion = script_json(motion_document(clips, [""] * len(clips)))
+        code += f'<script type="application/json" id="motion">{motion}</script>'
+        code += f"<!--\n{asset('three.LICENSE.txt')}\n--><script>{asset('three.min.js')}</script>"
+        names = ("scene.js", "clip.js", "small_players.js")
+        code += "".join(f"<script>\n{asset(name)}</script>" for name in names)
+    return Markup(code)  # noqa: S704
+
+
+def _clips_of(report: Report) -> list[MotionClip]:
+    """The motions that the page holds, in the order of its players."""
+    return [exhibit.clip for exhibit in (*report.worst, *report.best) if exhibit.clip is not None]

@@ -31,6 +31,10 @@ MOST_COLUMNS = 6
 """Of a table: with intervals and row names, what a window of 1,000 pixels shows. R-precision in both pools is six."""
 MOST_RUNS = 30
 """Of a trend: half a year of weekly runs."""
+MOST_STYLES = 8
+"""Columns of the heat map that have room to spare; more stand closer together, their names upright."""
+RAMP = (0.2, 0.4, 0.6, 0.8, 0.95)
+"""Shares passed at which a cell of the heat map gets paler; the last step begins where a bar of 95 % would be met."""
 LEAST_TRIALS = 3
 """A cell of the heat map with fewer is not named among the weakest: chance would choose it."""
 
@@ -172,6 +176,11 @@ def heat_of(report: Report) -> Heat:
 def share(cell: HeatCell) -> float:
     """Of the trials that passed, 0 to 1."""
     return cell.passed / cell.trials
+
+
+def heat_step(cell: HeatCell) -> int:
+    """Step of the colour ramp: 0 where most fails, 5 where nearly all passes."""
+    return sum(share(cell) >= bound for bound in RAMP)
 
 
 def in_percent(cell: HeatCell) -> str:

@@ -1,17 +1,14 @@
-"""Trends: a small plot for each key metric over the last runs, as SVG of our own, and the same as a table."""
+"""Trends: the layout of a small plot for each key metric over the last runs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
-from marey.evaluator.report.markup import Markup, element, join
-from marey.evaluator.report.model import Report
 from marey.evaluator.report.parts import Metric, TrendPoint
-from marey.evaluator.report.sections import section, wide
-from marey.evaluator.report.tables import trended
-from marey.evaluator.report.words import MINUS, day, direction, moment, number, with_unit
+from marey.evaluator.report.words import MINUS, day, moment, number, with_unit
 
 WIDTH, HEIGHT = 340, 170
 LEFT, RIGHT, TOP, BOTTOM = 52, 328, 16, 136  # of the plot in the picture
@@ -19,60 +16,75 @@ HIT = 9  # radius that a pointer finds
 TINY = 1e-12  # no metric is told to so many digits
 
 
-def trends(report: Report) -> Markup:
-    """The section; nothing when there is no run to draw."""
-    runs, metrics = trended(report)
-    if not metrics:
-        return Markup("")
-    figures = [_figure(index, metric, runs) for index, metric in enumerate(metrics)]
-    label = report.row(report.judged).label
-    said = f"The row “{label}” of {'one run' if len(runs) == 1 else f'{len(runs)} runs, the oldest left'}."
-    if len({run.bundle for run in runs}) > 1:
-        said += " A dotted line stands where another bundle begins."
-    return section(
-        "Trends",
-        element("p", said, class_="remark"),
-        element("div", *figures, class_="trends"),
-        _table(metrics, runs),
-        id="trends",
-    )
+@dataclass(frozen=True)
+class Dot:
+    """A run in the picture; x and y in the units of its view box."""
+
+    x: float
+    y: float
+    run: TrendPoint
+    label: str
 
 
-def _figure(index: int, metric: Metric, runs: Sequence[TrendPoint]) -> Markup:
-    way = direction(metric)
-    unit = f"{metric.unit}, " if metric.unit and way else metric.unit
-    heading = element("figcaption", element("b", metric.name), element("small", unit, way))
-    return element("figure", heading, plot(f"trend-{index}", metric, runs))
+@dataclass(frozen=True)
+class Plot:
+    """One metric over runs, evenly spaced, as `plot.svg.jinja` draws it.
+
+    Attributes:
+        name: prefix of the ids in the picture.
+        metric: what is drawn.
+        runs: the oldest first.
+        description: what the picture shows, in words.
+        ticks: heights and labels of the grid.
+        bundle_changes: where another bundle begins.
+        path: the line through the runs; a run without the metric is a gap.
+        dots: the runs that have the metric.
+    """
+
+    name: str
+    metric: Metric
+    runs: Sequence[TrendPoint]
+    description: str
+    ticks: Sequence[tuple[float, str]]
+    bundle_changes: Sequence[float]
+    path: str
+    dots: Sequence[Dot]
 
 
-def plot(name: str, metric: Metric, runs: Sequence[TrendPoint]) -> Markup:
-    """One metric over runs, evenly spaced; a run without the metric is a gap.
+def plot_of(name: str, metric: Metric, runs: Sequence[TrendPoint]) -> Plot | None:
+    """Lay out the plot of a metric; None if no run has it.
 
     Args:
         name: prefix of the ids in the picture; one a page.
         metric: what is drawn.
         runs: the oldest first.
     """
-    values = [run.values.get(metric.key) for run in runs]
-    known = [value for value in values if value is not None]
+    known = [run.values[metric.key] for run in runs if metric.key in run.values]
     if not known:
-        return Markup("")
+        return None
     ticks = ticks_of(known)
-    low, high = ticks[0], ticks[-1]
-    places = [
-        None if value is None else (_across(k, len(runs)), _up(value, low, high)) for k, value in enumerate(values)
-    ]
-    marks = [_mark(place, metric, run, last=run is runs[-1]) for place, run in zip(places, runs, strict=True) if place]
-    return element(
-        "svg",
-        element("title", f"Trend of {metric.name}", id=f"{name}-title"),
-        element("desc", describe(metric, runs), id=f"{name}-desc"),
-        _axes(runs, ticks),
-        _line(places),
-        *marks,
-        viewBox=f"0 0 {WIDTH} {HEIGHT}",
-        role="img",
-        aria_labelledby=f"{name}-title {name}-desc",
+    count, dots = len(runs), list[Dot | None]()
+    for k, run in enumerate(runs):
+        value = run.values.get(metric.key)
+        if value is None:
+            dots.append(None)
+            continue
+        said = with_unit(number(value, metric), metric)
+        label = f"{said} · {run.bundle} · {moment(run.finished)} · evaluation {run.evaluation}"
+        dots.append(Dot(_across(k, count), _up(value, ticks[0], ticks[-1]), run, label))
+    return Plot(
+        name,
+        metric,
+        runs,
+        describe(metric, runs),
+        _labelled(ticks),
+        [
+            (_across(k, count) + _across(k + 1, count)) / 2
+            for k, (before, run) in enumerate(pairwise(runs))
+            if before.bundle != run.bundle
+        ],
+        _path(dots),
+        [dot for dot in dots if dot],
     )
 
 
@@ -115,51 +127,16 @@ def _up(value: float, low: float, high: float) -> float:
     return BOTTOM - (BOTTOM - TOP) * (value - low) / (high - low)
 
 
-def _axes(runs: Sequence[TrendPoint], ticks: Sequence[float]) -> Markup:
+def _labelled(ticks: Sequence[float]) -> list[tuple[float, str]]:
     digits = max(0, -math.floor(math.log10(ticks[1] - ticks[0]) + 1e-6))
-    lines: list[Markup] = []
-    for tick in ticks:
-        y = _up(tick, ticks[0], ticks[-1])
-        label = f"{tick:.{digits}f}".replace("-", MINUS) if tick else "0"
-        lines.append(element("line", x1=LEFT, x2=RIGHT, y1=f"{y:.1f}", y2=f"{y:.1f}", class_="grid"))
-        lines.append(element("text", label, x=LEFT - 6, y=f"{y + 4:.1f}", class_="end"))
-    for k, (before, run) in enumerate(pairwise(runs)):
-        if before.bundle != run.bundle:
-            x = f"{(_across(k, len(runs)) + _across(k + 1, len(runs))) / 2:.1f}"
-            lines.append(element("line", x1=x, x2=x, y1=TOP, y2=BOTTOM, class_="bundle"))
-    dates = [element("text", day(runs[-1].finished), x=RIGHT, y=HEIGHT - 14, class_="end")]
-    if len(runs) > 1:
-        dates.insert(0, element("text", day(runs[0].finished), x=LEFT, y=HEIGHT - 14))
-    return join(*lines, *dates)
+    labels = [f"{tick:.{digits}f}".replace("-", MINUS) if tick else "0" for tick in ticks]
+    return [(_up(tick, ticks[0], ticks[-1]), label) for tick, label in zip(ticks, labels, strict=True)]
 
 
-def _line(places: Sequence[tuple[float, float] | None]) -> Markup:
+def _path(dots: Sequence[Dot | None]) -> str:
     path, drawn = list[str](), False
-    for place in places:
-        if place:
-            path.append(f"{'L' if drawn else 'M'}{place[0]:.1f} {place[1]:.1f}")
-        drawn = place is not None
-    return element("path", d=" ".join(path), class_="trend")
-
-
-def _mark(place: tuple[float, float], metric: Metric, run: TrendPoint, *, last: bool) -> Markup:
-    x, y = (f"{v:.1f}" for v in place)
-    value = with_unit(number(run.values[metric.key], metric), metric)
-    told = element("title", f"{value} · {run.bundle} · {moment(run.finished)} · evaluation {run.evaluation}")
-    dot = element("circle", cx=x, cy=y, r="4.5" if last else "2.6", class_="dot")
-    return element("g", told, dot, element("circle", cx=x, cy=y, r=HIT, class_="hit"), class_="run")
-
-
-def _table(metrics: Sequence[Metric], runs: Sequence[TrendPoint]) -> Markup:
-    head = [element("th", title, scope="col") for title in ("run", "bundle", *(metric.name for metric in metrics))]
-    rows = [
-        element(
-            "tr",
-            element("th", f"{day(run.finished)} · {run.evaluation}", scope="row"),
-            element("td", run.bundle),
-            *(element("td", number(run.values[m.key], m) if m.key in run.values else "–") for m in metrics),
-        )
-        for run in reversed(runs)
-    ]
-    table = element("table", element("thead", element("tr", *head)), element("tbody", *rows), class_="runs")
-    return element("details", element("summary", "The same as a table"), wide("Trends as a table", table))
+    for dot in dots:
+        if dot:
+            path.append(f"{'L' if drawn else 'M'}{dot.x:.1f} {dot.y:.1f}")
+        drawn = dot is not None
+    return " ".join(path)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal
 
 from marey.evaluator.metrics.distribution import SAMPLES_PER_DIMENSION
 from marey.evaluator.report.model import Against, Change, Report
-from marey.evaluator.report.parts import Metric, Repeats, Value
+from marey.evaluator.report.parts import Exhibit, Metric, Repeats, Value
 
 MINUS, SPACE = "\u2212", "\u00a0"
 SUBJECTS: dict[Against, str] = {"last run": "the last run", "pinned baseline": "the pinned baseline"}
@@ -152,3 +153,22 @@ def day(time: datetime) -> str:
     """`22 Nov 2026`."""
     utc = time.astimezone(UTC)
     return f"{utc.day} {MONTHS[utc.month - 1]} {utc.year}"
+
+
+def score_of(exhibit: Exhibit) -> str:
+    """Three digits tell clips apart."""
+    return f"{exhibit.score:.3f}".replace("-", MINUS)
+
+
+def speed_of(report: Report) -> str:
+    """`1.42 motions a second, 9.80 s a motion (median), 1 worker`; empty when it was not measured."""
+    if report.speed is None:
+        return ""
+    rate, median = report.speed.motions_per_second, report.speed.median_seconds_per_motion
+    note = f", {report.speed.note}" if report.speed.note else ""
+    return f"{rate:.3g} motions a second, {median:.3g} s a motion (median){note}"
+
+
+def plain(value: object) -> str:
+    """A setting as a person types it."""
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
