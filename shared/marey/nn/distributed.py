@@ -19,11 +19,6 @@ def rank() -> int:
     return dist.get_rank() if is_distributed() else 0
 
 
-def world_size() -> int:
-    """Number of processes, 1 without a process group."""
-    return dist.get_world_size() if is_distributed() else 1
-
-
 def all_reduce_sum(tensor: Tensor) -> Tensor:
     """Sum `tensor` over all processes, in place."""
     if is_distributed():

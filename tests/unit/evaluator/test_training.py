@@ -21,7 +21,6 @@ from marey.evaluator.bundle import load_networks
 from marey.evaluator.config import TINY, EvaluatorConfig
 from marey.evaluator.labels import label_of
 from marey.evaluator.loading import load_evaluator
-from marey.evaluator.port import check_reads
 from marey.evaluator.reference import FILE, Reference
 from marey.evaluator.sentences import open_encoder
 from marey.evaluator.stage_tmr import TMRStage
@@ -277,14 +276,6 @@ def test_a_motion_of_another_width_or_length_is_refused(evaluator: TMREvaluator,
         evaluator.embed_motion([motions[0][:15]])
     with pytest.raises(InvalidInput, match="has 197 frames"):
         evaluator.embed_motion([np.zeros((197, 263), np.float32)])
-
-
-def test_motions_of_another_layout_or_rate_are_refused(evaluator: TMREvaluator) -> None:
-    check_reads(evaluator, "humanml3d-263", 20)
-    with pytest.raises(InvalidInput, match=r"reads humanml3d-263 at 20 fps, the motions are kit-251 at 12\.5 fps"):
-        check_reads(evaluator, "kit-251", 12.5)
-    with pytest.raises(InvalidInput, match="at 30 fps"):
-        check_reads(evaluator, "humanml3d-263", 30)
 
 
 def test_a_sentence_that_is_no_prompt_is_refused_and_named(evaluator: TMREvaluator) -> None:

@@ -86,20 +86,6 @@ def unheard() -> None:
     """The `Beat` of those for whom nobody waits."""
 
 
-def check_reads(evaluator: Evaluator, layout: str, fps: float) -> None:
-    """Refuse to judge motions of another layout or frame rate.
-
-    Raises:
-        InvalidInput: they differ.
-    """
-    if (evaluator.layout, evaluator.fps) != (layout, fps):
-        raise InvalidInput(
-            f"reads {evaluator.layout} at {evaluator.fps:g} fps, the motions are {layout} at {fps:g} fps",
-            where=evaluator.name,
-            hint="Take an evaluator of the motions' layout; features of another one have no meaning to it.",
-        )
-
-
 def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest: int) -> None:
     """Refuse motions that an embedding would say nothing about.
 

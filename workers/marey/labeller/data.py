@@ -33,7 +33,6 @@ SWAPS = (
     ("he", "she"),
 )
 _SWAP = {word: group for group in SWAPS for word in group}
-OPTIONAL_ROLES = frozenset({"ARGM-DIR", "ARGM-MNR", "ARGM-TMP", "ARGM-LOC", "ARGM-EXT", "ARGM-ADV"})
 _STOP = re.compile(r"[.!?]+$")
 
 

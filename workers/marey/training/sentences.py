@@ -43,10 +43,6 @@ class SentenceData:
         chosen = self.first[clips] + np.floor(rng.random(len(clips)) * self.count[clips]).astype(np.int64)
         return torch.from_numpy(chosen).to(self.sentence.device)
 
-    def of_act(self, clips: NDArray[np.int64], act: NDArray[np.int64]) -> Tensor:
-        """The caption of act `act` (B,) alone, of clips that have several."""
-        return torch.from_numpy(self.first[clips] + self.count[clips] + act).to(self.sentence.device)
-
     def sentences(self, captions: Tensor) -> Tensor:
         """Sentence features (B, W)."""
         return self.strings[self.sentence[captions]].float()

@@ -61,11 +61,6 @@ class Fid:
     n_generated: int
     dimensions: int
 
-    @property
-    def reliable(self) -> bool:
-        """Whether both sets have 5 embeddings a dimension; with fewer the covariances are mostly sampling noise."""
-        return min(self.n_real, self.n_generated) >= SAMPLES_PER_DIMENSION * self.dimensions
-
 
 @dataclass(frozen=True)
 class Kid:
