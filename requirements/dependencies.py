@@ -29,11 +29,12 @@ HEAD = """# Dependencies
 
 Written by `make lock` (`requirements/dependencies.py`); do not edit.
 
-Every Python package that the locks pin, with the licence that it states. `direct` packages stand in `pyproject.toml`,
-by extra; the others come with them. `server.lock` is what `marey[server]` needs, `worker.lock` what
-`marey[worker]` needs, `dev.lock` adds training, tests and tools. torch stays outside the locks
-([decision 1](../decisions/0001-torch-outside-the-lock.md)); the weights of MiniLM come without the
-dependencies of their package ([decision 13](../decisions/0013-minilm-without-its-dependencies.md)).
+Every Python package that the locks pin, with the licence that it states. `direct` packages stand in
+`pyproject.toml`, by extra; the others come with them. `server.lock` is what `marey[server]` needs,
+`worker.lock` what `marey[worker]` needs, `dev.lock` adds training, tests and tools. torch stays
+outside the locks ([decision 1](../decisions/0001-torch-outside-the-lock.md)); the weights of MiniLM
+come without the dependencies of their package
+([decision 13](../decisions/0013-minilm-without-its-dependencies.md)).
 """
 VENDORED = {
     "three": ("shared/marey/viz/assets/README.md", re.compile(r"three\.js ([0-9.]+[0-9])")),
