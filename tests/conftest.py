@@ -11,8 +11,10 @@ import itertools
 import os
 import shutil
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import nullcontext
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import psycopg
@@ -31,6 +33,19 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH")])
 )
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
+
+
+def pytest_configure() -> None:
+    """Refuse to run where the installed entry points are not those of pyproject.toml: registries would be empty."""
+    project = tomllib.loads((Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    for group, wanted in project["project"]["entry-points"].items():
+        missing = wanted.keys() - {entry.name for entry in entry_points(group=group)}
+        if missing:
+            raise pytest.UsageError(
+                f"the installed package has no entry point {min(missing)!r} of {group!r}: run `make setup`, or "
+                "`.venv/bin/pip install --no-deps --no-build-isolation -e .`"
+            )
+
 
 TEMPLATE = "migrated"
 _numbers = itertools.count()

@@ -11,7 +11,6 @@ from marey.jobs.generators import GeneratorCapabilities, capabilities_of
 
 FRESH_SECONDS = 5.0
 """A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""
-DEFAULT_MODEL = "hgm3"
 
 
 class Catalogue:
@@ -22,13 +21,18 @@ class Catalogue:
         self._offers: dict[str, tuple[float, GeneratorCapabilities]] = {}
         self._lock = threading.Lock()
 
+    @property
+    def live_model(self) -> str:
+        """The model of live streams that name none."""
+        return self._config.live_model
+
     def offer(self, name: str | None) -> GeneratorCapabilities:
         """Return the capabilities of a model (`hgm3`), a bundle or an exact bundle; None = the default model.
 
         Raises:
             NotFound, InvalidBundle, Refused: as `choose_bundle`.
         """
-        wanted = name or DEFAULT_MODEL
+        wanted = name or self._config.default_model
         with self._lock:
             made, offer = self._offers.get(wanted, (0.0, None))
             if offer is None or time.monotonic() - made > FRESH_SECONDS:

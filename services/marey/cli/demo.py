@@ -23,7 +23,6 @@ INTERRUPTED = 130
 START_SECONDS = 120.0
 """Making the database, importing torch and loading the model: 15 s here; a slow disk takes longer."""
 JOB_SECONDS = 240.0
-MODEL = "hgm3"
 PROMPTS = (
     {"prompt": "a person walks forward", "name": "walk", "seconds": 4, "seed": 1},
     {"prompt": "someone runs forward in a hurry", "name": "run", "seconds": 3, "seed": 2},
@@ -71,12 +70,14 @@ def _ensure_bundle(home: Path) -> bool:
     os.environ["MAREY_HOME"] = str(home)
     from marey.bundles import choose_bundle
     from marey.cli.roles.oneshot import make_random_bundle
+    from marey.core.settings import settings
 
+    model = settings().default_model
     try:
-        return choose_bundle(MODEL, verify=False).manifest.random
+        return choose_bundle(model, verify=False).manifest.random
     except NotFound:
         console.say("There is no trained bundle in models/: making a tiny one with random weights.")
-        make_random_bundle(home / "models" / f"{MODEL}-random")
+        make_random_bundle(model, home / "models" / f"{model}-random")
         return True
 
 

@@ -18,7 +18,7 @@ from typing import IO
 from marey.cli import console
 from marey.cli.children import Child, marey, metrics_port, stop_all
 from marey.cli.ports import try_port
-from marey.cli.roles.serving import GENERATORS, SHOWS, check_device, role_of, threads_of
+from marey.cli.roles.serving import PLATFORM, check_device, live_models, role_of, threads_of
 from marey.client.place import Server, read_server, write_server
 from marey.core.errors import Conflict, InvalidInput, MareyError
 from marey.core.private_home import make_private, open_private
@@ -148,11 +148,11 @@ class Supervisor:
 
     def _shown(self) -> list[str]:
         """Models with a live loop, in a process of its own: a batch must not hold up a stream."""
-        return [model for model in SHOWS if self.config.live_slots and any(model in role for role in self.roles)]
+        return list(live_models(queue for role in self.roles for queue in role)) if self.config.live_slots else []
 
     def _environment(self, database_url: str, queue_url: str) -> dict[str, str]:
         keys = {} if self.config.webhook_key else {"MAREY_WEBHOOK_KEY_FILE": str(key_file(self.home))}
-        computing = sum(any(queue in GENERATORS for queue in role) for role in self.roles)
+        computing = sum(any(queue not in PLATFORM for queue in role) for role in self.roles)
         return {
             **os.environ,
             **keys,

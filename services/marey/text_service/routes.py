@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from marey.bundles import TextSpec, choose_bundle, named_by
+from marey.core import defaults
 from marey.core.errors import InvalidInput, Unauthenticated, Unreachable
 from marey.core.settings import Settings
 from marey.http.fields import PROMPT
@@ -40,7 +41,9 @@ class ParseBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     prompts: list[Annotated[str, Field(json_schema_extra=PROMPT)]] = Field(min_length=1, max_length=MAX_PROMPTS)
-    model: str = Field("hgm3", pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use.")
+    model: str = Field(
+        defaults.MODEL, pattern=rf"^{MODEL.pattern}$", description="Model or bundle whose labeller to use."
+    )
 
 
 class NodeView(BaseModel):

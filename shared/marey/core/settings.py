@@ -28,6 +28,7 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from marey.core import defaults
 from marey.core.addresses import Allowed
 from marey.core.errors import InvalidInput
 from marey.core.origins import check_origins
@@ -231,6 +232,12 @@ class Settings(BaseSettings):
     webhook_seconds: Seconds = 1.0
     """Seconds between the scheduler's checks for due webhook deliveries."""
 
+    role: str | None = None
+    """Queues that `marey worker` serves where its command line names none, as hgm3+mogo."""
+    default_model: str = defaults.MODEL
+    """Model of items that name none."""
+    live_model: str = defaults.LIVE_MODEL
+    """Model of live streams that name none."""
     live_slots: int = Field(default=4, ge=0, le=1000)
     """Live streams of one worker at once."""
     streams_per_key: int = Field(default=4, ge=0, le=1000)

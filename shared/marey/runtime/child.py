@@ -31,7 +31,7 @@ from marey.storage import open_store
 
 log = logger(__name__)
 
-ROLE_VARIABLE = "MAREY_ROLE"
+ROLE_VARIABLE = "MAREY_CHILD_ROLE"
 """Environment variable that tells a child, a fresh interpreter, what to serve."""
 NAME_VARIABLE = "MAREY_WORKER_NAME"
 

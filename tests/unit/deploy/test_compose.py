@@ -9,7 +9,7 @@ import typer
 
 from marey.cli import children
 from marey.cli.main import app
-from marey.cli.roles.serving import HANDLERS, parse_roles
+from marey.cli.roles.serving import known_queues, parse_roles
 from marey.core.settings import Settings
 from marey.runtime import worker
 from marey.runtime.live import main as live
@@ -37,7 +37,7 @@ def test_every_part_of_the_platform_is_there() -> None:
     ours = {"migrate", "api", "scheduler", "parser", "text", "worker-hgm3", "worker-mogo", "evaluator"}
     assert set(ALL) == ours | {"postgres", "redis", "objectstore"}
     assert {service.name for service in OURS} == ours
-    assert {service.command[1] for service in OURS if service.command[0] == "worker"} == set(HANDLERS)
+    assert {service.command[1] for service in OURS if service.command[0] == "worker"} == set(known_queues())
 
 
 @each

@@ -10,7 +10,6 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from marey.api.catalogue import Catalogue
-from marey.api.streams.schemas import MODEL
 from marey.core.errors import MareyError
 from marey.http.pages import page_response
 from marey.viz.live_page import live_page
@@ -32,7 +31,7 @@ def examples(catalogue: Catalogue) -> tuple[str, ...]:
     `python -m marey.models.mogo.examples` measures them.
     """
     try:
-        reference = catalogue.offer(MODEL).bundle.reference
+        reference = catalogue.offer(catalogue.live_model).bundle.reference
     except MareyError:
         return ()  # no such model here: the page says so when a stream is begun
     return tuple(row["prompt"] for row in _measured().get(reference, [])[:MOST_EXAMPLES])

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from marey.api.jobs.schemas import ErrorView
 from marey.bundles import Bundle
+from marey.core import defaults
 from marey.http.fields import ITEM_MODEL, ITEM_NAME, PROMPT
 from marey.http.problems import ProblemBody
 from marey.http.schemas import View
@@ -21,8 +22,6 @@ from marey.motion.features import layout
 from marey.motion.skeleton import Skeleton
 from marey.streams import StreamPrompt, StreamRow, StreamState
 
-MODEL = "mogo"
-"""The model that makes motion frame by frame."""
 MIN_SECONDS, MAX_SECONDS = 1.0, 600.0
 DIGITS = 6
 """Of offsets: a thousandth of a millimetre."""
@@ -43,7 +42,7 @@ class NewStreamBody(BaseModel):
         None, description="File name of the clip, without its ending.", json_schema_extra=ITEM_NAME
     )
     model: str = Field(
-        MODEL,
+        defaults.LIVE_MODEL,
         description="Model, bundle or exact bundle that can make motion frame by frame.",
         json_schema_extra=ITEM_MODEL,
     )

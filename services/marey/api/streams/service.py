@@ -13,12 +13,13 @@ from marey.api.audit import note
 from marey.api.catalogue import Catalogue
 from marey.api.context import Context
 from marey.api.stream_hub import Hub
-from marey.api.streams.schemas import MODEL, Made, NewStreamBody, StreamDetailView
+from marey.api.streams.schemas import Made, NewStreamBody, StreamDetailView
 from marey.bundles import named_by
 from marey.core.errors import Conflict, InvalidBundle, InvalidInput, NotFound, Refused, Unreachable
 from marey.db import transaction
 from marey.items.item import MAX_SEED, Item, read_item
 from marey.jobs.generators import GeneratorCapabilities
+from marey.registry import find_model, model_names
 from marey.streams import NewStream, StreamRow, create_stream, end_stream, get_stream, prompts_with_rewrites
 from marey.streams.control import Control, ControlQueue
 from marey.streams.notifier import StreamNotifier
@@ -153,7 +154,7 @@ def _new_stream(key: ApiKey, body: NewStreamBody, catalogue: Catalogue) -> NewSt
 
 def _checked(body: NewStreamBody) -> Item:
     """Validate the fields that a stream shares with an item."""
-    item, problems = read_item(body.model_dump(exclude={"seconds"}))
+    item, problems = read_item(body.model_dump(exclude={"seconds"}, exclude_unset=True))
     if item is None or problems:
         message = "; ".join(str(problem) for problem in problems)
         raise InvalidInput(message, where=", ".join(dict.fromkeys(str(problem.field) for problem in problems)))
@@ -164,14 +165,16 @@ def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
     """Return the capabilities of the stream's bundle."""
     try:
         with named_by("model"):
-            offer = catalogue.offer(item.model)
+            offer = catalogue.offer(item.model or catalogue.live_model)
     except NotFound as error:  # what is not found is not at this path
         raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
     manifest = offer.bundle.manifest
-    if manifest.model != MODEL:
+    spec = find_model(manifest.model)
+    if spec is None or spec.live is None:
+        live = [name for name in model_names() if (each := find_model(name)) and each.live]
         raise InvalidInput(
             f"{manifest.name} is a bundle of {manifest.model}, which cannot make motion frame by frame",
             where="model",
-            hint=f"Bundles of {MODEL} can.",
+            hint=f"Bundles of {', '.join(live) or 'no model that is installed here'} can.",
         )
     return offer

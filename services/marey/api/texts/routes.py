@@ -16,4 +16,6 @@ router = APIRouter(prefix="/v1/texts", tags=["texts"], responses=RESPONSES)
 @router.post("/parse", response_model=GraphsView)
 async def parse_texts(body: ParseBody, shared: Shared, key: Parser) -> Response:
     """Parse prompts into semantic graphs; 429 while too much is being parsed, 503 after 10 s."""
+    if "model" not in body.model_fields_set:
+        body = body.model_copy(update={"model": shared.config.default_model})
     return await shared.texts.parse(body)

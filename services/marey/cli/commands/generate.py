@@ -107,7 +107,7 @@ def _bundle_for(reader: rows.PromptReader, items: list[Item], bundle: str | None
         raise needs_extra("worker", error) from error
     config = settings()
     try:
-        chosen = choose_bundle(bundle or _one_model(items), config=config)
+        chosen = choose_bundle(bundle or _one_model(items, config.default_model), config=config)
         reader.add(_problems(reader, items, chosen))
     except MareyError:
         if reader.total:
@@ -125,13 +125,13 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
         InvalidBundle: not a bundle of a model that runs here.
     """
     from marey.bundles.limits import check_seconds, check_settings
-    from marey.cli.roles.serving import GENERATORS
+    from marey.registry import find_model, model_names
 
-    if bundle.manifest.model not in GENERATORS:
+    if find_model(bundle.manifest.model) is None:
         raise InvalidBundle(
             f"is a bundle of {bundle.manifest.model!r}, which does not run here",
             where=str(bundle.path),
-            hint=f"Models that do: {', '.join(sorted(GENERATORS))}.",
+            hint=f"Models that do: {', '.join(model_names())}.",
         )
     problems: list[Problem] = []
     for number, item in enumerate(items, 1):
@@ -145,13 +145,13 @@ def _problems(reader: rows.PromptReader, items: Iterable[Item], bundle: Bundle) 
     return reader.located(problems)
 
 
-def _one_model(items: Iterable[Item]) -> str:
+def _one_model(items: Iterable[Item], default: str) -> str:
     """The model all items are for; one process loads one.
 
     Raises:
         InvalidInput: they name several.
     """
-    models = sorted({item.model or "hgm3" for item in items})
+    models = sorted({item.model or default for item in items})
     if len(models) > 1:
         raise InvalidInput(
             f"the prompts name {len(models)} models: {', '.join(models)}",

@@ -54,7 +54,14 @@ class Part(StrEnum):
 
 
 def worker(
-    model: Annotated[str, typer.Argument(metavar="MODEL", help="Queues: hgm3, mogo, text, evaluator; or hgm3+text.")],
+    model: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MODEL",
+            help="Queues: a model such as hgm3, text, evaluator; or several, as hgm3+text. Default: MAREY_ROLE.",
+            show_default=False,
+        ),
+    ] = None,
     only: Annotated[
         Part | None,
         typer.Option(
@@ -64,25 +71,32 @@ def worker(
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
     os.umask(UMASK)
-    from marey.cli.roles.serving import SHOWS, parse_roles, role_of
     from marey.core.extras import needs_extra
+    from marey.cli.roles.serving import live_models, parse_roles, role_of
 
-    queues = parse_roles(model.replace(",", "+"))[0]
-    shown = [queue for queue in queues if queue in SHOWS]
     try:
         from marey.cli.children import Child, keep_all, marey, metrics_port
         from marey.core.settings import settings
         from marey.runtime.worker import worker_main
     except ImportError as error:
         raise needs_extra("worker", error) from error
+    where = "MODEL" if model else "MAREY_ROLE"
+    model = model or settings().role
+    if not model:
+        raise InvalidInput(
+            "a worker needs to know what it serves", where=where, hint="Name its queues: `marey worker hgm3`."
+        )
+    queues = parse_roles(model.replace(",", "+"), where)[0]
+    shown = live_models(queues)
     if only is Part.LIVE:
         from marey.runtime.live.main import live_main
 
         if len(shown) != 1:
             raise InvalidInput(
-                f"{model!r} names {len(shown)} models that stream", where="MODEL", hint="Name one: mogo."
+                f"{model!r} names {len(shown)} models that stream", where="MODEL", hint="Name one that does."
             )
-        raise typer.Exit(live_main(SHOWS[shown[0]], settings()))
+        (factory,) = shown.values()
+        raise typer.Exit(live_main(factory, settings()))
     role = role_of(queues, settings())
     if only is Part.QUEUE or not shown or not settings().live_slots:
         raise typer.Exit(worker_main(role, settings()))

@@ -11,6 +11,7 @@ import typer
 from marey.cli import console, options
 from marey.cli.commands.submit import read_prompts
 from marey.client.rows import right_items
+from marey.core import defaults
 from marey.core.private_home import UMASK
 
 if TYPE_CHECKING:
@@ -26,7 +27,9 @@ def parse(
     prompts: options.Prompts = None,
     file: options.PromptFile = None,
     input_format: options.PromptFormat = None,
-    model: Annotated[str, typer.Option("--model", help="Model or bundle whose labeller and rewriter to use.")] = "hgm3",
+    model: Annotated[
+        str, typer.Option("--model", help="Model or bundle whose labeller and rewriter to use.")
+    ] = defaults.MODEL,
     as_json: console.Json = False,
 ) -> None:
     """Show the graph a prompt becomes. Needs no server."""

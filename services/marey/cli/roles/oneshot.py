@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.roles.serving import GENERATORS, threads_of
-from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
+from marey.cli.roles.serving import threads_of
+from marey.core.errors import InvalidInput
+from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
@@ -45,14 +45,14 @@ class OneShot:
             from marey.text.keys import as_served
             from marey.text.pipeline import TextPipeline
 
-            kind = import_module(GENERATORS[bundle.manifest.model]).Generator
+            load = resolve(get_model(bundle.manifest.model, where=str(bundle.path)).load)
         except ImportError as error:
             raise needs_extra("worker", error) from error
         if bundle.manifest.text is None:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
-        self._generator: Generator[Any] = kind.load(bundle, device=config.device, threads=threads_of(config, 1))
+        self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads_of(config, 1))
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
         """Each motion with the seconds it took, in the order given.
@@ -86,8 +86,14 @@ class OneShot:
             start += len(rows)
 
 
-def make_random_bundle(path: Path) -> None:
-    """A tiny HGM³ with random weights: it exercises everything and generates nonsense."""
-    from marey.models.hgm3.bundle import random_bundle
+def make_random_bundle(model: str, path: Path) -> None:
+    """Write a tiny bundle of a model with random weights: it exercises everything and generates nonsense.
 
-    random_bundle(path)
+    Raises:
+        NotFound: there is no such model.
+        InvalidInput: the model makes no such bundles.
+    """
+    spec = get_model(model)
+    if spec.random_bundle is None:
+        raise InvalidInput(f"the model {model!r} makes no bundles with random weights")
+    resolve(spec.random_bundle)(path)

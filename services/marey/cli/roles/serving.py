@@ -5,28 +5,34 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from marey.core.errors import InvalidInput
+from marey.registry import get_model, model_names
 
 if TYPE_CHECKING:
     from marey.core.settings import Settings
     from marey.runtime.handler import Role
 
-HANDLERS = {
-    "hgm3": "marey.models.hgm3.handler:create_handler",
-    "mogo": "marey.models.mogo.handler:create_handler",
-    "text": "marey.text_service.handler:create_handler",
-    "evaluator": "marey.evaluator.handler:create_handler",
-}
-"""Factories by queue, as strings: only a worker's child imports them, and with them torch."""
 TEXT = "text"
 """The queue of prompts, which computes on no device."""
-SHOWS = {"mogo": "marey.models.mogo.live:create_live_model"}
-"""What the live loop of each model that streams serves."""
-GENERATORS = {"hgm3": "marey.models.hgm3.generate", "mogo": "marey.models.mogo.generate"}
-"""Where each model's `Generator` is."""
+PLATFORM = {
+    TEXT: "marey.text_service.handler:create_handler",
+    "evaluator": "marey.evaluator.handler:create_handler",
+}
+"""Factories of the queues that are no model's, as strings: only a worker's child imports them, and with them torch."""
+
+
+def known_queues() -> tuple[str, ...]:
+    """The queues that a worker can serve: of every registered model, and of the platform."""
+    return (*model_names(), *PLATFORM)
+
+
+def live_models(queues: Iterable[str]) -> dict[str, str]:
+    """The models among these queues that stream, each with the factory of its live loop."""
+    specs = (get_model(queue) for queue in dict.fromkeys(queues) if queue not in PLATFORM)
+    return {spec.name: spec.live for spec in specs if spec.live is not None}
 
 
 def default_roles(config: Settings) -> str:
@@ -36,22 +42,27 @@ def default_roles(config: Settings) -> str:
 
     here = {bundle.manifest.model for bundle in list_bundles(config=config, kind="generator")}
     judges = ["evaluator" for _ in list_bundles(config=config, kind="evaluator")][:1]
-    return "+".join([*([model for model in GENERATORS if model in here] or ["hgm3"]), "text", *judges])
+    return "+".join([*([model for model in model_names() if model in here] or [config.default_model]), "text", *judges])
 
 
-def parse_roles(text: str) -> list[tuple[str, ...]]:
+def parse_roles(text: str, where: str = "--with") -> list[tuple[str, ...]]:
     """`hgm3+text,hgm3` → one worker of both queues and one of the first.
+
+    Args:
+        text: queues; + joins them in one child, a comma separates children.
+        where: where it was given, for the error.
 
     Raises:
         InvalidInput: an unknown queue.
     """
     roles = [tuple(part.strip() for part in role.split("+")) for role in text.split(",")]
+    known = known_queues()
     for name in (name for role in roles for name in role):
-        if name not in HANDLERS:
+        if name not in known:
             raise InvalidInput(
                 f"there is no worker {name!r}",
-                where="--with",
-                hint=f"Known: {', '.join(HANDLERS)}; + joins them in one child, a comma separates children.",
+                where=where,
+                hint=f"Known: {', '.join(known)}; + joins them in one child, a comma separates children.",
             )
     return roles
 
@@ -65,8 +76,8 @@ def role_of(queues: Sequence[str], config: Settings) -> Role:
     from marey.bundles import choose_bundle
     from marey.runtime.handler import Role
 
-    preload = {q: choose_bundle(q, config=config).reference for q in queues if q in GENERATORS}
-    return Role("+".join(queues), {queue: HANDLERS[queue] for queue in queues}, preload)
+    preload = {q: choose_bundle(q, config=config).reference for q in queues if q not in PLATFORM}
+    return Role("+".join(queues), {q: PLATFORM.get(q) or get_model(q).handler for q in queues}, preload)
 
 
 def check_device(device: str, roles: Sequence[Sequence[str]]) -> None:

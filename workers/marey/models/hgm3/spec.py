@@ -1,0 +1,50 @@
+"""HGM³ as the registry knows it. Standard library only."""
+
+from __future__ import annotations
+
+from marey.registry import Ablation, Choice, ModelSpec, Setting, Stage, Training
+
+SPEC = ModelSpec(
+    name="hgm3",
+    title="HGM³",
+    about="""\
+Whole motions from one English prompt, drawn by masked tokens in a few passes.
+Reads a prompt as a graph: the whole, its actions, and what is said of each action.
+Several actions in one prompt come out in the order of time.
+Decides the length itself where none is given.
+Decoding goes from coarse to fine; steps trade quality for time.
+Does not stream: a motion is drawn as a whole.
+The same prompt, seed, settings and bundle give the same motion.""",
+    handler="marey.models.hgm3.handler:create_handler",
+    load="marey.models.hgm3.generate:Generator.load",
+    settings=(
+        Setting("steps", 1, 100, 10, "Passes of the base level; fewer are faster.", whole=True),
+        Setting("guidance", 0.0, 100.0, 4.0, "Weight of the prompt at the base level; 1 = none."),
+        Setting("temperature", 0.0, 100.0, 1.0, "Randomness of the base level; 0 = the likeliest token."),
+        Setting("top_k", 0.001, 1.0, 0.1, "Share of the codes that the base level may draw."),
+        Setting("residual_guidance", 0.0, 100.0, 5.0, "As guidance, for the residual levels."),
+        Setting("residual_temperature", 0.0, 100.0, 1.0, "As temperature, for the residual levels."),
+        Setting("residual_top_k", 0.001, 1.0, 0.1, "As top_k, for the residual levels."),
+    ),
+    training=Training(
+        help="HGM³: stages in this order, then `bundle`.",
+        stages=(
+            Stage("tokenizer", "Train the residual VQ-VAE."),
+            Stage("masked", "Train the masked transformer, with hard token mining."),
+            Stage("residual", "Train the residual transformer."),
+            Stage("length", "Train the length estimator."),
+            Stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on."),
+        ),
+        config="marey.models.hgm3.config:named_config",
+        train="marey.models.hgm3.train:train_stage",
+        assemble="marey.models.hgm3.assembly:assemble",
+        unpack="marey.models.hgm3.assembly:take_apart",
+        choices=(Choice("mask", ("hard", "random"), "hard or random; none given = as the configuration says."),),
+    ),
+    tokenizer="marey.models.hgm3.tokenizer:build_tokenizer",
+    random_bundle="marey.models.hgm3.bundle:random_bundle",
+    self_train="marey.models.hgm3.practice:draw_practice",
+    ablations=(
+        Ablation("masks", "Hard and random masks, each decoded in three ways.", "marey.models.hgm3.ablation:ablate"),
+    ),
+)

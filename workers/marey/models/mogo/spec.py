@@ -1,0 +1,47 @@
+"""MOGO as the registry knows it. Standard library only."""
+
+from __future__ import annotations
+
+from marey.registry import Ablation, ModelSpec, Setting, Stage, Training
+
+SPEC = ModelSpec(
+    name="mogo",
+    title="MOGO",
+    about="""\
+Motions from one English prompt, drawn frame by frame, and live streams that are steered while they run.
+A stream follows a new prompt within about two seconds and goes on without end.
+Reads a prompt as one sentence; several actions in one prompt are less reliable than one after another.
+An open length ends where the model draws an end.
+Only the past decides a frame: nothing is revised, so a motion is less even than one drawn as a whole.
+The same prompt, seed, settings and bundle give the same motion.""",
+    handler="marey.models.mogo.handler:create_handler",
+    load="marey.models.mogo.generate:Generator.load",
+    settings=(
+        Setting("guidance", 0.0, 100.0, 1.0, "Weight of the prompt at level 0; 1 = none, else twice the work."),
+        Setting("temperature", 0.0, 100.0, 1.0, "Randomness of level 0; 0 = the likeliest token."),
+        Setting("top_k", 0.001, 1.0, 0.1, "Share of the codes that level 0 may draw."),
+        Setting("upper_guidance", 0.0, 100.0, 1.0, "As guidance, for all other levels."),
+        Setting("upper_temperature", 0.0, 100.0, 0.6, "As temperature, for all other levels."),
+        Setting("upper_top_k", 0.001, 1.0, 0.1, "As top_k, for all other levels."),
+    ),
+    live="marey.models.mogo.live:create_live_model",
+    training=Training(
+        help="MOGO: tokenizer, transformer, then `bundle`.",
+        stages=(
+            Stage("tokenizer", "Train the MoSA-VQ."),
+            Stage("transformer", "Train the RQHC-Transformer."),
+            Stage("all", "Both stages one after another, --max-minutes for them together; called again, it goes on."),
+        ),
+        config="marey.models.mogo.config:named_config",
+        train="marey.models.mogo.train:train_stage",
+        assemble="marey.models.mogo.assembly:assemble",
+        unpack="marey.models.mogo.assembly:take_apart",
+    ),
+    tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
+    random_bundle="marey.models.mogo.bundle:random_bundle",
+    live_adherence="marey.models.mogo.obedience:judge_streams",
+    ablations=(
+        Ablation("tokenizer", "Ways in which MoSA scales its levels.", "marey.models.mogo.ablation:ablate_tokenizer"),
+        Ablation("transformer", "How levels and depth are drawn.", "marey.models.mogo.ablation:ablate_transformer"),
+    ),
+)
