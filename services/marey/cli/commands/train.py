@@ -2,31 +2,51 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Mapping, MutableMapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from marey.cli import console
+from marey.registry import Stage, Training
 
-app = typer.Typer(help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
-hgm3 = typer.Typer(help="HGM³: stages in this order, then `bundle`.", no_args_is_help=True)
-app.add_typer(hgm3, name="hgm3")
-mogo = typer.Typer(help="MOGO: tokenizer, transformer, then `bundle`.", no_args_is_help=True)
-app.add_typer(mogo, name="mogo")
-evaluator = typer.Typer(help="What judges generated motions: the stage `tmr`, then `bundle`.", no_args_is_help=True)
-app.add_typer(evaluator, name="evaluator")
+EVALUATOR = Training(
+    help="What judges generated motions: the stage `tmr`, then `bundle`.",
+    stages=(Stage("tmr", "Train the motion and the text encoder of the evaluator."),),
+    config="marey.evaluator.config:named_config",
+    train="marey.evaluator.train:train_stage",
+    assemble="marey.evaluator.assembly:assemble",
+    bundle_help="Write the bundle from the part of a run, with captions and embeddings of the real test clips.",
+)
 
-Model = Literal["hgm3", "mogo", "evaluator"]
+
+class TrainGroup(TyperGroup):
+    """The registered models beside the commands for all models; reads the registry at the first look-up."""
+
+    _own: MutableMapping[str, Any]
+    _models: dict[str, Any] | None = None
+
+    @property
+    def commands(self) -> MutableMapping[str, Any]:
+        """Commands by name: a group for each model, then the others."""
+        if self._models is None:
+            from marey.cli.roles.training import trained_models
+
+            self._models = {
+                name: typer.main.get_group(_group_of(name, each)) for name, each in trained_models().items()
+            }
+        return {**self._models, **self._own}
+
+    @commands.setter
+    def commands(self, own: MutableMapping[str, Any]) -> None:
+        self._own = own
 
 
-class Mask(StrEnum):
-    """What the masked transformer masks in training."""
-
-    HARD = "hard"
-    RANDOM = "random"
-
+app = typer.Typer(cls=TrainGroup, help="Train a model, stage by stage, then write its bundle.", no_args_is_help=True)
 
 Data = Annotated[Path, typer.Argument(metavar="DATA", help="A prepared folder, with its texts.")]
 Run = Annotated[Path, typer.Option("--run", help="Folder of all stages of one bundle.")]
@@ -36,134 +56,114 @@ Minutes = Annotated[float | None, typer.Option("--max-minutes", help="Minutes; s
 Seed = Annotated[int, typer.Option("--seed", help="Of weights and batches.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint.")]
 Warm = Annotated[bool, typer.Option("--warm", help="Start from the stage's finished part, not from nothing.")]
-Masking = Annotated[Mask | None, typer.Option("--mask", help="hard or random; none given = as the configuration says.")]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
 Rate = Annotated[float | None, typer.Option("--learning-rate", help="None given = as the configuration says.")]
 Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
 
 
-def _run(model: Model, stage: str, as_json: bool, **chosen: Any) -> None:
-    from marey.cli.roles import training
-
-    metrics = training.train_stage(model, stage, **chosen)
-    if as_json:
-        console.result_json(metrics)
-    else:
-        for metric, value in metrics.items():
-            console.result(f"{metric} = {value:g}")
-
-
-def _hgm3_stage(name: str, what: str) -> None:
-    """Add the command of one stage."""
-
-    def command(
-        data: Data,
-        run: Run,
-        config: Config = "starter",
-        steps: Steps = None,
-        max_minutes: Minutes = None,
-        seed: Seed = 0,
-        resume: Resume = False,
-        warm: Warm = False,
-        learning_rate: Rate = None,
-        mask: Masking = None,
-        device: Device = "auto",
-        threads: Threads = 0,
-        bf16: Bf16 = True,
-        as_json: console.Json = False,
-    ) -> None:
-        _run(
-            "hgm3", name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
-            resume=resume, warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16,
-            mask=None if mask is None else mask.value,
-        )  # fmt: skip
-
-    hgm3.command(name, help=what)(command)
-
-
-def _stage(model: Literal["mogo", "evaluator"], name: str, what: str) -> None:
-    """Add the command of one stage that has no options of its own."""
-
-    def command(
-        data: Data,
-        run: Run,
-        config: Config = "starter",
-        steps: Steps = None,
-        max_minutes: Minutes = None,
-        seed: Seed = 0,
-        resume: Resume = False,
-        warm: Warm = False,
-        learning_rate: Rate = None,
-        device: Device = "auto",
-        threads: Threads = 0,
-        bf16: Bf16 = True,
-        as_json: console.Json = False,
-    ) -> None:
-        _run(
-            model, name, as_json, data=data, run=run, config=config, steps=steps, minutes=max_minutes, seed=seed,
-            resume=resume, warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16,
-        )  # fmt: skip
-
-    {"mogo": mogo, "evaluator": evaluator}[model].command(name, help=what)(command)
-
-
-_hgm3_stage("tokenizer", "Train the residual VQ-VAE.")
-_hgm3_stage("masked", "Train the masked transformer, with hard token mining.")
-_hgm3_stage("residual", "Train the residual transformer.")
-_hgm3_stage("length", "Train the length estimator.")
-_hgm3_stage("all", "All stages one after another, --max-minutes for them together; called again, it goes on.")
-_stage("mogo", "tokenizer", "Train the MoSA-VQ.")
-_stage("mogo", "transformer", "Train the RQHC-Transformer.")
-_stage("mogo", "all", "Both stages one after another, --max-minutes for them together; called again, it goes on.")
-_stage("evaluator", "tmr", "Train the motion and the text encoder of the evaluator.")
-
-
 Output = Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")]
 Card = Annotated[Path | None, typer.Option("--card", help="The model card to put in.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a bundle that is there.")]
+Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
+UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
 
 
-@hgm3.command("bundle")
-def hgm3_bundle(
-    data: Data,
-    run: Run,
-    output: Output,
-    config: Config = "starter",
-    mask: Masking = None,
-    card: Card = None,
-    overwrite: Overwrite = False,
-) -> None:
-    """Write the bundle from the parts of a run."""
-    from marey.cli.roles import training
+def _group_of(name: str, training: Training) -> typer.Typer:
+    """Make the commands of one model: its stages, `bundle`, and `unpack` where bundles can be trained further."""
+    group = typer.Typer(name=name, help=training.help, no_args_is_help=True, rich_markup_mode=None)
+    for stage in training.stages:
+        group.command(stage.name, help=stage.help)(_with_choices(_stage_command(training, stage.name), training))
+    group.command("bundle", help=training.bundle_help)(_with_choices(_bundle_command(training), training))
+    if training.unpack is not None:
 
-    chosen = None if mask is None else mask.value
-    made = training.assemble_bundle(
-        "hgm3", data, run, output, config=config, card=card, overwrite=overwrite, mask=chosen
-    )
-    console.result(made)
+        def unpack(bundle: Packed, run: Run) -> None:
+            from marey.cli.roles.training import unpack_bundle
+
+            console.result(unpack_bundle(training, bundle, run))
+
+        group.command("unpack", help=UNPACK)(unpack)
+    return group
 
 
-@mogo.command("bundle")
-def mogo_bundle(
-    data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
-) -> None:
-    """Write the bundle from the parts of a run."""
-    from marey.cli.roles import training
+def _stage_command(training: Training, stage: str) -> Callable[..., None]:
+    def command(
+        data: Data,
+        run: Run,
+        config: Config = "starter",
+        steps: Steps = None,
+        max_minutes: Minutes = None,
+        seed: Seed = 0,
+        resume: Resume = False,
+        warm: Warm = False,
+        learning_rate: Rate = None,
+        device: Device = "auto",
+        threads: Threads = 0,
+        bf16: Bf16 = True,
+        as_json: console.Json = False,
+        **choices: StrEnum | None,
+    ) -> None:
+        from marey.cli.roles.training import train_stage
 
-    console.result(training.assemble_bundle("mogo", data, run, output, config=config, card=card, overwrite=overwrite))
+        metrics = train_stage(
+            training, stage, data, run, config=config, steps=steps, minutes=max_minutes, seed=seed, resume=resume,
+            warm=warm, rate=learning_rate, device=device, threads=threads, bf16=bf16, choices=_given(choices),
+        )  # fmt: skip
+        if as_json:
+            console.result_json(metrics)
+        else:
+            for metric, value in metrics.items():
+                console.result(f"{metric} = {value:g}")
+
+    return command
 
 
-@evaluator.command("bundle")
-def evaluator_bundle(
-    data: Data, run: Run, output: Output, config: Config = "starter", card: Card = None, overwrite: Overwrite = False
-) -> None:
-    """Write the bundle from the part of a run, with captions and embeddings of the real test clips."""
-    from marey.cli.roles import training
+def _bundle_command(training: Training) -> Callable[..., None]:
+    def command(
+        data: Data,
+        run: Run,
+        output: Output,
+        config: Config = "starter",
+        card: Card = None,
+        overwrite: Overwrite = False,
+        **choices: StrEnum | None,
+    ) -> None:
+        from marey.cli.roles.training import assemble_bundle
 
-    console.result(
-        training.assemble_bundle("evaluator", data, run, output, config=config, card=card, overwrite=overwrite)
-    )
+        made = assemble_bundle(
+            training, data, run, output, config=config, card=card, overwrite=overwrite, choices=_given(choices)
+        )
+        console.result(made)
+
+    return command
+
+
+def _given(choices: Mapping[str, StrEnum | None]) -> dict[str, str]:
+    return {name: value.value for name, value in choices.items() if value is not None}
+
+
+def _with_choices(command: Callable[..., None], training: Training) -> Callable[..., None]:
+    """Put the model's own options into the signature of a command, which typer reads."""
+    signature = inspect.signature(command, eval_str=True)
+    common = [each for each in signature.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+    own = [
+        inspect.Parameter(
+            choice.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[
+                StrEnum(choice.name.title(), {value.upper(): value for value in choice.values}) | None,  # pyright: ignore[reportArgumentType]
+                typer.Option(f"--{choice.name}", help=choice.help),
+            ],
+        )
+        for choice in training.choices
+    ]
+    command.__signature__ = signature.replace(parameters=[*common, *own])  # pyright: ignore[reportFunctionMemberAccess]
+    return command
+
+
+evaluator = _group_of("evaluator", EVALUATOR)
+app.add_typer(evaluator)
 
 
 @evaluator.command("reference")
@@ -208,19 +208,49 @@ def evaluator_reconstruct(
                 console.result(f"{source}/{metric} = {value['mean']:g}")
 
 
-Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
-UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
+@app.command("self-train")
+def self_train(
+    bundle: Packed,
+    data: Data,
+    run: Run,
+    captions: Annotated[int, typer.Option("--captions", help="Captions to draw motions for.")] = 3600,
+    seed: Seed = 0,
+    threads: Threads = 0,
+) -> None:
+    """Draw motions for training captions, and keep those that do what the caption says for the next training.
 
-
-@hgm3.command("unpack", help=UNPACK)
-def hgm3_unpack(bundle: Packed, run: Run) -> None:
+    The run must have the bundle's tokenizer: `marey train MODEL unpack` puts it there. The stage that learns from the
+    kept motions finds them in the run.
+    """
     from marey.cli.roles import training
 
-    console.result(training.take_bundle_apart("hgm3", bundle, run))
+    with console.bar() as bar:
+        task = bar.add_task("drawing", total=None)
+        kept = training.self_train(
+            bundle, data, run, captions=captions, seed=seed, threads=threads,
+            progress=lambda line: bar.update(task, description=line),
+        )  # fmt: skip
+    console.result(f"{kept} motions kept")
 
 
-@mogo.command("unpack", help=UNPACK)
-def mogo_unpack(bundle: Packed, run: Run) -> None:
+@app.command()
+def ablate(
+    data: Data,
+    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Gives the configuration and the other parts.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of runs, numbers and tables.")],
+    what: Annotated[
+        str | None, typer.Option("--what", help="Which ablation of the model; none given = the only one.")
+    ] = None,
+    steps: Annotated[int, typer.Option("--steps", help="Optimiser steps of each variant.")] = 1500,
+    batch: Annotated[int | None, typer.Option("--batch", help="Clips a step; none given = as configured.")] = None,
+    seeds: Annotated[int, typer.Option("--seeds", help="Training seeds of each variant.")] = 1,
+    threads: Threads = 0,
+) -> None:
+    """Train variants of a model, and measure what each of its parts is worth. Called again, it goes on."""
     from marey.cli.roles import training
 
-    console.result(training.take_bundle_apart("mogo", bundle, run))
+    console.result(
+        training.ablate(
+            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads
+        ).rstrip("\n")
+    )  # fmt: skip

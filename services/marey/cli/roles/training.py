@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
+from marey.registry import Training, find_model, model_names, resolve
+
+
+def trained_models() -> dict[str, Training]:
+    """The models that can be trained here, by name."""
+    specs = (find_model(name) for name in model_names())
+    return {spec.name: spec.training for spec in specs if spec is not None and spec.training is not None}
 
 
 def train_stage(
-    model: Literal["hgm3", "mogo", "evaluator"],
+    training: Training,
     name: str,
     data: Path,
     run: Path,
@@ -18,35 +27,29 @@ def train_stage(
     steps: int | None,
     minutes: float | None,
     rate: float | None = None,
-    mask: Literal["hard", "random"] | None = None,
+    choices: Mapping[str, str] | None = None,
     **options: Any,
 ) -> dict[str, float]:
-    """Train one stage of a model; its metrics. See `marey.training.staging.TrainOptions` for the options."""
+    """Train one stage; its metrics.
+
+    Args:
+        choices: of the model's own options.
+        options: of `marey.training.staging.TrainOptions`.
+    """
     try:
-        from marey.evaluator import config as evaluator_config
-        from marey.evaluator import train as evaluator
-        from marey.models.hgm3 import config as hgm3_config
-        from marey.models.hgm3 import train as hgm3
-        from marey.models.mogo import config as mogo_config
-        from marey.models.mogo import train as mogo
         from marey.training.budget import Budget
         from marey.training.optimisation import with_learning_rate
         from marey.training.staging import TrainOptions
+
+        named_config, train = resolve(training.config), resolve(training.train)
     except ImportError as error:
         raise needs_extra("train", error) from error
-    budget = Budget(steps, minutes)
-    if model == "hgm3":
-        chosen = with_learning_rate(hgm3_config.named_config(config, mask=mask), name, rate)
-        return hgm3.train_stage(name, TrainOptions(data, run, chosen, budget, **options))
-    if model == "evaluator":
-        judge = with_learning_rate(evaluator_config.named_config(config), name, rate)
-        return evaluator.train_stage(name, TrainOptions(data, run, judge, budget, **options))
-    mogos = with_learning_rate(mogo_config.named_config(config), name, rate)
-    return mogo.train_stage(name, TrainOptions(data, run, mogos, budget, **options))
+    chosen = with_learning_rate(named_config(config, **(choices or {})), name, rate)
+    return train(name, TrainOptions(data, run, chosen, Budget(steps, minutes), **options))
 
 
 def assemble_bundle(
-    model: Literal["hgm3", "mogo", "evaluator"],
+    training: Training,
     data: Path,
     run: Path,
     output: Path,
@@ -54,38 +57,28 @@ def assemble_bundle(
     config: str,
     card: Path | None,
     overwrite: bool,
-    mask: Literal["hard", "random"] | None = None,
+    choices: Mapping[str, str] | None = None,
 ) -> str:
     """Write the bundle of a run; its exact reference."""
     try:
-        from marey.evaluator import assembly as evaluator
-        from marey.evaluator import config as evaluator_config
-        from marey.models.hgm3 import assembly as hgm3
-        from marey.models.hgm3 import config as hgm3_config
-        from marey.models.mogo import assembly as mogo
-        from marey.models.mogo import config as mogo_config
+        named_config, assemble = resolve(training.config), resolve(training.assemble)
     except ImportError as error:
         raise needs_extra("train", error) from error
     text = None if card is None else card.read_text(encoding="utf-8")
-    if model == "hgm3":
-        chosen = hgm3_config.named_config(config, mask=mask)
-        return hgm3.assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
-    if model == "evaluator":
-        judge = evaluator_config.named_config(config)
-        return evaluator.assemble(data, run, output, judge, card=text, overwrite=overwrite).reference
-    return mogo.assemble(data, run, output, mogo_config.named_config(config), card=text, overwrite=overwrite).reference
+    chosen = named_config(config, **(choices or {}))
+    return assemble(data, run, output, chosen, card=text, overwrite=overwrite).reference
 
 
-def take_bundle_apart(model: Literal["hgm3", "mogo"], bundle: str, run: Path) -> str:
+def unpack_bundle(training: Training, bundle: str, run: Path) -> str:
     """Write the parts of a bundle into a run folder; the name of its configuration."""
+    assert training.unpack is not None  # else there is no such command
     try:
         from marey.bundles import find_bundle
-        from marey.models.hgm3 import assembly as hgm3
-        from marey.models.mogo import assembly as mogo
+
+        unpack = resolve(training.unpack)
     except ImportError as error:
         raise needs_extra("train", error) from error
-    take_apart = hgm3.take_apart if model == "hgm3" else mogo.take_apart
-    return take_apart(find_bundle(bundle), run).name
+    return unpack(find_bundle(bundle), run).name
 
 
 def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -> str:
@@ -96,3 +89,83 @@ def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -
     except ImportError as error:
         raise needs_extra("train", error) from error
     return renew_reference(find_bundle(bundle), data, output, overwrite=overwrite).reference
+
+
+def self_train(
+    bundle: str,
+    data: Path,
+    run: Path,
+    *,
+    captions: int,
+    seed: int,
+    threads: int,
+    progress: Callable[[str], None],
+) -> int:
+    """Draw motions for training captions, and leave those that do what the caption says in a run; how many.
+
+    Raises:
+        InvalidInput: the bundle's model cannot be trained on its own motions.
+    """
+    try:
+        from marey.bundles import choose_bundle
+        from marey.data.prepared import PreparedData
+        from marey.training.adherence import pipeline_of
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    found = choose_bundle(bundle)
+    spec = find_model(found.manifest.model)
+    if spec is None or spec.self_train is None:
+        able = [name for name in model_names() if (each := find_model(name)) and each.self_train]
+        raise InvalidInput(
+            f"the model {found.manifest.model!r} has no self-training",
+            where=bundle,
+            hint=f"Models that have: {', '.join(able) or 'none'}.",
+        )
+    generator = resolve(spec.load)(found, threads=threads)
+    prepared = PreparedData.open(data)
+    return resolve(spec.self_train)(
+        generator, pipeline_of(generator), prepared, run, captions=captions, seed=seed, progress=progress
+    )
+
+
+def ablate(
+    name: str | None,
+    data: Path,
+    bundle: str,
+    output: Path,
+    *,
+    steps: int,
+    batch: int | None,
+    seeds: int,
+    threads: int,
+) -> str:
+    """Train and measure variants of a bundle's model; a Markdown table.
+
+    Args:
+        name: of the ablation; None = the only one of the model.
+
+    Raises:
+        InvalidInput: the model has no such ablation, or several and none is named.
+    """
+    try:
+        from marey.bundles import choose_bundle
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    found = choose_bundle(bundle)
+    spec = find_model(found.manifest.model)
+    known = {each.name: each for each in (spec.ablations if spec else ())}
+    if name is None and len(known) == 1:
+        (name,) = known
+    if name not in known:
+        raise InvalidInput(
+            f"the model {found.manifest.model!r} has no ablation {name!r}"
+            if name
+            else "the model has several ablations",
+            where="--what",
+            hint=f"Known: {'; '.join(f'{each.name} ({each.help})' for each in known.values()) or 'none'}.",
+        )
+    try:
+        run = resolve(known[name].run)
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    return run(data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads)
