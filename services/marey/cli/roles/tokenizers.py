@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
+from marey.registry import find_model, model_names, resolve
 
 if TYPE_CHECKING:
     from marey.nn.motion_tokenizer import MotionTokenizer
@@ -56,28 +58,38 @@ def reconstruct(
 
 def _open_tokenizer(generator: str) -> tuple[str, str | None, MotionTokenizer]:
     """Exact name, licence (None = of a run, which has none yet) and tokenizer, in evaluation mode."""
+    import torch
+
     from marey.bundles import choose_bundle
     from marey.core.hashing import sha256_of
-    from marey.models.hgm3 import bundle as hgm3
-    from marey.models.hgm3 import config as hgm3_config
-    from marey.models.hgm3 import tokenizer as hgm3_tokenizer
-    from marey.models.mogo import bundle as mogo
-    from marey.models.mogo import config as mogo_config
-    from marey.models.mogo import tokenizer as mogo_tokenizer
+    from marey.nn.bundling import fill
     from marey.training.parts import load_part
 
     folder = Path(generator) / "tokenizer" / "part"
     if (folder / "part.json").is_file():
         part = load_part(folder)
-        if "masked" in part.config:
-            tokenizer = hgm3_tokenizer.Tokenizer(hgm3_config.HGM3Config.from_dict(part.config))
-        else:
-            tokenizer = mogo_tokenizer.Tokenizer(mogo_config.MOGOConfig.from_dict(part.config))
+        tokenizer = _tokenizer_of_run(part.config, folder)
         tokenizer.load_state_dict({name: value.float() for name, value in part.state.items()}, strict=False)
         sha256 = sha256_of(folder / "weights.safetensors")[:12]
         return f"{Path(generator).resolve().name}@{sha256}", None, tokenizer.eval()
     found = choose_bundle(generator)
-    networks = {"hgm3": lambda: hgm3.load_networks(found)[1].tokenizer, "mogo": lambda: mogo.load_networks(found)[1]}
-    if found.manifest.model not in networks:
+    spec = find_model(found.manifest.model)
+    if spec is None or spec.tokenizer is None:
         raise InvalidInput(f"{found.manifest.name!r} has no tokenizer", where=str(found.path))
-    return found.reference, found.manifest.licence, networks[found.manifest.model]()
+    tokenizer = resolve(spec.tokenizer)(found.manifest.parameters)
+    fill(tokenizer, found, "tokenizer")
+    tokenizer.set_statistics(*map(torch.from_numpy, found.statistics()))
+    return found.reference, found.manifest.licence, tokenizer
+
+
+def _tokenizer_of_run(parameters: Mapping[str, Any], folder: Path) -> MotionTokenizer:
+    """The untrained tokenizer of the model whose configuration a run's part holds.
+
+    Raises:
+        InvalidInput: no model that is installed here reads it.
+    """
+    for spec in filter(None, map(find_model, model_names())):
+        if spec.tokenizer is not None:
+            with suppress(InvalidInput):  # of another model: it has fields that this one has not
+                return resolve(spec.tokenizer)(parameters)
+    raise InvalidInput("no model that is installed here reads this configuration", where=str(folder))

@@ -6,6 +6,9 @@ length after every convolution and upsampling.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -139,3 +142,12 @@ class Tokenizer(MotionTokenizer):
         if mask is None:
             return features
         return features * mask.repeat_interleave(self.frames_per_token, dim=1)[..., None]
+
+
+def build_tokenizer(parameters: Mapping[str, Any]) -> Tokenizer:
+    """Build an untrained tokenizer from the configuration of a bundle or run.
+
+    Raises:
+        InvalidInput: the configuration of another model.
+    """
+    return Tokenizer(HGM3Config.from_dict(parameters))

@@ -7,9 +7,9 @@ behind the causal decoder it is enough to blank what goes in and what comes out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import torch
 import torch.nn.functional as F
@@ -184,6 +184,15 @@ class Tokenizer(MotionTokenizer):
         x = self.normalize(features).transpose(1, 2)  # (B, D, T)
         wide = None if mask is None else mask[:, None].to(x.dtype)
         return self.encoder(masked(x, wide), wide).transpose(1, 2), mask
+
+
+def build_tokenizer(parameters: Mapping[str, Any]) -> Tokenizer:
+    """Build an untrained tokenizer from the configuration of a bundle or run.
+
+    Raises:
+        InvalidInput: the configuration of another model.
+    """
+    return Tokenizer(MOGOConfig.from_dict(parameters))
 
 
 def _dilations(config: TokenizerConfig) -> list[int]:
