@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from marey.cli.references import FORMS
 from marey.core.characters import escape
 from marey.core.errors import InvalidInput, ItemsFailed, MareyError, NotFound, Regressed
 from marey.items.evaluation_prompts import PromptCheck
-from marey.items.item import InvalidItems, Problem, outside_range
+from marey.items.item import InvalidItems, Problem, outside_range, read_setting
 
 if TYPE_CHECKING:
     from marey.client.transport import Transport
@@ -248,17 +247,10 @@ def check_comparison(found: dict[str, Any], *, fail_on_regression: bool) -> None
 
 
 def _settings(given: Sequence[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        try:
-            number = float(value)
-            if not equals or not math.isfinite(number):
-                raise ValueError
-        except ValueError:
-            raise InvalidInput(f"{text!r} is not a setting", where="--set", hint="Write --set guidance=4.5") from None
-        found[name.strip()] = number
-    return found
+    try:
+        return dict(map(read_setting, given))
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where="--set", hint=error.hint) from None
 
 
 def _caption(found: dict[str, Any]) -> str:

@@ -70,6 +70,15 @@ Tags = Annotated[
     list[str] | None, typer.Option("--tag", help="A tag of every motion, beside a row's own; may be repeated.")
 ]
 Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; none given = the model's.")]
+Sampling = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A setting of sampling, such as temperature=1.2; may be repeated. `marey models show` lists them; a row's "
+        "own come first.",
+    ),
+]
 Model = Annotated[str | None, typer.Option("--model", help="Model, such as hgm3.")]
 Bundle = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter.")]
 BundleOrFolder = Annotated[str | None, typer.Option("--bundle", help="Bundle, such as hgm3-starter, or its folder.")]

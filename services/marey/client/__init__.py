@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         Quota,
         Reroll,
         Review,
+        SamplingSetting,
         Speed,
         Stream,
         StreamDetail,
@@ -93,8 +94,8 @@ __getattr__ = lazy_names(
         "marey.client.types": (
             "CheckedJob ComparedRun Comparison Counters Erasure ErrorDetail Estimate Evaluation "
             "EvaluationDetail EvaluationEvent EvaluationJob EvaluationRequest File Job JobEvent JobItem "
-            "MetricChange MetricPair Model Motion MotionDetail QueuePosition Quota Reroll Review Speed "
-            "Stream StreamDetail StreamPrompt StreamSkeleton TrainingData"
+            "MetricChange MetricPair Model Motion MotionDetail QueuePosition Quota Reroll Review "
+            "SamplingSetting Speed Stream StreamDetail StreamPrompt StreamSkeleton TrainingData"
         ),
         "marey.core.errors": (
             "Busy Conflict InvalidBundle InvalidFile InvalidInput ItemsFailed MareyError NotFound "
@@ -156,6 +157,7 @@ __all__ = [
     "Reroll",
     "Result",
     "Review",
+    "SamplingSetting",
     "Server",
     "Speed",
     "Stream",

@@ -27,6 +27,7 @@ from marey.items.item import (
     check_count,
     names_model,
     read_json,
+    read_setting,
     read_values,
 )
 
@@ -136,19 +137,21 @@ def defaults_of(
     variants: int | None = None,
     fps: float | None = None,
     tags: Sequence[str] | None = None,
+    settings: Sequence[str] | None = None,
 ) -> Mapping[str, object]:
     """The fields of a row where it says nothing itself, from the options of the command; tags come beside its own.
 
     Raises:
         InvalidInput: one cannot be; by the name of its option.
     """
+    sampling = _sampling_of(settings or (), fps)
     given = (
         ("--model", "model", model),
         ("--bundle", "model", bundle),  # names it more exactly
         ("--seconds", "seconds", seconds),
         ("--seed", "seed", seed),
         ("--variants", "variants", variants),
-        ("--fps", "settings", None if fps is None else {OUTPUT_FPS: fps}),
+        ("--set" if settings else "--fps", "settings", sampling or None),
         ("--tag", "tags", tags or None),
     )
     found: dict[str, object] = {}
@@ -160,6 +163,18 @@ def defaults_of(
         except InvalidInput as error:
             raise InvalidInput(error.message, where=option, hint=error.hint) from None
     return found
+
+
+def _sampling_of(given: Sequence[str], fps: float | None) -> dict[str, float]:
+    """Settings of `--set` and `--fps` together."""
+    found: dict[str, float] = {}
+    try:
+        for text in given:
+            name, value = read_setting(text)
+            found[name] = value
+    except InvalidInput as error:
+        raise InvalidInput(error.message, where="--set", hint=error.hint) from None
+    return found if fps is None else {**found, OUTPUT_FPS: fps}
 
 
 def read_arguments(prompts: Sequence[str], defaults: Mapping[str, object] = NO_DEFAULTS) -> PromptReader:

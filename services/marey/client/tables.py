@@ -12,7 +12,8 @@ from typing import Literal
 from marey.client import manifest
 from marey.client.csv_cells import TAG_SEPARATOR, restore, split_tags
 from marey.core.characters import find_forbidden
-from marey.items.item import Unreadable
+from marey.core.errors import InvalidInput
+from marey.items.item import Unreadable, read_settings
 
 Rows = Iterator[tuple[int | None, object]]
 Lines = Iterator[tuple[int, str]]
@@ -164,6 +165,8 @@ def _value(name: str, cell: str) -> object:
             return int(cell)
         if name == "seconds":
             return float(cell)
-    except ValueError:
+        if name == "settings":
+            return read_settings(cell)
+    except (ValueError, InvalidInput):
         pass
     return cell if name == "prompt" else cell.strip(BLANK)

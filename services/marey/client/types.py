@@ -347,6 +347,19 @@ class TrainingData(Result):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SamplingSetting(Result):
+    """A setting of a model's sampling; minimum and maximum are allowed themselves."""
+
+    name: str = ""
+    minimum: float = 0.0
+    maximum: float = 0.0
+    default: float = 0.0
+    whole: bool = False
+    """Whole numbers only."""
+    help: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Model(Result):
     """A bundle."""
 
@@ -365,6 +378,9 @@ class Model(Result):
     encoder: str = ""
     data: tuple[TrainingData, ...] = ()
     metrics: Mapping[str, float] = field(default_factory=dict[str, float])
+    settings: tuple[SamplingSetting, ...] = ()
+    about: str = ""
+    """What the model can and cannot do, in a few lines; empty where the server does not know it."""
 
 
 @dataclass(frozen=True, kw_only=True)

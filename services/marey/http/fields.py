@@ -9,7 +9,17 @@ from pydantic.config import JsonDict
 
 from marey.core.characters import LINE_PATTERN
 from marey.items.expected import ACTS, JOIN, MAX_ACTS, SIDED, STRAIGHT
-from marey.items.item import MAX_NAME, MAX_TAG_LENGTH, MODEL, SETTINGS
+from marey.items.item import (
+    MAX_NAME,
+    MAX_OUTPUT_FPS,
+    MAX_SETTING,
+    MAX_SETTINGS,
+    MAX_TAG_LENGTH,
+    MIN_OUTPUT_FPS,
+    MODEL,
+    OUTPUT_FPS,
+    SETTING,
+)
 from marey.items.prompts import MAX_CHARACTERS
 
 MAX_MODEL = 165
@@ -37,12 +47,10 @@ _ACT = rf"({'|'.join(ACTS)})( ({_MORE})){{0,2}}"
 EXPECTED: JsonDict = {"pattern": rf"^{_ACT}( {JOIN} {_ACT}){{0,{MAX_ACTS - 1}}}$"}
 
 
-def _setting(low: float, high: float) -> JsonDict:
-    return {"type": "integer" if isinstance(low, int) else "number", "minimum": low, "maximum": high}
-
-
 SAMPLING: dict[str, Any] = {
-    "properties": {name: _setting(*bounds) for name, bounds in SETTINGS.items()},
-    "additionalProperties": False,
+    "properties": {OUTPUT_FPS: {"type": "number", "minimum": MIN_OUTPUT_FPS, "maximum": MAX_OUTPUT_FPS}},
+    "additionalProperties": {"type": "number", "minimum": -MAX_SETTING, "maximum": MAX_SETTING},
+    "propertyNames": {"pattern": f"^{SETTING.pattern}$"},
+    "maxProperties": MAX_SETTINGS,
 }
-"""Which of these a model has, its bundle says."""
+"""Which settings a model has, and their ranges, `/v1/models/{name}` says."""

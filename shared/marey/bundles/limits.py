@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, cast
 
 from marey.bundles.bundle import Bundle
 from marey.core.errors import InvalidBundle, InvalidInput
-from marey.items.item import OUTPUT_FPS, SETTINGS, outside_range
+from marey.items.item import MAX_SETTING, OUTPUT_FPS, outside_range
+from marey.registry import Setting, find_model
 
 MAX_FRAMES = 2**53
 """The largest integer that a float holds exactly: JSON holds whole numbers that no float can."""
@@ -46,8 +48,10 @@ def check_seconds(bundle: Bundle, seconds: float | None) -> None:
         raise InvalidInput(outside_range(seconds, low, high, bundle.manifest.name))
 
 
-def settings_of(bundle: Bundle) -> Mapping[str, Any]:
-    """The settings that a model has, with their defaults.
+def settings_of(bundle: Bundle) -> tuple[Setting, ...]:
+    """The settings of sampling that a generator has, with the defaults of this bundle.
+
+    Those of a model that is not installed here are what its manifest holds; their ranges are not known.
 
     Raises:
         InvalidBundle: its manifest says something else of them.
@@ -55,18 +59,24 @@ def settings_of(bundle: Bundle) -> Mapping[str, Any]:
     own: Any = bundle.manifest.parameters.get("inference") or {}
     if not isinstance(own, dict):
         raise InvalidBundle("its parameters give no object as 'inference'", where=str(bundle.path))
-    return cast("dict[str, Any]", own)
+    values = {name: value for name, value in cast("dict[str, Any]", own).items() if isinstance(value, int | float)}
+    spec = find_model(bundle.manifest.model)
+    if spec is not None:
+        return tuple(replace(each, default=values.get(each.name, each.default)) for each in spec.settings)
+    return tuple(
+        Setting(name, -MAX_SETTING, MAX_SETTING, value, whole=isinstance(value, int)) for name, value in values.items()
+    )
 
 
-def check_settings(bundle: Bundle, names: Iterable[str]) -> None:
-    """Nothing, if the model has all these settings.
+def check_settings(bundle: Bundle, values: Mapping[str, float]) -> dict[str, float]:
+    """Return an item's settings as the model takes them: whole numbers as integers.
 
     Raises:
-        InvalidInput: it has not.
+        InvalidInput: the model has no such setting, or the value is out of range.
     """
-    own = settings_of(bundle)
-    for name in names:
-        if name != OUTPUT_FPS and name not in own:
-            model = bundle.manifest.name
-            known = [setting for setting in SETTINGS if setting == OUTPUT_FPS or setting in own]
-            raise InvalidInput(f"{name!r} is not a setting of {model}; known are {', '.join(known)}")
+    known = {setting.name: setting for setting in settings_of(bundle)}
+    for name in values:
+        if name != OUTPUT_FPS and name not in known:
+            names = ", ".join([*known, OUTPUT_FPS])
+            raise InvalidInput(f"{name!r} is not a setting of {bundle.manifest.name}; known are {names}")
+    return {name: value if name == OUTPUT_FPS else known[name].check(value) for name, value in values.items()}

@@ -77,7 +77,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
         # Custom prompts are compared with real motion too: check that it exists before any motion is made.
         captions = tuple(p for split in request.splits or (TEST_SPLIT,) for p in reference_prompts(evaluator, split))
     prompts = captions if prompts is None else prompts
-    offer.check_settings(request.settings)
+    settings = offer.check_settings(request.settings)
     if not request.splits:
         _check_seconds(prompts, offer)
     _check_size(request, len(prompts))
@@ -86,6 +86,7 @@ def plan_evaluation(request: EvaluationRequest, prompts: tuple[EvaluationPrompt,
         bundle=offer.bundle.reference,
         model=offer.bundle.manifest.model,
         evaluator=evaluator.reference,
+        settings=settings,
     )
     return Plan(exact, offer, prompts)
 

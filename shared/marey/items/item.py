@@ -33,25 +33,18 @@ MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 """Range over all models; a bundle's own range, which is narrower, is checked once the bundle is known."""
 MAX_TAGS, MAX_TAG_LENGTH = 20, 64
 
-COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags")
-FIELDS = (*COLUMNS, "settings")
+COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags", "settings")
+FIELDS = COLUMNS
 OUTPUT_FPS = "fps"
 """The only setting of an item that is not the network's: the frame rate of its files."""
-SETTINGS = {
-    "steps": (1, 100),
-    "guidance": (0.0, 100.0),
-    "temperature": (0.0, 100.0),
-    "top_k": (0.001, 1.0),
-    "upper_guidance": (0.0, 100.0),
-    "upper_temperature": (0.0, 100.0),
-    "upper_top_k": (0.001, 1.0),
-    "residual_guidance": (0.0, 100.0),
-    "residual_temperature": (0.0, 100.0),
-    "residual_top_k": (0.001, 1.0),
-    OUTPUT_FPS: (1.0, 240.0),
-}
-"""Sampling settings, each with its range; a bundle declares which ones it has. Settings with whole bounds are
-integers."""
+MIN_OUTPUT_FPS, MAX_OUTPUT_FPS = 1.0, 240.0
+SETTING = re.compile(r"[a-z][a-z0-9_]{0,39}")
+"""Names of settings. Which a model has, and their ranges, its spec says (`marey.registry`): they are checked where the
+model is known."""
+MAX_SETTINGS = 32
+MAX_SETTING = 1e9
+"""Of the value of any setting, and of its negative."""
+SETTINGS_SEPARATOR = ";"
 
 MAX_NAME = 100
 NAME = re.compile(rf"[^\W_][^/\\]{{0,{MAX_NAME - 1}}}")
@@ -340,19 +333,55 @@ def _tag(value: object) -> str:
 
 def _settings(value: object) -> dict[str, float]:
     if not isinstance(value, Mapping):
+        if isinstance(value, str):  # of a table
+            raise InvalidInput(f"{value[:60]!r} is not settings: write guidance=4.5;temperature=0.8")
         raise InvalidInput('is not an object: write {"guidance": 4.5}')
+    given = cast("Mapping[object, object]", value)
+    if len(given) > MAX_SETTINGS:
+        raise InvalidInput(f"{len(given)} settings are over the limit of {MAX_SETTINGS}")
     checked: dict[str, float] = {}
-    for name, given in cast("Mapping[object, object]", value).items():
-        if not isinstance(name, str) or name not in SETTINGS:
-            raise InvalidInput(f"{str(name)[:60]!r} is not a setting; known are {', '.join(SETTINGS)}")
-        low, high = SETTINGS[name]
+    for name, number in given.items():
+        if not isinstance(name, str) or not SETTING.fullmatch(name):
+            raise InvalidInput(f"{str(name)[:60]!r} is not the name of a setting, such as guidance")
+        low, high = (MIN_OUTPUT_FPS, MAX_OUTPUT_FPS) if name == OUTPUT_FPS else (-MAX_SETTING, MAX_SETTING)
         try:
-            checked[name] = _whole(given, low, int(high)) if isinstance(low, int) else _number(given)
+            checked[name] = _number(number)
         except InvalidInput as error:
             raise InvalidInput(f"{name}: {error.message}") from error
         if not low <= checked[name] <= high:
             raise InvalidInput(f"{name}: {checked[name]:g} is outside {low:g} to {high:g}")
     return checked
+
+
+def read_setting(text: str) -> tuple[str, float]:
+    """Read `NAME=VALUE`, as `guidance=4.5`.
+
+    Raises:
+        InvalidInput: it is something else.
+    """
+    name, _, value = (part.strip() for part in text.partition("="))
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not SETTING.fullmatch(name) or not math.isfinite(number):
+        raise InvalidInput(f"{text[:60]!r} is not a setting: write NAME=VALUE, such as guidance=4.5")
+    return name, number
+
+
+def read_settings(text: str) -> dict[str, float]:
+    """Read settings in one cell of a table: `temperature=1.2;guidance=4`.
+
+    Raises:
+        InvalidInput: it is something else, or names a setting twice.
+    """
+    found: dict[str, float] = {}
+    for part in filter(None, (part.strip() for part in text.split(SETTINGS_SEPARATOR))):
+        name, value = read_setting(part)
+        if name in found:
+            raise InvalidInput(f"{name} stands twice")
+        found[name] = value
+    return found
 
 
 def _text(value: object) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from marey.bundles import BrokenBundle, Bundle, TextSpec, scan_bundles
@@ -32,9 +32,9 @@ class GeneratorCapabilities:
         """See `check_seconds`."""
         check_seconds(self.bundle, seconds)
 
-    def check_settings(self, names: Iterable[str]) -> None:
+    def check_settings(self, values: Mapping[str, float]) -> dict[str, float]:
         """See `check_settings`."""
-        check_settings(self.bundle, names)
+        return check_settings(self.bundle, values)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,8 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
     batch_keys: dict[tuple[str, str], str] = {}
     for index, (item, offer) in enumerate(items):
         reference = offer.bundle.reference
-        settings = json.dumps(dict(item.settings), sort_keys=True)
+        values = offer.check_settings(item.settings) if item.settings else {}
+        settings = json.dumps(values, sort_keys=True)
         batch_key = batch_keys.setdefault((reference, settings), _sha256(f"{reference}\n{settings}"))
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         for variant in range(item.variants):
@@ -98,7 +99,7 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
                 variant=variant,
                 name=item.name,
                 seconds=item.seconds,
-                settings=dict(item.settings),
+                settings=dict(values),
                 tags=item.tags,
             )
 

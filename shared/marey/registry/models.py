@@ -153,18 +153,6 @@ class ModelSpec:
     self_train: str | None = None
     ablations: tuple[Ablation, ...] = ()
 
-    def check_settings(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return settings as the model takes them; see `Setting.check`.
-
-        Raises:
-            InvalidInput: a setting that the model has not, or a value out of its range.
-        """
-        known = {setting.name: setting for setting in self.settings}
-        for name in values:
-            if name not in known:
-                raise InvalidInput(f"{name!r} is not a setting of {self.name}; known are {', '.join(known) or 'none'}")
-        return {name: known[name].check(value) for name, value in values.items()}
-
 
 @cache
 def _registered() -> Mapping[str, EntryPoint]:

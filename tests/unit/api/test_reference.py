@@ -25,9 +25,9 @@ from marey.api.streams.schemas import NewStreamBody
 from marey.api.takes.schemas import NewRerollBody, NewReviewBody
 from marey.api.webhooks.schemas import NewWebhookBody, WebhookPatch
 from marey.core.settings import Settings
-from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, SAMPLING, TAGS
+from marey.http.fields import EXPECTED, ITEM_MODEL, ITEM_NAME, TAGS
 from marey.items.expected import read_expected
-from marey.items.item import MAX_TAG_LENGTH, SETTINGS, read_item
+from marey.items.item import MAX_TAG_LENGTH, OUTPUT_FPS, read_item
 from marey.text_service.routes import ParseBody
 
 BODIES = {
@@ -92,14 +92,20 @@ def test_every_field_and_parameter_of_a_request_has_its_range(document: dict[str
 
 def test_ranges_are_those_of_the_checks(document: dict[str, Any]) -> None:
     item = document["components"]["schemas"]["NewItemBody"]["properties"]
-    for name, (low, high) in SETTINGS.items():
-        shown = item["settings"]["properties"][name]
-        assert (shown["minimum"], shown["maximum"]) == (low, high)
-        for value, right in ((low, True), (high, True), (high + 1, False), (low - 1, False)):
+    settings = item["settings"]
+    fps, others = settings["properties"][OUTPUT_FPS], settings["additionalProperties"]
+    for name, shown in ((OUTPUT_FPS, fps), ("guidance", others)):
+        low, high = shown["minimum"], shown["maximum"]
+        for value, right in ((low, True), (high, True), (high * 1.1, False), (low - 1, False)):
             problems = read_item({"prompt": "walk", "settings": {name: value}})[1]
             assert (problems == []) is right
-    assert SAMPLING["additionalProperties"] is False
-    assert read_item({"prompt": "walk", "settings": {"unknown": 1}})[1]
+    pattern = re.compile(settings["propertyNames"]["pattern"])
+    for name, right in (("guidance", True), ("top_k2", True), ("Guidance", False), ("a" * 41, False), ("", False)):
+        assert (pattern.search(name) is not None) is right
+        assert (read_item({"prompt": "walk", "settings": {name: 1}})[1] == []) is right
+    for count in (settings["maxProperties"], settings["maxProperties"] + 1):
+        many = {f"s{number}": 1 for number in range(count)}
+        assert (read_item({"prompt": "walk", "settings": many})[1] == []) is (count == settings["maxProperties"])
     for length in (MAX_TAG_LENGTH, MAX_TAG_LENGTH + 1):
         allowed = length <= TAGS["items"]["maxLength"]
         assert (read_item({"prompt": "walk", "tags": ["x" * length]})[1] == []) is allowed

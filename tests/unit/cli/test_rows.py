@@ -48,6 +48,23 @@ def test_a_jsonl_line_may_hold_settings(tmp_path: Path) -> None:
     assert list(items_from_file(path)) == [Item("a person waves", settings={"guidance": 3.0})]
 
 
+def test_a_csv_has_a_column_of_settings_which_come_before_those_of_the_command(tmp_path: Path) -> None:
+    path = write(tmp_path, "p.csv", "prompt,settings\na person waves,temperature=1.2; guidance=4\na person bows,\n")
+    assert [item.settings for item in items_from_file(path)] == [{"temperature": 1.2, "guidance": 4.0}, {}]
+    defaults = defaults_of(settings=["guidance=2", "steps = 8"], fps=30.0)
+    assert [item.settings for item in items_from_file(path, defaults=defaults)] == [
+        {"temperature": 1.2, "guidance": 4.0, "steps": 8.0, "fps": 30.0},
+        {"guidance": 2.0, "steps": 8.0, "fps": 30.0},
+    ]
+
+
+@pytest.mark.parametrize("cell", ["hot", "guidance=", "guidance=high", "guidance=nan", "Guidance=2", "a=1;a=2", "=3"])
+def test_settings_that_are_none_are_told_with_their_line(tmp_path: Path, cell: str) -> None:
+    (problem,) = problems(tmp_path, "p.csv", f"prompt,settings\na person waves,{cell}\n")
+    assert problem.startswith("line 2: settings: ")
+    assert "write guidance=4.5;temperature=0.8" in problem
+
+
 def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
     path = write(tmp_path, "p.txt", "a person waves\n\n  a person   bows \r\n")
     assert [item.prompt for item in items_from_file(path)] == ["a person waves", "a person bows"]
@@ -56,7 +73,8 @@ def test_a_text_file_is_a_prompt_a_line(tmp_path: Path) -> None:
 def test_an_unknown_column_is_an_error_that_lists_the_known_ones(tmp_path: Path) -> None:
     found = problems(tmp_path, "p.csv", "prompt,duration\na person waves,3\n")
     assert found == [
-        "line 1: 'duration' is not a known column; known columns are prompt, name, seconds, seed, variants, model, tags"
+        "line 1: 'duration' is not a known column; known columns are prompt, name, seconds, seed, variants, model, "
+        "tags, settings"
     ]
 
 

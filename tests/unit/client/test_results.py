@@ -26,6 +26,7 @@ NAMES = {
     types.QueuePosition: "QueueView", types.Erasure: "ErasureView", types.Reroll: "RerollView",
     types.StreamPrompt: "PromptView", types.StreamSkeleton: "SkeletonView", types.Stream: "StreamView",
     types.StreamDetail: "StreamDetailView", types.TrainingData: "DataView", types.Model: "ModelView",
+    types.SamplingSetting: "SettingView",
     types.EvaluationRequest: "RequestView", types.EvaluationJob: "EvaluationJobView",
     types.EvaluationEvent: "EvaluationEventView", types.Evaluation: "EvaluationView",
     types.EvaluationDetail: "EvaluationDetailView", types.ComparedRun: "ComparedView",

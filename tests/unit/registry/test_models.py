@@ -39,8 +39,8 @@ def test_reading_every_spec_needs_the_standard_library_alone() -> None:
     code = (
         "import sys; before = set(sys.modules); from marey.registry import find_model, model_names\n"
         "assert all(find_model(name) for name in model_names()) and model_names()\n"
-        "foreign = {name.partition('.')[0] for name in sys.modules.keys() - before} - sys.stdlib_module_names - {'marey'}\n"
-        "print(sorted(foreign))"
+        "found = {name.partition('.')[0] for name in sys.modules.keys() - before}\n"
+        "print(sorted(found - sys.stdlib_module_names - {'marey'}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -99,18 +99,15 @@ def test_two_packages_cannot_register_one_name(installed) -> None:
         model_names()
 
 
-def test_settings_have_ranges_and_kinds() -> None:
-    spec = ModelSpec("x", "", "", handler="a:b", load="a:b", settings=(
-        Setting("steps", 1, 100, 10, whole=True), Setting("heat", 0.5, 2.0, 1.0),
-    ))  # fmt: skip
-    checked = spec.check_settings({"steps": 8.0, "heat": 2})
-    assert checked == {"steps": 8, "heat": 2.0}
-    assert [type(value) for value in checked.values()] == [int, float]
-    for values, message in (
-        ({"steps": 8.5}, "steps: is 8.5, not a whole number"),
-        ({"steps": 0}, "steps: 0 is outside 1 to 100"),
-        ({"heat": 2.5}, "heat: 2.5 is outside 0.5 to 2"),
-        ({"heta": 1}, "'heta' is not a setting of x; known are steps, heat"),
+def test_a_setting_has_a_range_and_a_kind() -> None:
+    steps, heat = Setting("steps", 1, 100, 10, whole=True), Setting("heat", 0.5, 2.0, 1.0)
+    checked = steps.check(8.0), heat.check(2)
+    assert checked == (8, 2.0)
+    assert [type(value) for value in checked] == [int, float]
+    for setting, value, message in (
+        (steps, 8.5, "steps: is 8.5, not a whole number"),
+        (steps, 0, "steps: 0 is outside 1 to 100"),
+        (heat, 2.5, "heat: 2.5 is outside 0.5 to 2"),
     ):
         with pytest.raises(InvalidInput, match=message):
-            spec.check_settings(values)
+            setting.check(value)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from marey.bundles import BrokenBundle
+from marey.bundles.limits import settings_of
 from marey.http.schemas import View
 from marey.jobs.generators import GeneratorCapabilities, GeneratorList
+from marey.registry import find_model
 
 
 class DataView(View):
@@ -13,6 +15,19 @@ class DataView(View):
     name: str
     licence: str
     credit: str
+
+
+class SettingView(View):
+    """A setting of sampling."""
+
+    name: str
+    minimum: float
+    maximum: float
+    default: float
+    """Of this bundle."""
+    whole: bool
+    """Whole numbers only."""
+    help: str
 
 
 class ModelView(View):
@@ -35,11 +50,15 @@ class ModelView(View):
     encoder: str
     data: list[DataView]
     metrics: dict[str, float]
+    settings: list[SettingView]
+    about: str
+    """What the model can and cannot do, in a few lines; empty where the model is not installed on the server."""
 
     @classmethod
     def of(cls, offer: GeneratorCapabilities) -> ModelView:
         """Convert capabilities."""
         manifest = offer.bundle.manifest
+        spec = find_model(manifest.model)
         own = ("name", "model", "version", "config", "random", "licence", "commercial", "skeleton", "fps", "metrics")
         return cls(
             bundle=offer.bundle.reference,
@@ -47,6 +66,18 @@ class ModelView(View):
             max_seconds=offer.max_seconds,
             encoder=offer.text.encoder,
             data=[DataView(name=d.name, licence=d.licence, credit=d.credit) for d in manifest.data],
+            settings=[
+                SettingView(
+                    name=each.name,
+                    minimum=each.low,
+                    maximum=each.high,
+                    default=each.default,
+                    whole=each.whole,
+                    help=each.help,
+                )
+                for each in settings_of(offer.bundle)
+            ],
+            about="" if spec is None else spec.about,
             **{name: getattr(manifest, name) for name in own},
         )
 

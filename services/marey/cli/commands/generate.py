@@ -47,6 +47,7 @@ def generate(
     variants: options.Variants = None,
     fps: options.Fps = None,
     tags: options.Tags = None,
+    sampling: options.Sampling = None,
     formats: options.Formats = None,
     output: options.Folder = Path(),
     name_template: options.Template = options.TEMPLATE,
@@ -58,7 +59,9 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
-    defaults = rows.defaults_of(model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags)
+    defaults = rows.defaults_of(
+        model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags, settings=sampling
+    )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)

@@ -32,10 +32,13 @@ def list_models(local: Local = False, as_json: console.Json = False) -> None:
 @app.command()
 def show(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A model, a bundle or an exact bundle.")],
+    metrics: Annotated[
+        bool, typer.Option("--metrics", help="Show the figures of its training and evaluation.")
+    ] = False,
     local: Local = False,
     as_json: console.Json = False,
 ) -> None:
-    """Show one bundle: terms, data, metrics."""
+    """Show one bundle: what its model can do, terms, data and settings; figures with --metrics."""
     found = _local_model(name) if local or not _server_named() else _ask(f"/v1/models/{name}")
     if as_json:
         console.result_json(found)
@@ -46,8 +49,15 @@ def show(
     console.result(f"{'weights':<12} {_weights(found)}")
     for source in found["data"]:
         console.result(f"{'data':<12} {source['name']} ({source['licence']}): {source['credit']}")
-    for metric, value in found["metrics"].items():
-        console.result(f"{'metric':<12} {metric} = {value:g}")
+    for line in found.get("about", "").splitlines():  # an older server does not tell
+        console.result(f"{'about':<12} {line}")
+    for setting in found.get("settings", []):
+        kind = "whole, " if setting["whole"] else ""
+        shown = f"{setting['name']} = {setting['default']:g} ({kind}{setting['minimum']:g} to {setting['maximum']:g})"
+        console.result(f"{'setting':<12} {shown}  {setting['help']}".rstrip())
+    if metrics:
+        for metric, value in found["metrics"].items():
+            console.result(f"{'metric':<12} {metric} = {value:g}")
 
 
 @app.command()

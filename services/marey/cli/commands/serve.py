@@ -71,8 +71,8 @@ def worker(
 ) -> None:
     """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
     os.umask(UMASK)
-    from marey.core.extras import needs_extra
     from marey.cli.roles.serving import live_models, parse_roles, role_of
+    from marey.core.extras import needs_extra
 
     try:
         from marey.cli.children import Child, keep_all, marey, metrics_port

@@ -39,6 +39,7 @@ def submit(
     variants: options.Variants = None,
     fps: options.Fps = None,
     tags: options.Tags = None,
+    sampling: options.Sampling = None,
     watch: Annotated[bool, typer.Option("--watch", help="Show progress until the job ends.")] = False,
     fetch: Annotated[
         Path | None, typer.Option("--fetch", help="Wait, then fetch the motions into this folder.")
@@ -59,7 +60,7 @@ def submit(
 
         check_folder(fetch, hint="Choose another folder for --fetch.")  # before anything is enqueued
     defaults = rows.defaults_of(
-        model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags
+        model=model, bundle=bundle, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags, settings=sampling
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     with Lines(item.as_json() for item in reader) as lines:

@@ -9,9 +9,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.core.extras import needs_extra
 from marey.cli.roles.serving import threads_of
 from marey.core.errors import InvalidInput
+from marey.core.extras import needs_extra
 from marey.registry import get_model, resolve
 
 if TYPE_CHECKING:

@@ -1,0 +1,65 @@
+"""Settings of sampling: a model that is installed here knows their ranges, of another its bundle tells the names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from marey.bundles import Bundle, find_bundle
+from marey.bundles.limits import check_settings, settings_of
+from marey.core.errors import InvalidInput
+from marey.core.settings import Settings
+from marey.items.item import Item
+from marey.jobs.generators import capabilities_of, new_items
+from tests.support.evaluations import write_generator
+
+FOREIGN, KNOWN = "toy-starter", "hgm3-starter"
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Settings:
+    write_generator(tmp_path, FOREIGN)
+    write_generator(tmp_path, KNOWN, model="hgm3")
+    return Settings(home=tmp_path, models=tmp_path)
+
+
+def bundle(config: Settings, name: str) -> Bundle:
+    return find_bundle(name, config=config)
+
+
+def test_an_installed_model_gives_ranges_and_its_bundle_the_defaults(config: Settings) -> None:
+    found = {each.name: each for each in settings_of(bundle(config, KNOWN))}
+    assert (found["steps"].low, found["steps"].high, found["steps"].default) == (1, 100, 10)
+    assert found["guidance"].default == 4.0  # the bundle has none
+    assert check_settings(bundle(config, KNOWN), {"steps": 8.0, "guidance": 3, "fps": 30.0}) == {
+        "steps": 8, "guidance": 3.0, "fps": 30.0,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"guidance": 101.0}, "guidance: 101 is outside 0 to 100"),
+        ({"steps": 2.5}, "steps: is 2.5, not a whole number"),
+        ({"heat": 1.0}, "'heat' is not a setting of hgm3-starter; known are steps, guidance"),
+    ],
+)
+def test_what_an_installed_model_cannot_be_set_to_is_told(
+    config: Settings, values: dict[str, float], message: str
+) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        check_settings(bundle(config, KNOWN), values)
+
+
+def test_of_a_model_that_is_not_installed_the_names_are_known(config: Settings) -> None:
+    assert check_settings(bundle(config, FOREIGN), {"steps": 5000.0}) == {"steps": 5000}
+    with pytest.raises(InvalidInput, match="'guidance' is not a setting of toy-starter; known are steps, fps"):
+        check_settings(bundle(config, FOREIGN), {"guidance": 2.0})
+
+
+def test_a_row_holds_whole_settings_as_integers_however_they_were_written(config: Settings) -> None:
+    offer = capabilities_of(bundle(config, FOREIGN), config)
+    rows = list(new_items((Item("walk", settings={"steps": steps}), offer) for steps in (8, 8.0)))
+    assert [type(row.settings["steps"]) for row in rows] == [int, int]
+    assert len({row.batch_key for row in rows}) == 1
