@@ -85,6 +85,15 @@ class Environment:
         return {**kept, **values}
 
 
+def install_from_index(folder: Path, requirements: Iterable[str], *, seconds: float) -> Environment:
+    """Make an environment into which pip installs these and what they require, from the package index."""
+    _run([sys.executable, "-m", "venv", "--without-pip", str(folder)])
+    made = Environment(folder)
+    _run([sys.executable, "-m", "pip", "--python", made.python, "install", "-q", *requirements], seconds)
+    _close_checkout(made, made.folder)
+    return made
+
+
 def make_environment(folder: Path, wheels: Iterable[Path], *, borrow: bool) -> Environment:
     """Make an environment with these wheels.
 
@@ -101,10 +110,14 @@ def make_environment(folder: Path, wheels: Iterable[Path], *, borrow: bool) -> E
         (made.packages / "borrowed.pth").write_text(f"{DEVELOPMENT}\n")
     else:
         _copy_requirements(made)
-    development = str(DEVELOPMENT.parents[2]) if borrow else str(made.folder)
-    closing = CLOSE.format(closed=f"{REPOSITORY}/", open=f"{development}/")
-    (made.packages / "sitecustomize.py").write_text(closing)
+    _close_checkout(made, DEVELOPMENT.parents[2] if borrow else made.folder)
     return made
+
+
+def _close_checkout(made: Environment, allowed: Path) -> None:
+    """Close the checkout to Python processes of an environment, but for one folder."""
+    closing = CLOSE.format(closed=f"{REPOSITORY}/", open=f"{allowed}/")
+    (made.packages / "sitecustomize.py").write_text(closing)
 
 
 def _copy_requirements(made: Environment) -> None:
@@ -132,8 +145,8 @@ def _required(packages: Path, name: str) -> list[str]:
     return Distribution.at(packages / name).requires or []
 
 
-def _run(command: list[str]) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
+def _run(command: list[str], seconds: float = SECONDS) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
     assert done.returncode == 0, done.stderr
 
 

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from marey.bundles import Bundle
 from marey.bundles.places import DISTRIBUTIONS
+from marey.motion.io.bvh_write import write_bvh
 from tests.support.marey import REPOSITORY
-from tests.support.releases import Release, installed_release
-from tests.support.wheels import build_wheel, make_environment, this_wheel
+from tests.support.releases import installed_release
+from tests.support.walker import walker
+from tests.support.wheels import build_wheel, install_from_index, this_wheel
 
 pytestmark = pytest.mark.slow
 
 SECONDS = 1800.0
 COMMANDS = {
-    "motion": ("render", "--help"),
+    "motion": ("render", "walk.bvh", "-o", "walk.png"),
     "server": ("models", "list", "--local", "--json"),
     "worker": ("generate", "a person walks", "--seconds", "2", "-o", "made", "--json"),
 }
@@ -33,18 +34,10 @@ def bundles(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [build_wheel(REPOSITORY / "models" / "packages" / name, folder / name) for name in ("open", "starter")]
 
 
-def install(folder: Path, *requirements: str) -> Release:
-    """Install requirements in an environment of their own, with what they require."""
-    made = make_environment(folder / "environment", [], borrow=False)
-    command = [sys.executable, "-m", "pip", "--python", made.python, "install", "-q", *requirements]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
-    assert done.returncode == 0, done.stderr
-    return installed_release(made, {"MAREY_HOME": str(folder / "home")}, folder)
-
-
 def test_wheels_of_bundles_hold_the_trained_weights(bundles: list[Path], tmp_path: Path) -> None:
-    made = make_environment(tmp_path / "environment", bundles, borrow=False)
-    found = {path.parent.name: path.parent for path in made.packages.glob("marey_bundles_*/*/manifest.json")}
+    for wheel in bundles:
+        zipfile.ZipFile(wheel).extractall(tmp_path)
+    found = {path.parent.name: path.parent for path in tmp_path.glob("marey_bundles_*/*/manifest.json")}
     assert set(found) == set(DISTRIBUTIONS)
     for name, path in found.items():
         assert Bundle.open(path).reference == Bundle.open(REPOSITORY / "models" / name).reference
@@ -54,8 +47,13 @@ def test_wheels_of_bundles_hold_the_trained_weights(bundles: list[Path], tmp_pat
 def test_an_extra_brings_what_its_commands_import(
     extra: str, bundles: list[Path], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    marey = install(tmp_path, f"{this_wheel(tmp_path_factory)}[{extra}]", *map(str, bundles))
+    requirements = [f"{this_wheel(tmp_path_factory)}[{extra}]", *map(str, bundles)]
+    made = install_from_index(tmp_path / "environment", requirements, seconds=SECONDS)
+    marey = installed_release(made, {"MAREY_HOME": str(tmp_path / "home")}, tmp_path)
+    write_bvh(tmp_path / "walk.bvh", walker())
     printed = marey.run(*COMMANDS[extra])
+    if extra == "motion":
+        assert (tmp_path / "walk.png").read_bytes().startswith(b"\x89PNG")
     if extra == "server":
         assert [json.loads(line)["name"] for line in printed.splitlines()] == ["hgm3-starter", "mogo-starter"]
     if extra == "worker":
