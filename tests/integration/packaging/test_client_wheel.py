@@ -58,6 +58,16 @@ def test_the_client_needs_no_other_package(environment: Environment, marey: Rele
     assert "submit" in marey.run("--help")
 
 
+def test_public_packages_are_typed_and_tell_their_version(wheel: Path, environment: Environment) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    public = [name.removesuffix("/py.typed").replace("/", ".") for name in names if name.endswith("/py.typed")]
+    assert "marey.client" in public
+    script = f"import importlib\nfor name in {public}: print(importlib.import_module(name).__version__)"
+    python = Release((environment.python,), environment.environ({}), environment.folder)
+    assert set(python.run("-c", script).split()) == {wheel.name.split("-")[1]}
+
+
 @pytest.mark.parametrize("command", ["generate", "serve", "train"])
 def test_help_needs_no_extra(marey: Release, command: str) -> None:
     assert f"marey {command}" in marey.run(command, "--help")
