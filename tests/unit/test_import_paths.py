@@ -14,7 +14,7 @@ import pytest
 from tests.support.marey import REPOSITORY
 
 PORTIONS = ("shared", "workers", "services", "migrations")
-OLD = re.compile(rf"(?<![\w./*-])({'|'.join(PORTIONS)})(\.[a-z_]\w*|/(?!marey\b)[a-z_]\w*)")
+OLD = re.compile(rf"(?<![\w./*-])({'|'.join(PORTIONS)})[./](?!marey\b)[a-z_]\w*")
 """A path of the time when each of these folders was a package of its own."""
 NEW = re.compile(r"(?<![\w./@-])marey((?:\.(?!__)[A-Za-z_]\w*)+)")
 STORED = {
