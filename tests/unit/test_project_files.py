@@ -94,3 +94,14 @@ def test_the_index_of_decisions_names_every_record() -> None:
     records = sorted(path.name for path in folder.glob("0*.md"))
     assert [name for _, name in listed] == records
     assert [int(number) for number, _ in listed] == [int(name[:4]) for name in records]
+
+
+def test_files_that_pages_name_exist() -> None:
+    named = re.compile(r"`((?:shared|workers|services|tests|deploy|models|docs|benchmarks)/[\w/.-]+\.[a-z]+)`")
+    missing = {
+        f"{page.relative_to(ROOT)}: {name}"
+        for page in PAGES
+        for name in named.findall(page.read_text(encoding="utf-8"))
+        if not (ROOT / name).exists()
+    }
+    assert missing == set()
