@@ -12,7 +12,7 @@ from fastapi import Depends, Header, Query, Request, Response
 from fastapi.responses import RedirectResponse, StreamingResponse
 
 from marey.api.context import Context
-from marey.core.disposition import attachment, download_name
+from marey.core.disposition import attachment
 from marey.http.ranges import ByteRange, parse_range
 from marey.http.schemas import View
 from marey.jobs import asset_key
@@ -54,13 +54,12 @@ class RequestedFile:
 FileRequest = Annotated[RequestedFile, Depends()]
 
 
-def file_response(shared: Context, tenant: str, stem: str, file: FileView, part: RequestedFile) -> Response:
+def file_response(shared: Context, tenant: str, name: str, file: FileView, part: RequestedFile) -> Response:
     """Answer a request for a file. Its ETag is its SHA-256; HEAD reports the whole file's size.
 
     Args:
-        stem: name of the download, without its ending.
+        name: of the download, as `download_name` makes it.
     """
-    name = download_name(stem, file.format)
     etag = f'"{file.sha256}"'
     if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
         return Response(status_code=304, headers={"ETag": etag})

@@ -11,13 +11,6 @@ import typer
 from marey.client.names import DEFAULT_TEMPLATE
 
 
-class FileFormat(StrEnum):
-    """Formats a motion comes in."""
-
-    BVH = "bvh"
-    NPZ = "npz"
-
-
 class InputFormat(StrEnum):
     """Formats of files of prompts."""
 
@@ -50,7 +43,12 @@ Extra = Annotated[
         "--extra-columns", help="CSV columns that are not known: an error, a tag column=value of the row, or ignored."
     ),
 ]
-Formats = Annotated[list[FileFormat] | None, typer.Option("--format", help="File format; may be repeated.")]
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format", metavar="FORMAT", help="File format, such as bvh or npz; may be repeated. None given = all."
+    ),
+]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; made if it is not there.")]
 Template = Annotated[
     str,

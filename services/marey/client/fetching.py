@@ -17,13 +17,14 @@ from marey.client.names import DEFAULT_TEMPLATE, FileNames, Naming, slug
 from marey.client.transport import Transport
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, MareyError, Unreachable
 from marey.core.hashing import sha256_of
+from marey.exporters import extension_of
 
 PARALLEL = 8
 ATTEMPTS = 4
 """Downloads of one file that may break off; each goes on where the last one stopped."""
 BLOCK = 2**18
 FORMAT = re.compile(r"[a-z0-9]{1,16}")
-"""Of a file, as a server may name it: it becomes the ending."""
+"""Of a file, as a server may name it: it becomes the ending where its exporter is not installed."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class Download:
     sha256: str
     size: int
     path: Path
+
+    @property
+    def format(self) -> str:
+        """Of the file, such as `npz`."""
+        return self.url.rpartition("/")[2]
 
 
 Planned = list[tuple[dict[str, Any], list[Download]]]
@@ -119,7 +125,7 @@ def _write_part(
 
 def _rows(folder: Path, planned: Planned) -> list[dict[str, str]]:
     return [
-        row_of(item, {file.path.suffix[1:]: file.path.relative_to(folder).as_posix() for file in files})
+        row_of(item, {file.format: file.path.relative_to(folder).as_posix() for file in files})
         for item, files in planned
     ]
 
@@ -180,7 +186,7 @@ def plan(
         for file in _wanted(motion["files"], formats, item["id"]) if motion else ():
             if not FORMAT.fullmatch(file["format"]):  # of the path: it must not lead out of the folder
                 raise InvalidFile(f"the server names the file format {file['format']!r}", where=f"item {item['id']}")
-            name = names.of(item["id"], naming(item), file["format"])
+            name = names.of(item["id"], naming(item), extension_of(file["format"]))
             url = f"/v1/motions/{motion['id']}/files/{file['format']}"
             downloads.append(Download(url, file["sha256"], file["size"], folder / name))
         planned.append((item, downloads))

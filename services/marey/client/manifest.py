@@ -14,6 +14,7 @@ from typing import Any
 
 from marey.client.csv_cells import join_tags, restore, write_csv
 from marey.core.errors import Conflict, InvalidInput
+from marey.exporters import extension_of
 
 NAME = "manifest.csv"
 RECORD = ".manifest-earlier.csv"
@@ -27,9 +28,13 @@ RAW_COLUMNS = (
 """Of files of earlier releases, whose cells hold the text as it is."""
 COLUMNS = (*RAW_COLUMNS, "seconds")
 """Of the file, whose cells are those of `csv_cells`. `npz` and `bvh` are paths of files from its folder; `comment` is
-the review's; `seconds` is the length that was asked for."""
+the review's; `seconds` is the length that was asked for. Other formats have columns behind these: `OTHER`."""
 NUMBERS = frozenset({"index", "seed", "variant", "frames", "fps", "seconds"})
 Row = dict[str, str]
+FORMATS = ("npz", "bvh")
+"""Formats that always have a column."""
+OTHER = re.compile(r"file:([a-z0-9]{1,16})")
+"""The column of another format, where there is such a file."""
 
 
 def check_manifest(folder: Path, *, overwrite: bool) -> None:
@@ -46,11 +51,12 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
     """The line of one item of the API; `files` are file names by format."""
     motion: Mapping[str, Any] = item["motion"] or {}
     review: Mapping[str, Any] = motion.get("review") or {}
+    paths = {format if format in FORMATS else f"file:{format}": name for format, name in files.items()}
     values: dict[str, Any] = {
         **{name: item[name] for name in ("index", "name", "prompt", "seed", "state", "variant", "model", "bundle")},
         "seconds": item.get("seconds"),
         **{name: motion.get(name) for name in ("licence", "frames", "fps")},
-        **files,
+        **paths,
         "tags": join_tags(item["tags"]),
         "review": review.get("verdict"),
         "comment": review.get("comment"),
@@ -60,7 +66,7 @@ def row_of(item: dict[str, Any], files: dict[str, str]) -> Row:
         "item": item["id"],
         "job": item["job"],
     }
-    return {name: "" if values.get(name) is None else str(values[name]) for name in COLUMNS}
+    return {name: "" if values.get(name) is None else str(values[name]) for name in (*COLUMNS, *_others(paths))}
 
 
 def write_manifest(
@@ -131,8 +137,19 @@ def _known(path: Path, *, overwrite: bool) -> list[Row]:
 
 def _files(row: Row) -> list[str]:
     """The names of a line's files. Anybody may have written the line: what is no plain name of a clip is left out."""
-    names = ((row[kind], f".{kind}") for kind in ("npz", "bvh"))
+    columns = (*FORMATS, *_others(row))
+    names = ((row[column], f".{extension_of(column.removeprefix('file:'))}") for column in columns)
     return [name for name, ending in names if PLAIN.fullmatch(name) and name.endswith(ending)]
+
+
+def is_column(name: str) -> bool:
+    """Return True if a manifest may have this column."""
+    return name in COLUMNS or OTHER.fullmatch(name) is not None
+
+
+def _others(names: Iterable[str]) -> list[str]:
+    """Columns among these of formats other than `FORMATS`, in alphabetical order."""
+    return sorted(name for name in set(names) if OTHER.fullmatch(name))
 
 
 def _is_file(folder: Path, name: str) -> bool:
@@ -146,7 +163,9 @@ def _is_file(folder: Path, name: str) -> bool:
 
 
 def _write(path: Path, rows: Iterable[Row]) -> None:
-    content = write_csv(COLUMNS, rows, numbers=NUMBERS)
+    rows = list(rows)
+    others = _others(name for row in rows for name, cell in row.items() if cell)
+    content = write_csv((*COLUMNS, *others), ({**dict.fromkeys(others, ""), **row} for row in rows), numbers=NUMBERS)
     if not path.exists() or path.read_bytes() != content:
         _replace(path, content)
 
@@ -157,9 +176,10 @@ def _read(path: Path) -> list[Row]:
         with path.open(newline="", encoding="utf-8") as stream:
             reader = csv.DictReader(stream, strict=True)
             columns = tuple(reader.fieldnames or ())
-            if columns in (COLUMNS, RAW_COLUMNS):
-                text = restore if columns == COLUMNS else str
-                return [{name: text(row.get(name) or "") for name in COLUMNS} for row in reader]
+            others = columns[len(COLUMNS) :]
+            if columns == RAW_COLUMNS or columns == (*COLUMNS, *_others(others)):
+                text = str if columns == RAW_COLUMNS else restore
+                return [{name: text(row.get(name) or "") for name in (*COLUMNS, *others)} for row in reader]
     except FileNotFoundError:
         return []
     except (UnicodeDecodeError, csv.Error):

@@ -12,6 +12,7 @@ from marey.client.resources import Resource, identifier, identifiers
 from marey.client.types import Job, Motion, MotionDetail, Reroll
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.core.extras import needs_extra
+from marey.exporters import extension_of
 
 if TYPE_CHECKING:
     from marey.motion.clip import MotionClip
@@ -91,7 +92,7 @@ class Motions(Resource):
         path = Path(path)
         found = motion if isinstance(motion, Motion) else self.get(motion)
         file_format = path.suffix.removeprefix(".").lower()
-        file = next((file for file in found.files if file.format == file_format), None)
+        file = next((file for file in found.files if file_format in (file.format, extension_of(file.format))), None)
         if file is None or not FORMAT.fullmatch(file.format):
             formats = ", ".join(file.format for file in found.files)
             raise NotFound(

@@ -120,7 +120,7 @@ def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) 
     problems: list[Unreadable] = []
     for index, name in enumerate(names):
         earlier = names[:index].count(name)
-        is_tag = extra == "tag" and name not in columns and not (ours and name in manifest.COLUMNS)
+        is_tag = extra == "tag" and name not in columns and not (ours and manifest.is_column(name))
         found.append(
             Column(
                 field=name if name in columns and not earlier else None,
@@ -129,7 +129,7 @@ def _read_header(names: list[str], columns: Sequence[str], extra: ExtraColumns) 
         )
         if is_tag and (not name or "=" in name):
             problems.append(Unreadable(f"{name!r} cannot be the key of a tag: give the column a name without ="))
-        elif extra == "refuse" and name not in columns and not (ours and name in manifest.COLUMNS):
+        elif extra == "refuse" and name not in columns and not (ours and manifest.is_column(name)):
             problems.append(Unreadable(f"{name!r} is not a known column; {known}"))
         elif earlier == 1 and (is_tag or name in columns):
             problems.append(Unreadable("stands twice", name))

@@ -19,7 +19,6 @@ from marey.core.tls import trusting_context
 from marey.db import check_listening, create_engine, outages, transaction
 from marey.evaluations import remove_unused_prompts
 from marey.jobs import Problem, make_due, record_scheduler_heartbeat, retire, sweep
-from marey.motion.clip import without_prompt
 from marey.runtime.app import create_app
 from marey.runtime.exposition import expose
 from marey.runtime.logs import configure_logging, logger
@@ -36,7 +35,7 @@ from marey.scheduler.servers import CHECK_SECONDS, server_check
 from marey.scheduler.webhooks import Deliverer
 from marey.storage import open_store
 from marey.streams import abandoned_streams, end_stream
-from marey.takes import KEPT, delete_expired, remove_stale_assets, rewrite_files
+from marey.takes import delete_expired, remove_stale_assets, rewrite_files
 from marey.webhooks.vault import Vault
 
 log = logger(__name__)
@@ -184,7 +183,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
 
     def retain() -> None:
         deleted = delete_expired(engine, store)
-        rewritten = rewrite_files(engine, store, partial(without_prompt, kept=KEPT))
+        rewritten = rewrite_files(engine, store)
         if deleted or rewritten:
             log.info("retained", jobs_deleted=deleted, files_rewritten=rewritten)
 

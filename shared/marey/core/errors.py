@@ -187,6 +187,10 @@ class QuotaUsedUp(Busy):
         return max(self.limit - self.used, 0)
 
 
+class PluginError(MareyError):
+    """An installed plug-in cannot be used, or one that is needed is not installed."""
+
+
 class ItemsFailed(MareyError):
     """Work that ended with items failed, dead or cancelled."""
 

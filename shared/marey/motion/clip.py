@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from marey.core.arrays import check_array, text_of
 from marey.core.arrays import parse_npz as parse_arrays
 from marey.core.documents import parse_json
-from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
-from marey.motion.files import write_atomically
+from marey.core.errors import InvalidFile, InvalidInput
+from marey.motion.files import read_limited, write_atomically
 from marey.motion.kinematics import forward_kinematics
 from marey.motion.rotations import Array
 from marey.motion.skeleton import Skeleton, skeleton_of
@@ -153,14 +153,7 @@ def load_npz(path: Path | str) -> MotionClip:
         TooLarge: more than `MAX_UNPACKED` bytes inside.
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > MAX_UNPACKED:
-            raise TooLarge(f"{path.stat().st_size / 2**30:.1f} GiB, over the limit of 1 GiB", where=str(path))
-        return parse_npz(path.read_bytes(), str(path))
-    except FileNotFoundError:
-        raise NotFound("no such file", where=str(path)) from None
-    except OSError as error:
-        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
+    return parse_npz(read_limited(path, MAX_UNPACKED), str(path))
 
 
 def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
@@ -203,14 +196,3 @@ def parse_npz(data: bytes, where: str = "npz") -> MotionClip:
         features_fps=features_fps,
         manifest=cast("dict[str, Any]", manifest),
     )
-
-
-def without_prompt(data: bytes, kept: Collection[str], where: str = "npz") -> bytes:
-    """A clip's npz file whose manifest says no more than what is `kept`, and that the rest was erased.
-
-    Raises:
-        InvalidFile, TooLarge: see `load_npz`.
-    """
-    clip = parse_npz(data, where)
-    manifest = {name: value for name, value in clip.manifest.items() if name in kept}
-    return replace(clip, manifest={**manifest, "erased": True}).to_npz()

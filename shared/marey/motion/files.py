@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Reading files up to a limit, and writing them whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,30 @@ import os
 import secrets
 from pathlib import Path
 
-from marey.core.errors import InvalidInput
+from marey.core.errors import InvalidFile, InvalidInput, NotFound, TooLarge
+
+
+def read_limited(path: Path, limit: int) -> bytes:
+    """Read a file.
+
+    Args:
+        limit: the most bytes it may have.
+
+    Raises:
+        NotFound: no such file.
+        InvalidFile: it cannot be read.
+        TooLarge: over the limit.
+    """
+    try:
+        size = path.stat().st_size
+        if size > limit:
+            message = f"{size / 2**20:.0f} MiB, over the limit of {limit / 2**20:.0f} MiB"
+            raise TooLarge(message, where=str(path))
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise NotFound("no such file", where=str(path)) from None
+    except OSError as error:
+        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
 
 
 def write_atomically(path: Path, data: bytes) -> None:

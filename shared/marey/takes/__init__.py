@@ -3,12 +3,11 @@
 from marey.takes.gc import collect_garbage, remove_stale_assets, remove_unused_assets
 from marey.takes.listings import list_motions
 from marey.takes.references import ReferenceKind, ReferenceMatch, resolve_reference
-from marey.takes.retention import KEPT, delete, delete_expired, erase, rewrite_files
+from marey.takes.retention import delete, delete_expired, erase, rewrite_files
 from marey.takes.reviews import MAX_REVIEWED, reroll, review
 from marey.takes.types import Erasure, GarbageReport, MotionFilter, Reroll
 
 __all__ = [
-    "KEPT",
     "MAX_REVIEWED",
     "Erasure",
     "GarbageReport",

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 from uuid import UUID
 
 import sqlalchemy as sa
 from sqlalchemy.dialects.postgresql import insert
 
-from marey.core.errors import Conflict, InvalidFile, NotFound
+from marey.core.errors import Conflict, InvalidFile, NotFound, Unreachable
 from marey.db.database import EVENT_CHANNEL, transaction
 from marey.db.deadlines import BULK, MAINTENANCE
 from marey.db.ids import new_id
 from marey.db.sql import CLOCK, notify
 from marey.evaluations import tables as evaluation_tables
 from marey.evaluations.repository import refuse_needed
+from marey.exporters import Coordinates, Exporter, exporter_of, exporters
 from marey.jobs import tables as job_tables
 from marey.jobs.files import asset_key
 from marey.jobs.journal import LockedJob, NewEvent, lock_job_of, record
@@ -60,7 +61,7 @@ FORGET = (
     WHERE job_id = :job AND data ? 'problem'
     """,
     "UPDATE motion_file SET erasing = true FROM motion "
-    "WHERE motion.id = motion_file.motion_id AND motion.job_id = :job AND motion_file.format = 'npz'",
+    "WHERE motion.id = motion_file.motion_id AND motion.job_id = :job AND motion_file.format <> ALL(:without_prompt)",
     "UPDATE stream_chunk SET prompts = '[]', reads = NULL FROM stream "
     "WHERE stream.id = stream_chunk.stream_id AND stream.job_id = :job",
     "UPDATE stream SET prompt = '' WHERE job_id = :job",
@@ -125,8 +126,10 @@ def delete_expired(engine: sa.Engine, store: ObjectStore) -> int:
 
 
 def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
-    """Erase the prompts of a job that has ended: prompts, rewrites, graphs and features at once; the npz files, whose
-    manifests hold them, are no longer served and are rewritten by `rewrite_files`.
+    """Erase the prompts of a job that has ended: prompts, rewrites, graphs and features, at once.
+
+    Files that hold prompts, such as npz, are not served until `rewrite_files` has rewritten them; nor are files of a
+    format whose exporter is not installed here.
 
     Names, tags, verdicts, motions and every other file stay. Erased already: no change.
 
@@ -147,20 +150,34 @@ def erase(conn: sa.Connection, tenant: str, job: UUID, *, by: str) -> Erasure:
     return Erasure(job, erased, _files_left(conn, job))
 
 
-def rewrite_files(engine: sa.Engine, store: FileStore, scrub: Callable[[bytes], bytes]) -> int:
-    """Rewrite the files of erased jobs, and remove the old ones; return their number.
+def rewrite_files(engine: sa.Engine, store: FileStore) -> int:
+    """Rewrite the files of erased jobs through the exporters of their formats, and remove the old ones.
 
-    Args:
-        scrub: returns a file's bytes without its prompt; a file that it cannot read (`InvalidFile`) is removed.
+    A file that its exporter cannot read (`InvalidFile`) is removed. A format whose exporter is not installed, or fails
+    otherwise, keeps its files from being served; the next call tries again. Other formats do not wait for it.
+
+    Returns:
+        How many files were done.
 
     Raises:
-        Unreachable: the store or the database does not answer; the rest is done the next time.
+        Unreachable: the store or the database does not answer; the next call goes on.
+        ExceptionGroup: of some formats no file could be rewritten.
     """
     with transaction(engine, MAINTENANCE) as conn:
-        waiting = _waiting(conn)
-    done = sum(_rewrite(engine, store, file, scrub) for file in waiting)
-    if waiting:
+        formats = _formats_waiting(conn)
+    done = 0
+    failures: list[Exception] = []
+    for format in formats:
+        try:
+            done += _rewrite_format(engine, store, exporter_of(format))
+        except Unreachable:
+            raise
+        except Exception as error:
+            failures.append(error)
+    if formats:
         remove_unused_assets(engine, store)
+    if failures:
+        raise ExceptionGroup("files of erased jobs still hold their prompts and are not served", failures)
     return done
 
 
@@ -191,9 +208,10 @@ def _forget(conn: sa.Connection, job: LockedJob, by: str) -> None:
     item = job_tables.item.c
     used = sa.select(item.text_key).where(item.job_id == job.id, item.text_key != NO_TEXT).distinct()
     keys: Sequence[str] = conn.execute(used).scalars().all()
+    without_prompt = [each.format for each in exporters().values() if not each.holds_prompt]
+    values = {"job": job.id, "kept": list(KEPT), "without_prompt": without_prompt}
     for statement in FORGET:
-        values = {"job": job.id} | ({"kept": list(KEPT)} if ":kept" in statement else {})
-        conn.execute(sa.text(statement), values)
+        conn.execute(sa.text(statement), {name: value for name, value in values.items() if f":{name}" in statement})
     # A concurrent submit may have seen these features and rely on them: wait for it, then check.
     conn.execute(sa.select(sa.func.pg_advisory_xact_lock(TEXTS_LOCK)))
     conn.execute(FORGET_TEXTS, {"keys": list(keys)})
@@ -210,22 +228,46 @@ def _files_left(conn: sa.Connection, job: UUID) -> int:
     return conn.execute(query.where(motion.job_id == job, file.erasing)).scalar_one()
 
 
-def _waiting(conn: sa.Connection) -> list[_File]:
+def _formats_waiting(conn: sa.Connection) -> Sequence[str]:
+    file = job_tables.motion_file.c
+    return conn.execute(sa.select(file.format).where(file.erasing).distinct().order_by(file.format)).scalars().all()
+
+
+def _waiting(conn: sa.Connection, format: str) -> list[_File]:
     file, asset = job_tables.motion_file.c, job_tables.asset.c
     query = (
         sa.select(file.motion_id, file.format, asset.id, asset.tenant_id, asset.sha256, asset.media_type)
         .join(job_tables.asset, asset.id == file.asset_id)
-        .where(file.erasing)
+        .where(file.erasing, file.format == format)
         .order_by(file.motion_id)
         .limit(ROUND)
     )
     return [_File(*row) for row in conn.execute(query)]
 
 
-def _rewrite(engine: sa.Engine, store: FileStore, file: _File, scrub: Callable[[bytes], bytes]) -> bool:
+def _rewrite_format(engine: sa.Engine, store: FileStore, exporter: Exporter[Any]) -> int:
+    with transaction(engine, MAINTENANCE) as conn:
+        if not exporter.holds_prompt:  # marked by a process that did not have the exporter
+            files = job_tables.motion_file.c
+            mine = files.erasing & (files.format == exporter.format)
+            return conn.execute(sa.update(job_tables.motion_file).where(mine).values(erasing=False)).rowcount
+        waiting = _waiting(conn, exporter.format)
+    return sum(_rewrite(engine, store, file, exporter) for file in waiting)
+
+
+def _without_prompt(exporter: Exporter[Any], data: bytes, where: str) -> bytes:
+    """Encode a file again, with a manifest of no more than what is `KEPT`, and that the rest was erased."""
+    assert exporter.decode is not None  # `Exporter` checks it of formats that hold prompts
+    clip = exporter.decode(data, where, Coordinates())
+    manifest = {name: value for name, value in clip.manifest.items() if name in KEPT}
+    return exporter.encode(replace(clip, manifest={**manifest, "erased": True}), Coordinates())
+
+
+def _rewrite(engine: sa.Engine, store: FileStore, file: _File, exporter: Exporter[Any]) -> bool:
     """Rewrite a file; return False if the garbage collector interfered: the next round tries again."""
+    key = asset_key(file.tenant, file.sha256)
     try:
-        data = scrub(store.get(asset_key(file.tenant, file.sha256)))
+        data = _without_prompt(exporter, store.get(key), key)
     except (InvalidFile, NotFound):
         with transaction(engine, MAINTENANCE) as conn:
             conn.execute(sa.delete(job_tables.motion_file).where(_row_of(file)))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from functools import partial
+from pathlib import Path
 from uuid import UUID
 
 import httpx2
 import pytest
 import sqlalchemy as sa
 
-from marey.core.errors import Conflict, NotFound
+from marey.core.errors import Conflict, NotFound, PluginError
 from marey.db import transaction
 from marey.jobs import (
     AssetDigest,
@@ -30,7 +30,7 @@ from marey.jobs import (
     submit,
 )
 from marey.jobs.types import NewJob
-from marey.motion.clip import parse_npz, without_prompt
+from marey.motion.clip import parse_npz
 from marey.storage import FolderStore
 from marey.streams import (
     NewStream,
@@ -43,17 +43,17 @@ from marey.streams import (
     take_stream,
 )
 from marey.streams.rewrites import PromptRewrite
-from marey.takes import KEPT, GarbageReport, collect_garbage, delete_expired, erase, rewrite_files
+from marey.takes import GarbageReport, collect_garbage, delete_expired, erase, rewrite_files
 from marey.tenants import DEFAULT_TENANT, create_key
 from tests.servers.audit import audit
 from tests.servers.jobs import claim_some, new_item, parse_texts, submit_items
 from tests.support.command import Command
 from tests.support.live_api import LiveApi
+from tests.support.plugins import installed, write_distribution
 from tests.support.walker import walker
 
 SECRET = "zanzibar"
 PROMPT = f"a person walks to {SECRET}"
-SCRUB = partial(without_prompt, kept=KEPT)
 
 
 def made(
@@ -115,7 +115,7 @@ def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_s
     assert left.files_left == 2
     assert files == ["bvh", "bvh"]  # nobody gets the others meanwhile
     assert SECRET not in dump(engine)
-    assert rewrite_files(engine, folder_store, SCRUB) == 2
+    assert rewrite_files(engine, folder_store) == 2
     assert not any(SECRET.encode(coding) in data for data in objects(folder_store) for coding in ("utf-8", "utf-32-le"))
     with transaction(engine) as conn:
         assert erase(conn, "default", job, by="bob") == type(left)(job, left.erased, 0)
@@ -193,7 +193,7 @@ def test_a_file_that_cannot_be_read_goes_rather_than_keep_its_prompt(
     job = made(engine, folder_store, PROMPT, npz=b"broken " + PROMPT.encode())
     with transaction(engine) as conn:
         erase(conn, "default", job, by="ann")
-    assert rewrite_files(engine, folder_store, SCRUB) == 1
+    assert rewrite_files(engine, folder_store) == 1
     assert objects(folder_store) == [b"HIERARCHY"]
 
 
@@ -229,9 +229,112 @@ def test_days_and_erasure_by_the_command_line(marey: Command, api: LiveApi, http
     marey("jobs", "erase", job["id"], "--yes").refused(2, "the job is queued")
     api.work(walker(seconds=0.2).to_npz())
     assert "expires" in marey("jobs", "show", job["id"]).ok().out
-    assert "1 npz files are written anew" in marey("jobs", "erase", job["id"], "--yes").ok().err
+    assert "1 files are written anew" in marey("jobs", "erase", job["id"], "--yes").ok().err
     with api.client() as client:
         (item,) = client.pages(f"/v1/jobs/{job['id']}/items")
     assert (item["prompt"], [file["format"] for file in item["motion"]["files"]]) == ("", ["bvh"])
     assert http.get(f"/v1/motions/{item['motion']['id']}/files/npz").status_code == 404
     marey("submit", "a person walks", "--keep-days", 0).refused(2)
+
+
+def add_file(engine: sa.Engine, store: FolderStore, job: UUID, format: str, data: bytes) -> None:
+    """Add a file to the motions of a job, as a worker with another exporter would."""
+    store.put(asset_key("default", digest(data).sha256), data)
+    with transaction(engine) as conn:
+        asset = conn.execute(
+            sa.text(
+                "INSERT INTO asset (id, tenant_id, sha256, size, media_type, state, announced_at) VALUES "
+                "(gen_random_uuid(), 'default', :sha256, :size, 'text/x-toy', 'stored', now()) RETURNING id"
+            ),
+            {"sha256": digest(data).sha256, "size": len(data)},
+        ).scalar_one()
+        conn.execute(
+            sa.text("INSERT INTO motion_file (motion_id, format, asset_id) SELECT id, :format, :asset FROM motion "
+                    "WHERE job_id = :job"),
+            {"format": format, "asset": asset, "job": job},
+        )  # fmt: skip
+
+
+TOY = """
+from marey.exporters import Exporter, exporter_of
+
+
+def encode(clip, coordinates):
+    return b"toy " + exporter_of("npz").encode(clip, coordinates)
+
+
+def decode(data, where, coordinates):
+    if data.startswith(b"bug"):
+        raise RuntimeError("a bug of the plug-in")
+    return exporter_of("npz").decode(data.removeprefix(b"toy "), where, coordinates)
+
+
+HOLDS = Exporter("toy", "text/x-toy", "toy", True, encode, decode)
+PLAIN = Exporter("toy", "text/x-toy", "toy", False, encode)
+"""
+
+
+def formats_served(engine: sa.Engine, job: UUID) -> list[str]:
+    with transaction(engine) as conn:
+        (row,) = list_items(conn, "default", job).rows
+        return [] if row.motion is None else [file.format for file in row.motion.files]
+
+
+def erased_with_toy(engine: sa.Engine, store: FolderStore, data: bytes) -> UUID:
+    """A job with a file of a format that is not installed here, erased."""
+    job = made(engine, store, PROMPT)
+    add_file(engine, store, job, "toy", data)
+    with transaction(engine) as conn:
+        assert erase(conn, "default", job, by="ann").files_left == 2
+    assert formats_served(engine, job) == ["bvh"]
+    return job
+
+
+def toy_plugin(folder: Path, name: str) -> Path:
+    module = f"toy_{name.lower()}"
+    return write_distribution(folder, module, {module: TOY}, f"[marey.exporters]\ntoy = {module}:{name}\n")
+
+
+def test_a_format_that_is_not_installed_is_never_skipped_and_holds_up_no_other(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    toy = b"toy " + walker(seconds=0.2, prompt=PROMPT).to_npz()
+    job = erased_with_toy(engine, folder_store, toy)
+    for _ in range(2):
+        with pytest.raises(ExceptionGroup, match="still hold their prompts") as raised:
+            rewrite_files(engine, folder_store)
+        assert [type(error) for error in raised.value.exceptions] == [PluginError]
+        assert "'toy' is installed" in str(raised.value.exceptions[0])
+        assert formats_served(engine, job) == ["bvh", "npz"]
+        assert toy in objects(folder_store)
+    with installed(toy_plugin(tmp_path, "HOLDS")):
+        assert rewrite_files(engine, folder_store) == 1
+    assert formats_served(engine, job) == ["bvh", "npz", "toy"]
+    (rewritten,) = (data for data in objects(folder_store) if data.startswith(b"toy "))
+    assert parse_npz(rewritten.removeprefix(b"toy ")).manifest == {"seed": 7, "erased": True}
+    assert rewrite_files(engine, folder_store) == 0
+    with transaction(engine) as conn:
+        assert audit(conn) == []
+
+
+def test_a_format_without_prompts_is_served_again_as_it_is(
+    engine: sa.Engine, folder_store: FolderStore, tmp_path: Path
+) -> None:
+    job = erased_with_toy(engine, folder_store, b"toy")
+    with installed(toy_plugin(tmp_path, "PLAIN")):
+        assert rewrite_files(engine, folder_store) == 2
+        assert formats_served(engine, job) == ["bvh", "npz", "toy"]
+        assert b"toy" in objects(folder_store)
+        later = made(engine, folder_store, PROMPT)
+        add_file(engine, folder_store, later, "toy", b"toy 2")
+        with transaction(engine) as conn:
+            assert erase(conn, "default", later, by="ann").files_left == 1
+        assert formats_served(engine, later) == ["bvh", "toy"]
+
+
+def test_a_plugin_that_fails_is_tried_again(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:
+    job = erased_with_toy(engine, folder_store, b"bug")
+    with installed(toy_plugin(tmp_path, "HOLDS")), pytest.raises(ExceptionGroup) as raised:
+        rewrite_files(engine, folder_store)
+    assert raised.value.subgroup(RuntimeError) is not None
+    assert formats_served(engine, job) == ["bvh", "npz"]

@@ -16,6 +16,7 @@ from marey.client.csv_cells import join_tags, protect, restore, split_tags, writ
 from marey.client.manifest import COLUMNS, NAME, NUMBERS, RAW_COLUMNS, row_of, write_manifest
 from marey.client.rows import items_from_file
 from marey.core.characters import find_forbidden
+from marey.core.errors import Conflict
 from marey.items.item import Item, read_item
 
 TEXT = st.text(st.one_of(st.sampled_from("=+-@\t\r\n'\",;x "), st.characters(exclude_categories=["Cs"])), max_size=20)
@@ -128,3 +129,27 @@ def test_the_columns_tell_which_release_wrote_a_manifest() -> None:
     assert COLUMNS != RAW_COLUMNS
     assert set(COLUMNS) > NUMBERS
     assert find_forbidden("".join(COLUMNS)) is None
+
+
+def test_a_manifest_has_a_column_of_each_other_format_that_there_is(tmp_path: Path) -> None:
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    files = {"npz": "walk.npz", "usd": "walk.usd", "seed": "walk.seed"}  # a format may have the name of a column
+    with_usd, without = row_of(item(0, seed=7), files), row_of(item(1), {"npz": "bow.npz"})
+    assert (with_usd["seed"], with_usd["file:usd"], with_usd["file:seed"]) == ("7", "walk.usd", "walk.seed")
+    assert write_manifest(folder, "job", [with_usd, without]) == []
+    first = (folder / NAME).read_text().splitlines()[0]
+    assert first == ",".join((*COLUMNS, "file:seed", "file:usd"))
+    assert [row["file:usd"] for row in manifest._read(folder / NAME)] == ["walk.usd", ""]
+    assert len(list(items_from_file(str(folder / NAME)))) == 2  # it is still ours to submit again
+    for name in files.values():
+        (folder / name).write_text("clip")
+    left = write_manifest(folder, "job", [without])
+    assert sorted(path.name for path in left) == ["walk.npz", "walk.seed", "walk.usd"]
+    assert (folder / NAME).read_text().splitlines()[0] == ",".join(COLUMNS)
+
+
+def test_a_manifest_with_columns_of_somebody_else_is_not_ours(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_text(",".join((*COLUMNS, "notes")) + "\n")
+    with pytest.raises(Conflict):
+        write_manifest(tmp_path, "job", [])

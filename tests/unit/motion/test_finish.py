@@ -8,12 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from marey.core.errors import Conflict, InvalidFile, InvalidInput, NotFound
+from marey.exporters.convert import convert
 from marey.motion.clip import MotionClip, load_npz
 from marey.motion.features import HUMANML3D_263, KIT_251
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
 from marey.motion.io.bvh import BvhClip, format_bvh, parse_bvh, read_bvh, write_bvh
-from marey.motion.io.convert import convert, steady
+from marey.motion.io.convert import steady
 from marey.motion.kinematics import bone_lengths, facing, forward_kinematics
 from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
 from marey.motion.rotations import about, angle_between, multiply

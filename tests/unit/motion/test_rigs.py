@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.exporters.convert import convert
 from marey.motion.clip import load_npz
 from marey.motion.feet import find_contacts
 from marey.motion.io.bvh import BvhClip, write_bvh
-from marey.motion.io.convert import convert
 from marey.motion.kinematics import facing
 from marey.motion.rigs import feet_and_facing
 from marey.motion.rotations import about, multiply, rotate

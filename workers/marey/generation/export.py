@@ -8,14 +8,12 @@ from typing import Any
 
 import torch
 
+from marey.exporters import Coordinates, exporters
 from marey.generation.port import Generated, Generator, Request, S
 from marey.items.item import OUTPUT_FPS
 from marey.motion.clip import MotionClip
 from marey.motion.finish import finish_motion
-from marey.motion.io.bvh_write import format_bvh
 from marey.runtime.handler import Export, ExportedFile
-
-MEDIA_TYPES = {"npz": "application/x-npz", "bvh": "text/plain; charset=utf-8"}
 
 
 def split_settings(values: Mapping[str, Any]) -> tuple[dict[str, Any], float | None]:
@@ -75,10 +73,12 @@ def finish(
 
 
 def export_clip(clip: MotionClip, licence: str) -> Export:
-    """The npz and the BVH of a clip, in memory."""
-    contents: Mapping[str, bytes] = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
+    """Encode a clip in every installed format, in memory."""
     return Export(
-        files=tuple(ExportedFile(name, content, MEDIA_TYPES[name]) for name, content in contents.items()),
+        files=tuple(
+            ExportedFile(each.format, each.encode(clip, Coordinates()), each.media_type)
+            for each in exporters().values()
+        ),
         frames=clip.frames,
         fps=clip.fps,
         licence=licence,

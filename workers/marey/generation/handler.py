@@ -11,6 +11,7 @@ from uuid import UUID
 
 from marey.core.errors import MareyError
 from marey.core.settings import Settings as Configuration
+from marey.exporters import exporters
 from marey.generation.export import export_clip, finish, split_settings
 from marey.generation.port import Generated, Generator, Request, S
 from marey.jobs import ClaimedItem
@@ -30,7 +31,11 @@ class GeneratorHandler(Generic[S]):
             load: a bundle's reference to its generator; takes `device` and `threads`.
             batch_size: items of one claim, at most.
             chosen: device and threads.
+
+        Raises:
+            PluginError: an export format cannot be used; found now, before an item fails for it.
         """
+        exporters()
         self.queue = queue
         self.batch_size = batch_size
         self._load = load

@@ -15,6 +15,7 @@ from marey.api.evaluations import service
 from marey.api.evaluations.comparison import ComparisonView, compare_runs
 from marey.api.evaluations.schemas import EvaluationDetailView, EvaluationView, NewEvaluationBody
 from marey.api.files import FILE_RESPONSES, FileRequest, file_response
+from marey.core.disposition import download_name
 from marey.core.errors import NotFound
 from marey.http.bodies import kept_body
 from marey.http.problems import RESPONSES
@@ -91,7 +92,8 @@ def get_report(
     if file is None:
         message = f"there is no such report: the evaluation is {row.state}"
         raise NotFound(message, where=str(evaluation), hint=row.reason)
-    return file_response(shared, key.tenant, f"{row.name or 'evaluation'}_{row.id}", file, part)
+    name = download_name(f"{row.name or 'evaluation'}_{row.id}", file.format)
+    return file_response(shared, key.tenant, name, file, part)
 
 
 @router.get("/{evaluation}/comparison")

@@ -25,7 +25,9 @@ from marey.api.takes.schemas import (
     ReviewFilter,
 )
 from marey.api.takes.service import file_stem, made_again
+from marey.core.disposition import download_name
 from marey.core.errors import NotFound
+from marey.exporters import extension_of
 from marey.http.problems import RESPONSES
 from marey.http.schemas import Cursor, FreeText, Limit, PageView
 from marey.items.item import MAX_NAME, MAX_TAG_LENGTH, MAX_TAGS
@@ -127,4 +129,4 @@ def get_file(
     if file is None:
         made = ", ".join(f.format for f in row.files)
         raise NotFound(f"the motion was not made as {format}", where=str(motion), hint=f"It has {made}.")
-    return file_response(shared, key.tenant, file_stem(row), file, part)
+    return file_response(shared, key.tenant, download_name(file_stem(row), extension_of(format)), file, part)

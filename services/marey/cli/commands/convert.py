@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Unit(StrEnum):
-    """Units of BVH files."""
+    """Units of files, such as BVH, that do not say theirs."""
 
     METRE = "m"
     CENTIMETRE = "cm"
@@ -26,20 +26,20 @@ class Unit(StrEnum):
 
 
 class Up(StrEnum):
-    """Axes that may point up in BVH files."""
+    """Axes that may point up in files that do not say which."""
 
     Y = "y"
     Z = "z"
 
 
-Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="A .bvh or .npz file.")]
+Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="A motion file, such as .bvh or .npz.")]
 FromUnit = Annotated[Unit, typer.Option("--from-unit", help="Unit of a BVH source.")]
 FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that points up.")]
 
 
 def convert(
     source: Source,
-    target: Annotated[Path, typer.Argument(metavar="TARGET", help="A .bvh or .npz file.")],
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="A motion file, such as .bvh or .npz.")],
     fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
@@ -47,11 +47,11 @@ def convert(
     from_up: FromUp = Up.Y,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Convert a motion between BVH and npz, with another rate, unit or axis if wanted."""
+    """Convert a motion between BVH, npz and installed formats, with another rate, unit or axis if wanted."""
     from marey.core.extras import needs_extra
 
     try:
-        from marey.motion.io.convert import convert as convert_file
+        from marey.exporters.convert import convert as convert_file
     except ImportError as error:
         raise needs_extra("motion", error) from error
     notes = convert_file(
@@ -70,7 +70,7 @@ def convert(
 
 
 def render(
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help=".bvh or .npz files.")],
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Motion files, such as .bvh or .npz.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .png (contact sheet) or .html (3D player).")],
     columns: Annotated[int, typer.Option("--columns", help="Poses a motion on a contact sheet.")] = 8,
     title: Annotated[str | None, typer.Option("--title", help="A line at the top.")] = None,
@@ -99,13 +99,7 @@ def render(
 
 
 def _read(source: Path, unit: Unit, up: Up) -> MotionClip:
-    from marey.motion.clip import load_npz
-    from marey.motion.io.bvh import read_bvh
-    from marey.motion.io.convert import clip_from_bvh, steady
+    from marey.exporters import Coordinates
+    from marey.exporters.convert import read_motion
 
-    ending = source.suffix.lower()
-    if ending == ".npz":
-        return load_npz(source)
-    if ending == ".bvh":
-        return clip_from_bvh(steady(read_bvh(source, unit=unit.value, up=up.value)), source.name)
-    raise InvalidInput("is neither a .bvh nor a .npz", where=str(source), hint="`marey convert` makes them.")
+    return read_motion(source, Coordinates(unit.value, up.value))

@@ -61,7 +61,7 @@ def write_job(
     client: Transport,
     job: str,
     folder: Path,
-    formats: Sequence[options.FileFormat] | None,
+    formats: Sequence[str] | None,
     *,
     template: str = options.TEMPLATE,
     only: Review | None = None,
@@ -88,7 +88,7 @@ def fetch_job(
     client: Transport,
     job: str,
     folder: Path,
-    formats: Sequence[options.FileFormat] | None = None,
+    formats: Sequence[str] | None = None,
     *,
     template: str = options.TEMPLATE,
     only: Review | None = None,
@@ -122,7 +122,7 @@ def fetch_job(
                 )
 
         planned, left = fetch(
-            client, job, folder, [f.value for f in formats] if formats else None,
+            client, job, folder, formats or None,
             template=template, review=None if only is None else only.value, prune=prune, overwrite=overwrite,
             observer=Observer(),
         )  # fmt: skip
@@ -151,5 +151,5 @@ def output_line(item: dict[str, Any], files: Sequence[Download]) -> dict[str, An
         "frames": motion.get("frames"),
         "fps": motion.get("fps"),
         "elapsed": motion.get("elapsed"),
-        "files": {d.url.rpartition("/")[2]: str(d.path.absolute()) for d in files},
+        "files": {d.format: str(d.path.absolute()) for d in files},
     }

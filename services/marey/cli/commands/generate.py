@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from marey.bundles import Bundle
     from marey.cli.roles.oneshot import Wanted
     from marey.core.settings import Settings
+    from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
 
 
@@ -59,13 +60,13 @@ def generate(
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
+    kinds = _exporters(formats)
     defaults = rows.defaults_of(
         model=model, seconds=seconds, seed=seed, variants=variants, fps=fps, tags=tags, settings=sampling
     )
     reader = read_prompts(prompts, file, input_format, defaults, extra_columns)
     items = list(reader)
     chosen, config = _bundle_for(reader, items, bundle)
-    kinds = [f.value for f in formats or options.FileFormat]
     planned = _plan(items, chosen, output, name_template, kinds)
     check_folder(output, hint="Choose another folder with -o.")
     make_folders(output, (path for plan in planned for path in plan.paths.values()))
@@ -163,7 +164,24 @@ def _one_model(items: Iterable[Item], default: str) -> str:
     return models[0]
 
 
-def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[str]) -> list[Planned]:
+def _exporters(formats: list[str] | None) -> list[Exporter[Any]]:
+    """The exporters of the formats, each once; by default all that are installed.
+
+    Raises:
+        InvalidInput: there is none for a format.
+    """
+    from marey.exporters import exporters
+
+    known = exporters()
+    for name in formats or ():
+        if name not in known:
+            raise InvalidInput(
+                f"{name!r} is not a known motion format", where="--format", hint=f"Known: {', '.join(known)}."
+            )
+    return [known[name] for name in dict.fromkeys(formats or known)]
+
+
+def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[Exporter[Any]]) -> list[Planned]:
     """What to make and where each motion goes.
 
     Raises:
@@ -189,18 +207,18 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
                 bundle.reference,
                 slug(item.prompt),
             )
-            paths = {kind: folder / names.of((index, variant), naming, kind) for kind in kinds}
+            paths = {kind.format: folder / names.of((index, variant), naming, kind.extension) for kind in kinds}
             yield Planned(item, variant, wanted, paths)
 
     return [plan for index, item in enumerate(items) for plan in of(index, item)]
 
 
 def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, overwrite: bool) -> dict[str, Any]:
+    from marey.exporters import Coordinates, exporters
     from marey.motion.files import write_atomically
-    from marey.motion.io.bvh import format_bvh
 
-    contents = {"npz": clip.to_npz(), "bvh": format_bvh(clip).encode()}
     paths = plan.paths
+    contents = {kind: exporters()[kind].encode(clip, Coordinates()) for kind in paths}
     changed = [kind for kind, path in paths.items() if not path.exists() or path.read_bytes() != contents[kind]]
     for kind in changed:
         if paths[kind].exists() and not overwrite:
@@ -214,7 +232,7 @@ def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, o
     return {
         "job": None,
         "item": None,
-        "motion": hashlib.sha256(contents["npz"]).hexdigest(),
+        "motion": hashlib.sha256(contents["npz"] if "npz" in contents else clip.to_npz()).hexdigest(),
         "name": plan.item.name,
         "prompt": plan.item.prompt,
         "variant": plan.variant,

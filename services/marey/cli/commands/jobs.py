@@ -183,7 +183,7 @@ def erase(
                 console.result_json(found)
                 continue
             left = found["files_left"]
-            more = f"; {left} npz files are written anew and cannot be fetched before" if left else ""
+            more = f"; {left} files are written anew and cannot be fetched before" if left else ""
             console.say(f"erased the prompts of {job}{more}")
 
 

@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from marey.core.errors import InvalidFile, NotFound, TooLarge
+from marey.core.errors import InvalidFile, TooLarge
+from marey.motion.files import read_limited
 from marey.motion.io.bvh_header import LARGEST, Header, Joint
 from marey.motion.io.bvh_write import format_bvh, write_bvh
 from marey.motion.kinematics import forward_kinematics
@@ -81,15 +82,7 @@ def read_bvh(
         TooLarge: over the limits above.
     """
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise TooLarge(f"{size / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB", where=str(path))
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise NotFound("no such file", where=str(path)) from None
-    except OSError as error:
-        raise InvalidFile(f"cannot be read: {error.strerror}", where=str(path)) from None
+    data = read_limited(path, MAX_BYTES)
     return parse_bvh(data, str(path), unit=unit, up=up, rest_frame=rest_frame, translation=translation)
 
 
@@ -103,6 +96,9 @@ def parse_bvh(
     translation: Literal["auto", "replace", "add"] = "auto",
 ) -> BvhClip:
     """Read the bytes of a BVH file; see `read_bvh`. `where` names it in errors."""
+    if len(data) > MAX_BYTES:
+        message = f"{len(data) / 2**20:.0f} MiB, over the limit of {MAX_BYTES / 2**20:.0f} MiB"
+        raise TooLarge(message, where=where)
     header = Header(data, where)
     notes = header.notes
     values = _numbers(data, header, where)

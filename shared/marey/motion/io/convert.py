@@ -1,75 +1,19 @@
-"""Conversion between BVH and npz, with another rate, unit or axis on the way: what `marey convert` calls."""
+"""BVH clips at another rate, with bones of constant length, and as `MotionClip`."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from marey.core.errors import Conflict, InvalidInput
-from marey.motion.clip import MotionClip, load_npz
+from marey.motion.clip import MotionClip
 from marey.motion.feet import find_contacts
-from marey.motion.io.bvh import BvhClip, read_bvh, write_bvh
+from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import facing, forward_kinematics
-from marey.motion.resample import frame_times, interpolate, interpolate_rotations, resample
+from marey.motion.resample import frame_times, interpolate, interpolate_rotations
 from marey.motion.rigs import feet_and_facing
 from marey.motion.rotations import Array, about, multiply, rotate
 from marey.motion.skeleton import known_order, skeleton_of
-from marey.motion.units import Unit, Up
-
-KINDS = (".bvh", ".npz")
-
-
-def convert(
-    source: Path | str,
-    target: Path | str,
-    *,
-    fps: float | None = None,
-    unit: Unit = "cm",
-    up: Up = "y",
-    source_unit: Unit = "cm",
-    source_up: Up = "y",
-    overwrite: bool = False,
-) -> tuple[str, ...]:
-    """Convert a motion file; the endings of the names tell the kinds.
-
-    Args:
-        source, target: `.bvh` or `.npz`.
-        fps: rate of the result; as it is by default.
-        unit, up: of a BVH result; npz is always metres and Y up.
-        source_unit, source_up: of a BVH source.
-        overwrite: replace an existing file.
-
-    Returns:
-        What was odd about a BVH source, for a person.
-
-    Raises:
-        InvalidInput: a kind of file that is not known, or a rate out of bounds.
-        Conflict: the target is there already.
-        NotFound, InvalidFile, TooLarge: from reading.
-    """
-    source, target = Path(source), Path(target)
-    for path in (source, target):
-        if path.suffix.lower() not in KINDS:
-            raise InvalidInput(f"`{path.suffix}` is no kind of motion file", where=str(path), hint="Known: .bvh, .npz.")
-    if target.exists() and not overwrite:
-        raise Conflict("is there already", where=str(target), hint="Choose another name, or allow overwriting.")
-    if source.suffix.lower() == ".bvh":
-        clip = steady(read_bvh(source, unit=source_unit, up=source_up))
-        clip = clip if fps is None else resample_bvh(clip, fps)
-        if target.suffix.lower() == ".npz":
-            clip_from_bvh(clip, source.name).save_npz(target)
-        else:
-            write_bvh(target, clip, unit=unit, up=up)
-        return clip.notes
-    motion = load_npz(source)
-    motion = motion if fps is None else resample(motion, fps)
-    if target.suffix.lower() == ".npz":
-        motion.save_npz(target)
-    else:
-        write_bvh(target, motion, unit=unit, up=up)
-    return ()
 
 
 def resample_bvh(clip: BvhClip, fps: float) -> BvhClip:

@@ -1,0 +1,10 @@
+"""Export formats of motions, found through the entry-point group `marey.exporters`.
+
+A format is one module with an `Exporter`, such as `npz.py`, and one line in `pyproject.toml`, Marey's or a plug-in's:
+see docs/extending.md. Importing this package needs the standard library only.
+"""
+
+from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.registry import GROUP, exporter_of, exporters, extension_of
+
+__all__ = ["GROUP", "Coordinates", "Exporter", "exporter_of", "exporters", "extension_of"]

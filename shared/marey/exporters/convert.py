@@ -1,0 +1,89 @@
+"""Conversion between motion files, with another rate, unit or axis if wanted: `marey convert` calls it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from marey.core.errors import Conflict, InvalidInput
+from marey.exporters.exporter import Coordinates, Exporter
+from marey.exporters.registry import exporters
+from marey.motion.clip import MAX_UNPACKED, MotionClip
+from marey.motion.files import read_limited, write_atomically
+from marey.motion.io.bvh import BvhClip
+from marey.motion.io.convert import clip_from_bvh, resample_bvh
+from marey.motion.resample import resample
+from marey.motion.units import Unit, Up
+
+
+def convert(
+    source: Path | str,
+    target: Path | str,
+    *,
+    fps: float | None = None,
+    unit: Unit = "cm",
+    up: Up = "y",
+    source_unit: Unit = "cm",
+    source_up: Up = "y",
+    overwrite: bool = False,
+) -> tuple[str, ...]:
+    """Convert a motion file; the extensions of the names tell the formats.
+
+    Args:
+        source, target: files of installed formats, such as `.bvh` and `.npz`.
+        fps: rate of the result, in frames a second; None = the source's.
+        unit, up: of a result whose format leaves them open, such as BVH; npz is always metres and Y up.
+        source_unit, source_up: of such a source.
+        overwrite: replace an existing file.
+
+    Returns:
+        Notes on oddities of a BVH source.
+
+    Raises:
+        InvalidInput: a format that is not known or only written, or a rate out of bounds.
+        Conflict: the target exists.
+        NotFound, InvalidFile, TooLarge: from reading.
+    """
+    source, target = Path(source), Path(target)
+    reader, writer = _exporter_for(source), _exporter_for(target)
+    if target.exists() and not overwrite:
+        raise Conflict("already exists", where=str(target), hint="Choose another name, or allow overwriting.")
+    clip = _decode(reader, source, Coordinates(source_unit, source_up))
+    notes: tuple[str, ...] = ()
+    if isinstance(clip, BvhClip):
+        notes = clip.notes
+        clip = clip if fps is None else resample_bvh(clip, fps)
+        clip = clip if writer is reader else clip_from_bvh(clip, source.name)
+    elif fps is not None:
+        clip = resample(clip, fps)
+    write_atomically(target, writer.encode(clip, Coordinates(unit, up)))
+    return notes
+
+
+def read_motion(path: Path, coordinates: Coordinates) -> MotionClip:
+    """Read a motion file of any installed format.
+
+    Args:
+        coordinates: unit and axis of a file whose format leaves them open.
+
+    Raises:
+        InvalidInput: a format that is not known or only written.
+        NotFound, InvalidFile, TooLarge: from reading.
+    """
+    clip = _decode(_exporter_for(path), path, coordinates)
+    return clip_from_bvh(clip, path.name) if isinstance(clip, BvhClip) else clip
+
+
+def _exporter_for(path: Path) -> Exporter[Any]:
+    extension = path.suffix.lower().removeprefix(".")
+    found = next((each for each in exporters().values() if each.extension == extension), None)
+    if found is None:
+        known = ", ".join(f".{each.extension}" for each in exporters().values())
+        raise InvalidInput(f"`{path.suffix}` is not a known motion format", where=str(path), hint=f"Known: {known}.")
+    return found
+
+
+def _decode(reader: Exporter[Any], path: Path, coordinates: Coordinates) -> MotionClip | BvhClip:
+    if reader.decode is None:
+        raise InvalidInput(f"{reader.format} files are only written, not read", where=str(path))
+    return reader.decode(read_limited(path, MAX_UNPACKED), str(path), coordinates)
