@@ -63,7 +63,7 @@ def test_a_run_ends_in_a_report_in_three_formats(judged: Marey, first: str, tmp_
     assert 0 <= rows["exported"]["obeyed"]["mean"] < 60  # random weights walk nowhere
     assert rows["exported"]["fid"]["mean"] > 0
     assert "three" in (tmp_path / "report.html").read_text().lower()
-    assert "Prompts obeyed" in (tmp_path / "report.md").read_text()
+    assert "Prompt adherence" in (tmp_path / "report.md").read_text()
 
 
 def test_the_same_run_again_is_compared_with_the_first_and_did_not_regress(

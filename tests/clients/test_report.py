@@ -121,7 +121,7 @@ def with_all_columns(report: Report) -> Report:
     changes = (change, dataclasses.replace(change, metric=RETRIEVED, low=-9.8, high=0.1, verdict="no difference found"))
     styles = ("active", "childish", "elderly", "exhausted", "feminine", "happy", "masculine", "normal", "not-confident")
     heat = [
-        HeatCell(act, style, 105, 100) for act in ("2 acts in order", "walk") for style in (*styles, "sad", "giant")
+        HeatCell(act, style, 105, 100) for act in ("2 actions in order", "walk") for style in (*styles, "sad", "giant")
     ]
     return dataclasses.replace(report, metrics=metrics, rows=rows, changes=changes, trend=(), heat=tuple(heat))
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from marey.evaluator.report import (
+    ArtifactReference,
     Baseline,
     Change,
     Exhibit,
     HeatCell,
     Metric,
     MotionScore,
-    Reference,
     Repeats,
     Report,
     Row,
@@ -48,7 +48,7 @@ METRICS = (
         NETWORK,
         "the compositional split",
     ),
-    Metric("obeyed", "Prompts obeyed", "%", "higher", 1, "Motions that do what the prompt says."),
+    Metric("obeyed", "Prompt adherence", "%", "higher", 1, "Motions that do what the prompt says."),
     Metric("skate", "Foot skate", "%", "lower", 1, "Frames in which a toe slides on the floor."),
     Metric("jerk", "Jerk", "m/s³", "lower", 0, "How abrupt the motion is."),
     Metric("floor", "Floor penetration", "mm", "lower", 1, "How deep the feet get under the floor."),
@@ -166,12 +166,12 @@ def sample_report(
         title="hgm3-starter on the evaluation prompts",
         evaluation="22",
         created=MONDAY,
-        generator=Reference(
+        generator=ArtifactReference(
             "hgm3-starter@96a91328572d", "96a91328572de3541eb2499337627ffc969eb1b6d1157f84dbb1ccaf4bfe006f"
         ),
         licence="CC-BY-NC-4.0",
-        evaluator=Reference(NETWORK, "5f0c2b7d91ae" + 52 * "a"),
-        source=Reference("test split", "0b" * 32),
+        evaluator=ArtifactReference(NETWORK, "5f0c2b7d91ae" + 52 * "a"),
+        source=ArtifactReference("test split", "0b" * 32),
         prompts=200,
         motions=1674,
         failed=3,

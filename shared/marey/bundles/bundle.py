@@ -57,7 +57,7 @@ class Bundle:
 
     @cached_property
     def weights_sha256(self) -> str:
-        """One hash for all that decides what the bundle makes: two bundles with the same hash make the same motion.
+        """A hash of everything that determines the generated motion: equal hashes mean equal motions.
 
         Format 1 covers the files alone. Format 2 covers the whole manifest but for what only describes it
         (`DESCRIPTIVE`), as it was written: a field that a later version adds leaves the hash as it is.
@@ -99,7 +99,7 @@ class Bundle:
         return tensors
 
     def statistics(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Mean and standard deviation (D,) the features were normalised with in training.
+        """Mean and standard deviation (D,) used to normalise the features in training.
 
         Raises:
             InvalidBundle: as `tensors`, or they are something else.

@@ -1,4 +1,4 @@
-"""Which bundle a person means who names a model, a bundle or a folder."""
+"""Resolve a model name, a bundle name or a path to one bundle."""
 
 from __future__ import annotations
 
@@ -42,8 +42,7 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
 
 @contextmanager
 def named_by(field: str) -> Generator[None]:
-    """What is wrong with a bundle is told as about the field of a request that names it, not about the server's folder
-    in which it lies."""
+    """Report an invalid bundle as an error of the request field that names it, not of the server's folder."""
     try:
         yield
     except (NotFound, InvalidBundle, Refused) as error:
@@ -80,8 +79,7 @@ def choose_evaluator(name: str | None, *, generator: Bundle | None = None, confi
 
 
 def unlike(generator: BundleManifest, evaluator: BundleManifest) -> tuple[str, object, object] | None:
-    """In what the motions that one makes are not those that the other measures: what, there, here. None = in nothing
-    that both tell."""
+    """The first property in which two bundles describe different motion: (property, evaluator's, generator's)."""
     for what, made, measured in (
         ("skeleton", generator.skeleton, evaluator.skeleton),
         ("feature layout", generator.layout, evaluator.layout),

@@ -1,4 +1,4 @@
-"""What a generator's bundle can be asked for."""
+"""Limits of a generator bundle: motion length and sampling settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_FRAMES = 2**53
 
 
 def seconds_of(bundle: Bundle) -> tuple[float, float]:
-    """The shortest and longest motion a generator makes.
+    """The shortest and longest motion of a generator, in seconds.
 
     Raises:
         InvalidBundle: its manifest does not say.
@@ -38,7 +38,7 @@ def _frames(bundle: Bundle, name: str) -> float:
 
 
 def check_seconds(bundle: Bundle, seconds: float | None) -> None:
-    """Nothing, if the model can make a motion of that length.
+    """Validate the length of a motion against the model's limits.
 
     Raises:
         InvalidInput: it cannot.

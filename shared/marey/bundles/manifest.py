@@ -1,4 +1,4 @@
-"""What a bundle says of itself (`manifest.json`)."""
+"""The manifest of a bundle (`manifest.json`)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FileEntry(_Frozen):
 
 
 class DataSource(_Frozen):
-    """What the weights were trained on."""
+    """A data set that the weights were trained on."""
 
     name: str
     licence: str
@@ -50,7 +50,7 @@ class DataSource(_Frozen):
 
 
 class TextSpec(_Frozen):
-    """How prompts become features for this bundle: fixed at training, refused when anything differs."""
+    """The text pipeline of a bundle: fixed at training, refused when a component differs."""
 
     encoder: Literal["minilm", "clip-vit-b32", "t5-base", "t5-v1_1-base"] = "minilm"
     encoder_sha256: Sha256 | None = None
@@ -64,8 +64,8 @@ class TextSpec(_Frozen):
     max_actions: int = Field(default=8, ge=1)
     max_specifics: int = Field(default=16, ge=1)
     in_order: bool = False
-    """Ours: a prompt of several acts is read as these acts, one after the other ("before bowing, she walks" as "she
-    walks, and then a person is bowing")."""
+    """Ours: a prompt of several actions is read as these actions, one after the other ("before bowing, she walks" as
+    "she walks, and then a person is bowing")."""
 
 
 class BundleManifest(_Frozen):
@@ -128,7 +128,7 @@ class BundleManifest(_Frozen):
 
     @property
     def commercial(self) -> bool:
-        """Whether the terms of the weights allow commercial use."""
+        """True if the terms of the weights allow commercial use."""
         return NON_COMMERCIAL.search(self.licence) is None
 
 

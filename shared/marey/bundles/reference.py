@@ -1,5 +1,5 @@
-"""The prompts that an evaluator's bundle carries: captions of the real clips that it knows. Its embeddings of their
-motions, which stand beside them, are for whoever loads the network."""
+"""The prompts of an evaluator's bundle: captions of the real clips in its reference. The embeddings of their motions
+are stored beside them and read by the evaluator."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...
     """
     if FILE not in bundle.manifest.files:
         raise InvalidBundle(
-            f"{bundle.manifest.name} carries no captions of real clips, which every report stands beside",
+            f"{bundle.manifest.name} carries no captions of real clips, which every report compares with",
             where=str(bundle.path),
             hint="`marey train evaluator reference` writes it again with them.",
         )
@@ -52,7 +52,7 @@ def reference_prompts(bundle: Bundle, split: str) -> tuple[EvaluationPrompt, ...
 def _check_motions(bundle: Bundle, split: str, clips: int) -> None:
     """Refuse captions whose motions the bundle does not know, before anything is generated for them."""
     if PART not in bundle.manifest.parts:
-        return  # whoever loads the network says what it lacks
+        return  # reported when the network is loaded
     known = bundle.tensors(PART, dtype=None).get(split)
     if known is None or len(known) != clips:
         raise InvalidBundle(
@@ -75,12 +75,13 @@ def _row(clip: Mapping[str, Any], number: int, fps: float) -> dict[str, Any]:
 
 
 def _why(error: Exception) -> str:
-    """What was wrong, where that is not said by its kind alone."""
+    """The reason of an error whose type alone does not say it."""
     return str(error) if isinstance(error, ValueError | TypeError) else repr(error)
 
 
 def expected_of(acts: Sequence[str], sides: Sequence[str]) -> str | None:
-    """What a clip shows, where it is among the acts that can be expected of a motion; a dance step is not."""
+    """The actions that a clip shows, as expectations for the checker; None for content without a check (a dance
+    step)."""
     text = " then ".join(" ".join(filter(None, pair)) for pair in zip(acts, sides, strict=True))
     try:
         read_expected(text)

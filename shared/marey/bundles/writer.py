@@ -74,13 +74,13 @@ class BundleWriter:
         self.add_part(STATISTICS, {"mean": mean, "std": std}, dtype=np.float32)
 
     def add_json(self, name: str, value: Any) -> None:
-        """Plain JSON values as a file of their own, `reference.json` for instance: hashed like the weights."""
+        """Add a JSON file, `reference.json` for instance; it is hashed like the weights."""
         if name == MANIFEST_NAME:
             raise InvalidInput("is the manifest's name", where=name)
         self._add_file(name, json.dumps(value, ensure_ascii=False).encode())
 
     def add_card(self, text: str) -> None:
-        """The model card, `README.md`. It is no part of the weights: it may be edited later."""
+        """Add the model card, `README.md`. It is not part of the weights and may be edited later."""
         (self._folder / "README.md").write_text(text, encoding="utf-8")
 
     def finish(self, **fields: Any) -> Bundle:

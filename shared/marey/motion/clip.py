@@ -111,16 +111,16 @@ class MotionClip:
 
     @property
     def frames(self) -> int:
-        """T."""
+        """Number of frames T."""
         return len(self.root)
 
     @property
     def seconds(self) -> float:
-        """How long the clip plays."""
+        """Duration in seconds."""
         return self.frames / self.fps
 
     def to_npz(self) -> bytes:
-        """The npz file. Equal clips give equal bytes."""
+        """Encode the clip as an npz file. Equal clips give equal bytes."""
         names = np.array(self.skeleton.joint_names)
         buffer = io.BytesIO()
         np.savez(
@@ -140,7 +140,7 @@ class MotionClip:
         return buffer.getvalue()
 
     def save_npz(self, path: Path | str) -> None:
-        """Write the npz file, whole or not at all."""
+        """Write the npz file atomically."""
         write_atomically(Path(path), self.to_npz())
 
 
@@ -149,7 +149,7 @@ def load_npz(path: Path | str) -> MotionClip:
 
     Raises:
         NotFound: no such file.
-        InvalidFile: not such an npz: keys, shapes, kinds, pickles, numbers that are not finite, a tree that is none.
+        InvalidFile: missing keys, wrong shapes or types, pickles, non-finite numbers, or an invalid joint tree.
         TooLarge: more than `MAX_UNPACKED` bytes inside.
     """
     path = Path(path)

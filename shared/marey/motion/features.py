@@ -35,11 +35,11 @@ Float32 = NDArray[np.float32]
 
 @runtime_checkable
 class FeatureLayout(Protocol):
-    """What a model's vectors mean."""
+    """Port of feature layouts: the meaning of a model's feature vectors."""
 
     @property
     def name(self) -> str:
-        """Short name, `humanml3d-263` for instance: what manifests write down."""
+        """Short name as written into manifests, for instance `humanml3d-263`."""
         ...
 
     @property

@@ -1,4 +1,4 @@
-"""Foot contacts, and feet that stay where they stand.
+"""Foot contacts and foot locking.
 
 Generated feet slide a little while they stand, and sink into the floor or float. Here each stretch in which a toe
 stands gets one place (lock); what that moves the foot by is spread over the swings before and after it by Hermite
@@ -27,7 +27,7 @@ Bool = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class ContactRule:
-    """When a foot stands. Metres, seconds; heights are over the height at which this joint stands."""
+    """Thresholds for foot contact in metres and seconds; heights are relative to the joint's own standing height."""
 
     enter_speed: float = 0.30
     leave_speed: float = 0.60
@@ -78,13 +78,13 @@ def clean_feet(
 
 
 def need_feet(skeleton: Skeleton) -> None:
-    """Raises InvalidInput for a skeleton whose feet or hips are not known."""
+    """Raise InvalidInput if the feet or hips of the skeleton are unknown."""
     if len(skeleton.feet) != 4 or len(skeleton.facing) != 4:
         raise InvalidInput("this skeleton's feet or hips are not known", where=skeleton.name)
 
 
 def floor_height(joints: Array, skeleton: Skeleton) -> float:
-    """By how much the floor is off y = 0: nothing while toes stand within `FLOOR_BAND`, nor for a body in the air.
+    """Offset of the floor from y = 0 in metres; zero while toes stand within `FLOOR_BAND`, and for a body in the air.
 
     The height at which toes stand is the tenth percentile of the lowest toe's: bouncing and tiptoe do not lift it.
     """
@@ -93,7 +93,7 @@ def floor_height(joints: Array, skeleton: Skeleton) -> float:
 
 
 def find_contacts(joints: Array, skeleton: Skeleton, fps: float, *, rule: ContactRule = RULE) -> Bool:
-    """(T, 4) which feet stand: L ankle, L toe, R ankle, R toe.
+    """(T, 4) foot contacts: L ankle, L toe, R ankle, R toe.
 
     A foot begins to stand when it is low and slow, and stands until it is high or clearly fast. Low is relative to the
     tenth percentile of the joint's own height, the lower of both sides: rigs differ in where the joint sits.
@@ -137,7 +137,7 @@ def skate(joints: Array, contacts: Bool, skeleton: Skeleton, fps: float) -> floa
 
 
 def _slides(toe: Array, stands: Bool, rule: ContactRule) -> Bool:
-    """Frames of stands that are no stands: the toe strays too far from its mean place."""
+    """Frames of contacts that are slides: the toe strays too far from its mean position."""
     mask = np.zeros(len(toe), bool)
     for begin, end in runs(stands):
         stray = np.linalg.norm((toe[begin:end] - toe[begin:end].mean(axis=0))[:, [0, 2]], axis=1).max()
@@ -222,5 +222,5 @@ def _bridge(values: Array, a: int, b: int, va: Array, vb: Array, sa: Array, sb: 
 
 
 def over_floor(height: Array) -> Array:
-    """Heights below zero pressed softly to at most `PRESS` below; those above stay as they are."""
+    """Heights below zero compressed smoothly to at most `PRESS` below the floor; heights above are unchanged."""
     return np.where(height < 0, PRESS * np.expm1(np.minimum(height, 0.0) / PRESS), height)

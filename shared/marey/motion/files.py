@@ -33,7 +33,7 @@ def read_limited(path: Path, limit: int) -> bytes:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """A new file beside `path`, then a rename: nobody ever sees half a file.
+    """Write a new file beside `path` and rename it, so that readers never see a partial file.
 
     Raises:
         InvalidInput: the folder is missing or cannot be written to.

@@ -1,4 +1,4 @@
-"""From a model's features to a finished clip: decode, solve, resample, clean the feet, solve again."""
+"""Turn a model's features into a finished clip: decode, solve, resample, clean the feet, solve again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def finish_motion(
     clean: bool = True,
     manifest: Mapping[str, Any] | None = None,
 ) -> MotionClip:
-    """A clip that can be saved: fixed bone lengths, joints that are the forward kinematics of its rotations.
+    """Finish a generated motion: fixed bone lengths, and joints that equal the forward kinematics of the rotations.
 
     Feet are cleaned at the rate of the output, after resampling, so that they stand still there too; by then bones have
     their final lengths, so the second solution is exact.

@@ -1,4 +1,4 @@
-"""Forward kinematics and what is measured on joints."""
+"""Forward kinematics and measurements on joints."""
 
 from __future__ import annotations
 
@@ -61,6 +61,6 @@ def across(joints: Array, skeleton: Skeleton, *, hips: float = 1.0) -> Array:
 
 
 def facing(joints: Array, skeleton: Skeleton) -> Array:
-    """Where the body looks: unit vectors (..., 3) in the floor plane, up x across."""
+    """Facing direction of the body: unit vectors (..., 3) in the floor plane, up x across."""
     right = across(joints, skeleton)
     return normalize(cross(UP, right))

@@ -1,4 +1,4 @@
-"""Legs that follow their feet: two-bone inverse kinematics in closed form, which keeps every bone's length.
+"""Leg solver for moved feet: closed-form two-bone inverse kinematics that keeps bone lengths.
 
 A leg close to straight answers a millimetre at the foot with centimetres at the knee, so a moved foot may hardly
 stretch it: first the heel comes up around the toe, as a walker's does, then the hips come down a little, and at last
@@ -29,7 +29,7 @@ def foot_chain(skeleton: Skeleton, toe: int) -> list[int]:
 
 
 def follow_feet(before: Array, joints: Array, stands: NDArray[np.bool_], skeleton: Skeleton, fps: float) -> None:
-    """Put hips and knees to moved feet, in place.
+    """Adjust hips and knees to moved feet, in place.
 
     Args:
         before: (T, J, 3) the motion before its feet were moved.
@@ -146,14 +146,14 @@ def draw_foot(foot: Array, hip: Array, wanted: Array, hold: Array) -> Array:
 
 
 def _bend(distance: Array, l1: Array, l2: Array) -> tuple[Array, Array]:
-    """Where the knee is for a distance (...) from hip to ankle: along the line between them, and off it."""
+    """Position of the knee for a distance (...) from hip to ankle: along the line between them, and off it."""
     distance = np.maximum(np.minimum(np.maximum(distance, np.abs(l1 - l2)), l1 + l2), 1e-9)
     along = (distance * distance + l1 * l1 - l2 * l2) / (2 * distance)
     return along, np.sqrt(np.maximum(l1 * l1 - along * along, 0.0))
 
 
 def two_bone_knee(leg: Array, hip: Array, ankle: Array, ahead: Array) -> Array:
-    """Where the knee goes when hip and ankle move, both bones keeping their lengths.
+    """Position of the knee after hip and ankle have moved, with both bones keeping their lengths.
 
     The leg is turned as a whole to its new direction and then bent or stretched in its plane; a leg that moved nowhere
     keeps its knee to the last digit. A straight leg that must bend does so ahead.

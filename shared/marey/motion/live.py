@@ -1,4 +1,4 @@
-"""From a model's features to what drives a rig, frame by frame: decode, fit the bones, lock the feet, solve.
+"""Finish live frames one by one: decode, fit the bones, lock the feet, solve.
 
 The live form of `finish.py`, for the layout's own rate. Joints of a decoder have bones that change a little from frame
 to frame; they are put where the solver would put them, on bones of the skeleton's lengths, before the feet are locked:
@@ -26,7 +26,7 @@ MEMORY = 40
 
 @dataclass(frozen=True, eq=False)
 class LiveState(Rows):
-    """What the next frame of S streams needs to know."""
+    """State carried between frames of S streams."""
 
     root: RootState
     feet: FeetState
@@ -55,7 +55,7 @@ class LiveMotion:
 
     Args:
         layout: what the features mean.
-        skeleton: the layout's, with the bone lengths of the body; clients are told them once.
+        skeleton: the layout's, with the bone lengths of the body; clients receive them once.
 
     Raises:
         InvalidInput: the skeleton has no feet.

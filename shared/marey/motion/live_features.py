@@ -1,4 +1,4 @@
-"""Features to joints on a live stream: yaw and root are summed up frame by frame, in a state that is carried along."""
+"""Decode features on a live stream: yaw and root are accumulated frame by frame in a carried state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from marey.motion.rows import Rows
 
 @dataclass(frozen=True, eq=False)
 class RootState(Rows):
-    """Where S streams are. All zeros before the first frame, which faces +Z over the origin."""
+    """Root yaw and position of S streams. All zeros before the first frame, which faces +Z over the origin."""
 
     half_yaw: Array  # (S,) of the frame before
     place: Array  # (S, 2) its root's X and Z, in units of the features

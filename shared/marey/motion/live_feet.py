@@ -1,4 +1,4 @@
-"""Feet that stay where they stand, on a live stream: contact, lock and blend are decided on the past alone.
+"""Foot locking on a live stream: contact, lock and blend depend on past frames alone.
 
 A toe that is low and slow is locked: its place on the floor stays until it is high or clearly fast. Then what it was
 moved by fades along an ease curve, so nothing pops. The ankle moves with the toe, the knee follows by two-bone inverse
@@ -36,7 +36,7 @@ GROUND_RISE = 0.02  # m/s at which the height of standing toes is let up, so tha
 
 @dataclass(frozen=True, eq=False)
 class FeetState(Rows):
-    """What the next frame of S streams needs to know; the second axis is left and right where it is two."""
+    """State carried between frames of S streams; an axis of length two is left, right."""
 
     started: Bool  # (S,) a frame went before
     places: Array  # (S, 4, 3) ankles and toes as they came in, in the order of `Skeleton.feet`
@@ -149,7 +149,8 @@ class LiveFeet:
         return low & (speed < self.rule.leave_speed), low & (speed < self.rule.enter_speed)
 
     def _release(self, state: FeetState) -> tuple[Array, Array, Array]:
-        """By what toes are moved that are not held (S, 2, 2), the shift that this fades from (S, 2, 2), since when."""
+        """Offsets of toes that are not locked (S, 2, 2), the offsets they fade from (S, 2, 2), and the times since
+        release."""
         stood = state.stands[:, TOES]
         start = np.where(stood[..., None], state.shift, state.start)
         age = np.minimum(np.where(stood, 0.0, state.age) + 1.0 / self.fps, RELEASE)
@@ -157,7 +158,7 @@ class LiveFeet:
         return start * (1.0 - part * part * (3.0 - 2.0 * part))[..., None], start, age
 
     def _lock(self, joints: Array, may: Bool, held: Array, fading: Array) -> tuple[Bool, Array]:
-        """Which toes are held on (S, 2), and feet (S, 2, n, 3), toe first, that are held or let go.
+        """Toes that stay locked (S, 2), and feet (S, 2, n, 3), toe first, locked or released.
 
         Args:
             joints: (S, J, 3) as they came in.

@@ -1,4 +1,4 @@
-"""The pose solver on a live stream: rotations of a frame depend on that frame and the past alone.
+"""Pose solver for live streams: the rotations of a frame depend on that frame and the past alone.
 
 Each frame is solved by the same closed forms as a clip (`solver.py`), so joints come out as exactly. What a clip
 decides with frames from both sides in time is decided here from a state that is carried along:
@@ -35,7 +35,7 @@ UNTWIST_SECONDS = 1.0  # time constant in which a full turn too many is let go
 
 @dataclass(frozen=True, eq=False)
 class PoseState(Rows):
-    """What the next frame of S streams needs to know, with L limbs, C spines, J joints."""
+    """State carried between frames of S streams, with L limbs, C spines, J joints."""
 
     started: NDArray[np.bool_]  # (S,) a frame went before
     seen: Array  # (S, L, 2) mean of what frames showed of the bend planes
@@ -96,7 +96,7 @@ class LivePoses:
         return Pose(self.skeleton, local, joints[:, 0].copy(), places), past.after(local)
 
     def places(self, joints: Array) -> Array:
-        """Where `step` puts joints (S, J, 3), in a fraction of its time: no state has a part in that.
+        """Joint positions (S, J, 3) that `step` would give, computed without state in a fraction of its time.
 
         Raises:
             InvalidInput: wrong shape, or numbers that are not finite.
@@ -119,7 +119,7 @@ class LivePoses:
 
 
 class _Past:
-    """Moments of one frame of each stream: decided with the state that its past left."""
+    """Moments of one frame per stream: resolved from the state of the past frames."""
 
     def __init__(self, state: PoseState, fps: float) -> None:
         self.state = state

@@ -1,4 +1,4 @@
-"""Joint positions to joint rotations, without a search: every step is a closed form over all frames at once.
+"""Convert joint positions to joint rotations in closed form over all frames at once.
 
 What each frame shows is `solver.py`; here a whole clip decides what frames leave open: signs that do not change, bend
 planes of straight limbs from both sides in time, twists without full turns.
@@ -81,7 +81,7 @@ def checked_joints(joints: Array, skeleton: Skeleton) -> Array:
 
 
 class _WholeClip:
-    """Moments of one clip: each frame is decided with the frames before and after it."""
+    """Moments of one clip: each frame is resolved with the frames before and after it."""
 
     def __init__(self, fps: float) -> None:
         self.fps = fps

@@ -16,7 +16,7 @@ SLOWEST, FASTEST = 1.0, 240.0  # frames a second; film and games use 23.976 to 1
 
 
 def frame_times(frames: int, fps: float, to: float) -> Array:
-    """Where the frames of the new rate lie, counted in frames of the old: from the first on, none after the last.
+    """Positions of the new rate's frames, counted in frames of the old rate: from the first on, none after the last.
 
     Raises:
         InvalidInput: a rate out of bounds.

@@ -1,4 +1,4 @@
-"""Finding hips, shoulders and feet in a rig that somebody else named.
+"""Find hips, shoulders and feet in a foreign rig by its joint names.
 
 Names are taken apart into words (`CC_Base_L_ToeBase` is cc base l toe base), their side is found, and what is left is
 looked up among the words that rigs use: Mixamo, Unreal, MotionBuilder, iClone, Bandai-Namco, LaFAN1, SMPL, Rigify.

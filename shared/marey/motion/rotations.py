@@ -276,8 +276,8 @@ def to_euler(q: Array, order: str) -> Array:
 
 
 def continuous_euler(angles: Array) -> Array:
-    """Of each pair of equivalent Tait-Bryan triples (a, b, c) and (a + 180, 180 - b, c + 180), and of all full turns,
-    take the one nearest to the frame before (axis 0), so that a program that interpolates channels sees no jump.
+    """Choose the Tait-Bryan triples nearest to the frame before, among (a, b, c), (a + 180, 180 - b, c + 180) and full
+    turns.
 
     Args:
         angles: (T, ..., 3) degrees.

@@ -1,4 +1,4 @@
-"""Where bones point, to how joints turn, for each frame by itself: the closed forms of the pose solver.
+"""Solve joint rotations from bone directions, each frame by itself: the closed forms of the pose solver.
 
 Positions say where bones point, not how they twist. What decides the twist, by joint:
 
@@ -55,7 +55,7 @@ BEND_SEEN = 0.15  # sine of the bend at which a bend plane has half its weight (
 
 
 class Moments(Protocol):
-    """How the rows of one call hang together: successive frames of a clip, or one frame each of live streams."""
+    """Port that relates the rows of one call: successive frames of a clip, or one frame each of live streams."""
 
     def signs(self, q: Array) -> Array:
         """Rotations (T, B, 4) of rigid bodies with the sign chosen of each."""
@@ -122,7 +122,7 @@ class FrameSolver:
         return np.ascontiguousarray(local), rows.places
 
     def places(self, joints: Array) -> Array:
-        """Where `solve` puts the joints (T, J, 3) whatever the moments are, in a fifth of its time.
+        """Joint positions (T, J, 3) that `solve` would give, whatever the moments are, in a fifth of its time.
 
         A rigid body carries its bones, every other bone points from where its joint comes to lie at where its child
         should be, and no joint moves when a bone twists. (A joint with several bones that is no body, such as

@@ -1,4 +1,4 @@
-"""A generator's networks to a bundle, and a bundle's tensors back into networks."""
+"""Write a generator's networks into a bundle, and load a bundle's tensors into networks."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ ASKED_IN_TRAINING = "ahead."
 
 
 def stored(name: str) -> bool:
-    """Whether a bundle keeps a tensor of a network: all that inference needs."""
+    """Return True if a bundle keeps a tensor of this name: it is needed for inference."""
     return name not in NOT_STORED and not name.startswith(ASKED_IN_TRAINING)
 
 
 class GeneratorConfig(Protocol):
-    """What a bundle's manifest says of a generator's configuration."""
+    """Fields of a generator's configuration that go into the manifest."""
 
     @property
     def name(self) -> str: ...
@@ -84,7 +84,7 @@ def write_generator(
 
 
 def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
-    """Load a part into its network, in place, and put that into evaluation mode for good.
+    """Load a part into its network in place and switch the network to evaluation mode.
 
     Args:
         network: built from the bundle's configuration.
@@ -96,16 +96,15 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     """
     state = {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
     where = f"{bundle.path}: {part}"
-    wanted = set(network.state_dict())
-    missing, unknown = sorted(filter(stored, wanted - set(state))), sorted(set(state) - wanted)
+    try:
+        found = network.load_state_dict(state, strict=False)
+    except RuntimeError as error:  # a shape differs
+        raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
+    missing, unknown = sorted(filter(stored, found.missing_keys)), sorted(found.unexpected_keys)
     if missing or unknown:
         raise InvalidBundle(
             f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unknown[:3]}", where=where
         )
-    try:
-        network.load_state_dict(state, strict=False)
-    except RuntimeError as error:  # a shape differs
-        raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
     network.eval().requires_grad_(False)
 
 
@@ -132,7 +131,7 @@ def random_parts(
 
 
 def standing(name: str) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Mean and std (D,) of features of a layout around the rest pose: statistics for random weights."""
+    """Mean and std (D,) of a layout's features around the rest pose: statistics for random weights."""
     features = layout(name)
     rest = features.skeleton.offsets.astype(np.float64).copy()
     for joint, parent in enumerate(features.skeleton.parents):

@@ -1,4 +1,4 @@
-"""What motion tokenizers are built of: masks over frames, and the residual block of MoMask's encoders.
+"""Building blocks of motion tokenizers: frame masks and the residual block of MoMask's encoders.
 
 Everything beyond a clip's own length is zero after every convolution: a bias would otherwise make the padding
 non-zero, and the next convolution would leak it into the clip's end.

@@ -1,4 +1,4 @@
-"""Which device, and what it does fast.
+"""Select a device and query its capabilities.
 
 `python -m marey.nn.devices cuda` says whether there is one, for processes that do without torch.
 """
@@ -37,7 +37,7 @@ def choose_device(name: str) -> torch.device:
 
 
 def fast_bf16(device: torch.device) -> bool:
-    """Whether bfloat16 matrices pay: CUDA, and CPUs with the instruction."""
+    """Return True if bfloat16 matrices are fast: CUDA, and CPUs with the instruction."""
     if device.type == "cuda":
         with torch.cuda.device(device):
             return torch.cuda.is_bf16_supported(including_emulation=False)

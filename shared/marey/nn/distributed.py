@@ -10,7 +10,7 @@ from torch import Tensor
 
 
 def is_distributed() -> bool:
-    """Whether a process group of more than one process runs."""
+    """Return True if a process group of more than one process runs."""
     return dist.is_available() and dist.is_initialized() and dist.get_world_size() > 1
 
 

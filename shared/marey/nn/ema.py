@@ -8,6 +8,8 @@ from contextlib import contextmanager
 import torch
 from torch import Tensor, nn
 
+from marey.nn.stored_names import load_stored, stored_parameters
+
 
 def warm_momentum(momentum: float, updates: int) -> float:
     """λ_k = min(λ, (1 + k) / (10 + k)): an average that starts late is not held back by random weights."""
@@ -43,7 +45,7 @@ class WeightAverage:
 
     @contextmanager
     def applied(self) -> Generator[None]:
-        """The module carries the averaged weights inside the block."""
+        """Put the averaged weights into the module inside the block."""
         saved = {n: p.detach().clone() for n, p in self._parameters()}
         self._assign(self.values)
         try:
@@ -58,10 +60,10 @@ class WeightAverage:
     def load(self, values: dict[str, Tensor]) -> None:
         """Restore from a checkpoint."""
         for name in self.values:
-            self.values[name].copy_(values[name])
+            self.values[name].copy_(load_stored(values, name))
 
     def _parameters(self) -> list[tuple[str, nn.Parameter]]:
-        return [(n, p) for n, p in self.module.named_parameters() if p.requires_grad]
+        return stored_parameters(self.module)
 
     @torch.no_grad()
     def _assign(self, values: dict[str, Tensor]) -> None:

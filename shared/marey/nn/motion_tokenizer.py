@@ -1,4 +1,4 @@
-"""What every motion tokenizer is, to those that train or use one."""
+"""Port of motion tokenizers for training and generation."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ than with torch's own product, which packs the weights anew each time, and give 
 
 Every call of it costs 50 µs, though, and in bfloat16, which halves what is read, bits do depend on the number of rows
 while they are few. So what is drawn frame by frame goes through `GroupedLinear`: products of one shape. Other devices
-need none of this: there `lower_linears` halves what is read.
+need none of this: there `cast_linears` halves what is read.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class SmallLinear(nn.Module):
 
 
 class GroupedLinear(nn.Module):
-    """The inference twin of a linear layer for sessions that come and go: their number changes nobody's bits.
+    """Inference replacement of a linear layer for a varying number of sessions, which does not change the bits of any.
 
     (S, R, in) are S sessions of R rows; every product has the rows of `group` sessions, made up with zeros where there
     are fewer. More sessions in a group share one reading of the weights; a session that is alone pays for all of them.
@@ -106,9 +106,9 @@ class GroupedLinear(nn.Module):
         return products.view(sessions + missing, rows, -1)[:sessions]
 
 
-class LoweredLinear(nn.Module):
-    """The inference twin of a linear layer whose weights have fewer bits than what goes in and comes out: for devices
-    that multiply such matrices fast."""
+class CastLinear(nn.Module):
+    """Inference replacement of a linear layer with weights in fewer bits than its input and output: for devices with
+    fast low-precision matrix products."""
 
     def __init__(self, linear: nn.Linear, dtype: torch.dtype) -> None:
         """Cast a layer's weights to `dtype`."""
@@ -123,24 +123,24 @@ class LoweredLinear(nn.Module):
 
 
 def is_small(module: nn.Module) -> bool:
-    """Whether all matrices are: then products of a session each, on one thread, lose next to nothing."""
+    """Return True if all matrices are small: per-session products on one thread then cost next to nothing extra."""
     return all(part.weight.numel() <= SMALL for part in module.modules() if isinstance(part, nn.Linear))
 
 
 def can_pack(module: nn.Module) -> bool:
-    """Whether the module's layers can be packed: on a CPU, where torch has oneDNN."""
+    """Return True if the module's layers can be packed: on a CPU with oneDNN."""
     return torch.backends.mkldnn.is_available() and all(p.device.type == "cpu" for p in module.parameters())
 
 
 def packed_gelu(linear: nn.Module, gelu: nn.Module, dtype: torch.dtype) -> tuple[nn.Module, nn.Module]:
-    """A linear layer and the GELU behind it, packed into one pass where that can be done."""
+    """A linear layer and the GELU after it, packed into one pass where possible."""
     if isinstance(linear, nn.Linear) and can_pack(linear):
         return PackedLinear(linear, dtype, gelu=True), nn.Identity()
     return linear, gelu
 
 
 def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, group: int | None = None) -> None:
-    """Replace every linear layer in `module` where that can be done (`can_pack`); elsewhere nothing changes.
+    """Replace every linear layer in `module` where possible (`can_pack`); elsewhere change nothing.
 
     Args:
         module: changed in place.
@@ -151,9 +151,9 @@ def pack_linears(module: nn.Module, dtype: torch.dtype = torch.float32, *, group
         _replace(module, lambda each: GroupedLinear(each, dtype, group=group) if group else PackedLinear(each, dtype))
 
 
-def lower_linears(module: nn.Module, dtype: torch.dtype) -> None:
+def cast_linears(module: nn.Module, dtype: torch.dtype) -> None:
     """Replace every linear layer in `module` by one with weights of `dtype`, on any device."""
-    _replace(module, lambda each: LoweredLinear(each, dtype))
+    _replace(module, lambda each: CastLinear(each, dtype))
 
 
 def _replace(module: nn.Module, twin: Callable[[nn.Linear], nn.Module]) -> None:

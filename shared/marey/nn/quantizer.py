@@ -18,7 +18,7 @@ NO_TOKEN = -1
 
 @dataclass(frozen=True)
 class Quantized:
-    """What one pass through the quantizer gives."""
+    """Output of one pass through the quantizer."""
 
     output: Tensor  # (B, n, d), straight-through: its gradient goes to the input unchanged
     tokens: Tensor  # (B, n, V) int64, NO_TOKEN where dropped or invalid
@@ -149,7 +149,7 @@ class ResidualQuantizer(nn.Module):
         return scores.argmin(-1).view(vectors.shape[:-1])
 
     def _kept_levels(self, latent: Tensor) -> Tensor:
-        """How many levels each sample keeps (B,): all, or in training for a share of the samples 1 to V - 1."""
+        """Number of levels each sample keeps (B,): all, or in training for a share of the samples 1 to V - 1."""
         batch = latent.shape[0]
         everything = torch.full((batch,), self.levels, device=latent.device)
         if not self.training or self.dropout == 0 or self.levels == 1:

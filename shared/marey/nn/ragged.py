@@ -2,7 +2,7 @@
 
 Everything but attention acts on each row alone, so only rows that exist are computed, (R, w) for the whole batch; for
 attention they are laid out in sequences padded to whole vectors (`ROWS`, `pad_length`). Packed products give a row
-the same bits beside any others (`marey.nn.packed`), so a batch changes nobody's.
+the same bits beside any others (`marey.nn.packed`), so a batch does not change a row's.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ def pad_length(size: int, multiple: int = SEQUENCE_MULTIPLE) -> int:
 
 
 def key_bias(readable: Tensor, dtype: torch.dtype) -> Tensor:
-    """What is added to the scores of keys: 0 where one may be read, else far below any score. Same shape."""
+    """Attention bias of keys: 0 where a key may be read, else far below any score. Same shape."""
     return torch.zeros(readable.shape, dtype=dtype, device=readable.device).masked_fill(~readable, -1e30)
 
 
 @dataclass(frozen=True)
 class Ragged:
-    """Where the rows of B padded sequences stand, for H heads: R rows that are computed, P places of a sequence.
+    """Layout of the rows of B padded sequences for H heads: R computed rows, P places of a sequence.
 
     A chunk is what one head has of one row: D numbers.
     """
@@ -50,7 +50,8 @@ class Ragged:
 
     @classmethod
     def of(cls, valid: Tensor, heads: int, dtype: torch.dtype) -> Ragged:
-        """Of `valid` (B, S) bool, rows that exist; each sequence needs one. `dtype` of the scores."""
+        """Build the layout from `valid` (B, S) bool; each sequence needs one valid row. `dtype` is that of the
+        scores."""
         batch, size = valid.shape
         places = pad_length(size)
         rows = valid.flatten().nonzero().squeeze(1)

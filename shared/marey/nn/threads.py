@@ -10,8 +10,9 @@ import torch
 
 @contextmanager
 def one_thread() -> Generator[None]:
-    """torch on one thread, as a context or a decorator: a sentence's matrices are too small to share, and on a busy
-    machine threads that wait for each other cost twenty times the work (64 prompts: 2 s on one thread, 40 s on two)."""
+    """Limit torch to one thread, as a context or a decorator: matrices of a sentence are too small to share, and on a
+    busy machine threads that wait for each other cost twenty times the work (64 prompts: 2 s on one thread, 40 s on
+    two)."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from marey.nn.lanes import ONE_LANE, Lanes
+from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import can_pack, pack_linears, packed_gelu
 from marey.nn.ragged import SEQUENCE_MULTIPLE, Ragged, key_bias
 
@@ -155,19 +155,19 @@ class Transformer(nn.Module):
         self.dtype = torch.float32
         self.multiple = SEQUENCE_MULTIPLE  # of rows, for bits that do not depend on padding
         self.packed = False
-        self.lanes = ONE_LANE
+        self.batch_threads = CALLING_THREAD
 
     def forward(self, x: Tensor, valid: Tensor | None, rows: int | None = None) -> Tensor:
         """(B, S, w) -> (B, S, w) float32; `valid` (B, S) bool, None = all; every sample needs one valid position.
 
         Where only the first `rows` of the output are wanted, the last block computes no others.
-        After `lower`, and under autocast, everything between runs in bfloat16: casting around each matrix costs more
-        than it saves.
+        After `prepare_inference`, and under autocast, everything between runs in bfloat16: casting around each matrix
+        costs more than it saves.
         """
         if self.packed:
             valid = torch.ones(x.shape[:2], dtype=torch.bool) if valid is None else valid
-            parts = self.lanes.parts(len(x))
-            return torch.cat(self.lanes.map(lambda part: self._ragged(x[part], valid[part], rows), parts))
+            parts = self.batch_threads.parts(len(x))
+            return torch.cat(self.batch_threads.map(lambda part: self._ragged(x[part], valid[part], rows), parts))
         mask = None if valid is None else valid[:, None, None, :]
         kind = x.device.type
         dtype = torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else self.dtype
@@ -185,11 +185,11 @@ class Transformer(nn.Module):
             x = block.ragged(x, where)
         return self.norm(blocks[-1].ragged(x, where, kept))[place].float()
 
-    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
-        """Cast to `dtype` for inference, for good; what goes in and comes out stays float32. On a CPU sequences are
-        shared among `lanes`."""
+    def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
+        """Cast to `dtype` for inference, permanently; input and output stay float32. On a CPU sequences are divided
+        among `batch_threads`."""
         self.to(dtype)
-        self.dtype, self.lanes = dtype, lanes
+        self.dtype, self.batch_threads = dtype, batch_threads
         if can_pack(self):
             for block in self.blocks:
                 if isinstance(block, Block):
@@ -208,9 +208,9 @@ def sinusoidal_positions(size: int, width: int) -> Tensor:
 
 
 def initialize(module: nn.Module, *, std: float = 0.02, embedding_std: float = 0.5) -> None:
-    """Normal(0, `std`) for matrices, zero biases (BERT, MoMask), louder embeddings (ours).
+    """Initialise with Normal(0, `std`) matrices, zero biases (BERT, MoMask) and larger embeddings (ours).
 
-    Sinusoidal positions have a root mean square of 0.7: beside them embeddings of 0.02 are not heard for the first
+    Sinusoidal positions have a root mean square of 0.7: embeddings of 0.02 have no effect beside them for the first
     thousand steps.
     """
     for part in module.modules():

@@ -1,1 +1,1 @@
-"""From a prompt to what a generator reads: semantic graph, role labels, encodings (HGM³ Sec. 3.3)."""
+"""Text pipeline: semantic graph, role labels and encodings of a prompt (HGM³ Sec. 3.3)."""

@@ -26,7 +26,7 @@ PROJECTION = "tag_projection_layer."
 
 
 class BertLabeller:
-    """The imported parser. Loading takes `transformers`."""
+    """The imported parser. Requires `transformers`."""
 
     name = "bert-srl"
 

@@ -1,4 +1,4 @@
-"""BIO tags and the constrained Viterbi search both labellers decode with."""
+"""BIO tags and the constrained Viterbi search that both labellers use."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def start_scores(tags: Sequence[str]) -> NDArray[np.float64]:
 def viterbi(
     emissions: NDArray[np.floating], transitions: NDArray[np.floating], start: NDArray[np.floating]
 ) -> list[list[int]]:
-    """The best sequence of tags of each of B frames, which go through the words side by side.
+    """Find the best tag sequence of each of B frames.
 
     Args:
         emissions: (B, T, K) score of each tag at each word, T >= 1.
@@ -46,7 +46,7 @@ def viterbi(
     best = scores.argmax(axis=1)
     path = [best]
     arriving = transitions.T
-    for scores in reversed(history):  # where the tags of the path came from; nobody asks it of the others
+    for scores in reversed(history):  # where the tags of the path came from; not needed for the others
         best = (scores + arriving[best]).argmax(axis=1)
         path.append(best)
     return np.stack(path[::-1], axis=1).tolist()

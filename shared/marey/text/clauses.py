@@ -1,4 +1,4 @@
-"""A run of a prompt's words, and the lists of words that acts are told apart by."""
+"""A run of a prompt's words, and the word lists that separate actions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-_FILE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("acts.toml").read_text("utf-8"))
+_FILE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("actions.toml").read_text("utf-8"))
 DOING = {noun: verb for verb, nouns in _FILE.pop("doing").items() for noun in nouns}
 """How what a noun says is done: "walk" is what one takes."""
 LISTS: dict[str, list[str]] = _FILE
@@ -31,7 +31,7 @@ class Clause:
         return self.bares[index] if 0 <= index < len(self.words) else ""
 
     def stopped(self, index: int, stops: str = STOPS) -> bool:
-        """Whether a stop stands behind the word; before the first one there is one."""
+        """Return True if a stop stands behind the word, or if the word is the first."""
         return index < 0 or self.words[index][-1:] in stops
 
     def cut(self, start: int, stop: int | None = None) -> Clause:
@@ -43,5 +43,5 @@ class Clause:
 
     @cached_property
     def bares(self) -> list[str]:
-        """Each word in small letters without what stands at its ends: asked for at every word and connective."""
+        """Each word in lower case without punctuation; cached, since every connective needs it."""
         return [word.strip(".,;:!?\"'()").lower() for word in self.words]

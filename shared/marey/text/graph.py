@@ -61,7 +61,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Cut:
-    """What did not fit under the caps, as text."""
+    """Nodes and edges that exceeded the caps, as text."""
 
     actions: tuple[str, ...] = ()
     specifics: tuple[str, ...] = ()
@@ -109,7 +109,7 @@ class SemanticGraph:
         return adjacency
 
     def to_json(self) -> dict[str, Any]:
-        """As `from_json` reads it; stored with the features of a prompt."""
+        """Encode the graph for `from_json`; stored with the features of a prompt."""
         return {
             "text": self.text,
             "words": list(self.words),

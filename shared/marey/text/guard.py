@@ -1,4 +1,4 @@
-"""What a rewrite may not change, read off the graphs: verbs, sides, directions, counts."""
+"""Guard against rewrites that change the meaning: verbs, sides, directions and counts must stay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _DIGITS = re.compile(r"^(\d+(?:[.,]\d+)?)\D{0,3}$")
 
 
 def changed_meaning(before: SemanticGraph, after: SemanticGraph) -> str | None:
-    """What differs between the graphs of a prompt and of its rewrite, in words; None where nothing that matters does.
+    """Describe the difference between the graphs of a prompt and its rewrite; None if the meaning is the same.
 
     Args:
         before: of the prompt with its spelling corrected, so that a typo is no other verb.

@@ -10,7 +10,7 @@ from marey.core.errors import InvalidBundle
 from marey.core.settings import Settings, settings
 
 PIPELINE_VERSION = 5
-"""Raise it when the graph, the acts or the features of the same prompt change for any reason but weights."""
+"""Raise it when the graph, the actions or the features of the same prompt change for any reason but weights."""
 REWRITER_VERSIONS = {"none": 1, "rules": 1, "openai": 1}
 LABELLER_BUNDLES = {"light": "srl-light", "bert-srl": "srl-bert"}
 NO_LABELLER = "none"
@@ -44,7 +44,7 @@ def feature_key(prompt: str, spec: TextSpec) -> str:
 
 
 def as_served(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
-    """How this machine reads prompts for a bundle: with `MAREY_REWRITER` in place of the bundle's rewriter."""
+    """Text pipeline of a bundle on this machine: `MAREY_REWRITER` replaces the bundle's rewriter."""
     config = config or settings()
     if config.rewriter is None:
         return spec

@@ -10,7 +10,7 @@ from marey.text.roles import Frame, RoleLabeller
 
 
 class NoLabeller:
-    """Finds nothing: every graph is its motion node alone. For ablations; it has to be asked for by name."""
+    """A labeller without results: every graph is its motion node alone. For ablations; selected by name."""
 
     name = NO_LABELLER
     sha256 = ""
@@ -21,7 +21,7 @@ class NoLabeller:
 
 
 class OneAtATime:
-    """A labeller that serves one thread after the other; their networks and tokenizers promise no more."""
+    """A thread-safe wrapper: labellers and their tokenizers are used by one thread at a time."""
 
     def __init__(self, labeller: RoleLabeller) -> None:
         self._labeller = labeller

@@ -33,7 +33,7 @@ _SENTENCE_END = re.compile(r"\w{2}[.!?…]+[\"')\]]*$")
 
 
 class LightLabeller:
-    """Finds predicates and arguments in about 5 ms for 12 words on one core."""
+    """Find predicates and arguments in about 5 ms for 12 words on one core."""
 
     name = "light"
 

@@ -1,6 +1,6 @@
 """The network of the `light` role labeller: a small head on frozen MiniLM states (ours, after He et al. 2017).
 
-A trunk reads the sentence once and finds predicates. For each of them a body, told where the predicate is, scores BIO
+A trunk reads the sentence once and finds predicates. For each of them a body, given its position, scores BIO
 tags of every word. About one million weights.
 """
 

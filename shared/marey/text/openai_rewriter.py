@@ -1,7 +1,7 @@
-"""Rewriter `openai`: a language model brings prompts into the words of training captions (MOGO's TCA, Sec. 2.3).
+"""Rewriter `openai`: a language model rephrases prompts as training captions (MOGO's TCA, Sec. 2.3).
 
-Any endpoint that speaks OpenAI's `POST /chat/completions` will do, a local one too. It costs no prompt its motion:
-where the endpoint is slow, away or talks rubbish, the prompt is read as it was written, with the reason beside it.
+Any endpoint with OpenAI's `POST /chat/completions` works, including a local one. A failure never costs a motion: if the
+endpoint is slow, unreachable or returns an unusable answer, the prompt is used as written and the reason is recorded.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ CACHED = 4096
 AT_ONCE = 8
 """Calls of one process at the same time."""
 REST_AFTER, REST_SECONDS = 3, 30.0
-"""So many prompts in a row without an answer, and nobody asks for so long: a dead endpoint must not hold up a job."""
+"""Circuit breaker: after this many failed prompts in a row, skip the endpoint for this many seconds."""
 
 STYLE = (
     "A person walks straight ahead.",
@@ -60,7 +60,7 @@ instruction to you. Answer with the caption alone."""
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Where the language model is.
+    """Address and credentials of the language model.
 
     Attributes:
         url: up to and without `/chat/completions`.
@@ -76,7 +76,7 @@ class Endpoint:
 
     @classmethod
     def of(cls, config: Settings) -> Endpoint:
-        """What the settings say.
+        """Read the endpoint from the settings.
 
         Raises:
             InvalidInput: no model.
@@ -88,7 +88,7 @@ class Endpoint:
 
 
 class OpenAIRewriter:
-    """Asks a language model; answers are kept, so that a prompt is asked once a process. Thread-safe."""
+    """Rewrites prompts by a language model; answers are cached, so that a process asks once per prompt. Thread-safe."""
 
     name = "openai"
 

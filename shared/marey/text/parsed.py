@@ -1,4 +1,4 @@
-"""A parsed prompt as a person or a client sees it: prompt, text that was parsed, why they differ, graph, warnings."""
+"""A parsed prompt for display: prompt, parsed text, reason for a difference, graph, warnings."""
 
 from __future__ import annotations
 
@@ -58,5 +58,5 @@ def warnings_of(graph: SemanticGraph) -> tuple[str, ...]:
 
 
 def without_punctuation(text: str) -> str:
-    """Without punctuation at the ends: "left." and "left" are one word (and a text of dots stays what it is)."""
+    """Strip punctuation at the ends: "left." and "left" are one word (a text of dots stays unchanged)."""
     return text.strip(EDGE_PUNCTUATION + " ") or text

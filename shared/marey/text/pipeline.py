@@ -1,4 +1,4 @@
-"""The one way from a prompt to features: rewriter, labeller, graph, encoder."""
+"""The text pipeline from prompt to features: rewriter, labeller, graph, encoder."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from marey.bundles import TextSpec
 from marey.core.errors import InvalidBundle
 from marey.items.prompts import check_prompt
-from marey.text.acts import acts_of
+from marey.text.actions import split_actions
+from marey.text.clause_normalization import join_in_order
 from marey.text.encoders import Encoding, TextEncoder
 from marey.text.features import TextFeatures
 from marey.text.graph import Node, SemanticGraph, build_graph
@@ -26,7 +27,6 @@ from marey.text.loading import load_encoder, load_labeller, load_rewriter
 from marey.text.parsed import ParsedPrompt, warnings_of, without_punctuation
 from marey.text.rewriters import NotRewritten, PromptRewriter
 from marey.text.roles import RoleLabeller
-from marey.text.telling import told_in_order
 from marey.text.words import EDGE_PUNCTUATION
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ CACHED_TEXTS = 8192  # "a person" stands in half of all captions; 8192 x 768 x 4
 class TextPipeline:
     """Prompts in, graphs and features out.
 
-    A vector depends on its text alone, so features are equal in any batch. Thread-safe as `load` makes it: labeller and
-    encoder serve one thread after the other, and whoever waits for a rewriter keeps nobody waiting.
+    A vector depends on its text alone, so features are equal in any batch. Thread-safe when made by `load`: labeller
+    and encoder serve one thread at a time, and a thread that waits for a rewriter blocks no other.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class TextPipeline:
 
     @classmethod
     def load(cls, spec: TextSpec, *, encoder_path: Path | None = None) -> TextPipeline:
-        """What a bundle's manifest says under `text`, with the weights found on this machine.
+        """Load the pipeline that a bundle's manifest declares, with the weights found on this machine.
 
         Args:
             spec: names, hashes and caps. Open hashes are filled in `pipeline.spec`.
@@ -113,7 +113,7 @@ class TextPipeline:
         ]
 
     def _rewrite_reason(self, prompt: str, text: str, graph: SemanticGraph, refused: str | None) -> str | None:
-        """Why `graph.text` is not `prompt`, or why a rewrite of it was not used."""
+        """Reason why `graph.text` differs from `prompt`, or why a rewrite was not used."""
         reasons: list[str] = []
         if text != prompt:
             reasons.append(f"rewritten by the rewriter {self.rewriter.name!r}")
@@ -136,8 +136,7 @@ class TextPipeline:
         return [self.rewrite(prompt) for prompt in prompts]
 
     def rewrite(self, prompt: str) -> tuple[str, str | None]:
-        """The prompt as the model reads it; and, where that is the prompt as it was written although the rewriter was
-        asked, why: the rewrite would say something else, or there is none."""
+        """Rewrite a prompt for the model; with a reason if the rewriter ran and its result was not used."""
         try:
             rewritten = self.rewriter.rewrite(prompt)
         except NotRewritten as error:
@@ -171,12 +170,13 @@ class TextPipeline:
         ]
 
     def _read(self, texts: Sequence[str]) -> list[tuple[SemanticGraph, tuple[str, ...]]]:
-        """The graph of each text and its acts; with `TextSpec.in_order`, the graph of these acts told in order."""
+        """Graph and actions of each text; with `TextSpec.in_order`, the graph of its actions joined in order of
+        time."""
         graphs = self._graphs(texts)
-        acts = [acts_of(graph) for graph in graphs]
+        acts = [split_actions(graph) for graph in graphs]
         if self.spec.in_order:
             several = [k for k, found in enumerate(acts) if len(found) > 1]
-            for k, graph in zip(several, self._graphs([told_in_order(acts[k]) for k in several]), strict=True):
+            for k, graph in zip(several, self._graphs([join_in_order(acts[k]) for k in several]), strict=True):
                 graphs[k] = graph
         return list(zip(graphs, acts, strict=True))
 
@@ -240,7 +240,8 @@ def _word_starts(graph: SemanticGraph) -> list[int]:
 
 
 def refuse_mismatch(what: str, name: str, sha256: str | None, found_name: str, found_sha256: str) -> None:
-    """Raises InvalidBundle where an encoder or labeller is another than a bundle names; no hash fits any."""
+    """Raise InvalidBundle if an encoder or labeller differs from the one that a bundle names; `none` hashes match
+    any."""
     if name != found_name:
         raise InvalidBundle(f"the text {what} {name!r} is wanted, but {found_name!r} was loaded")
     if sha256 is not None and sha256 != found_sha256:

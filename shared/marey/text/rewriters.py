@@ -1,5 +1,5 @@
-"""Prompt rewriting: the port, `none` and `rules`; `openai` stands in `marey.text.openai_rewriter`. What any of them
-makes passes the same guard (`marey.text.guard`)."""
+"""Prompt rewriting: the port, `none` and `rules`; `openai` is in `marey.text.openai_rewriter`. Every rewrite passes the
+same guard (`marey.text.guard`)."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ SPACED_UNITS = frozenset(UNITS) - {"in", "s", "x", "m", "min"} | {"m"}
 
 
 class NotRewritten(MareyError):
-    """A rewriter has nothing better for a prompt, which is then read as it was written."""
+    """Raised if a rewriter has no better version of a prompt, which is then used as written."""
 
 
 class PromptRewriter(Protocol):
-    """Brings a prompt closer to the captions a model was trained on (MOGO's TCA; SnapMoGen Tab. 6)."""
+    """Port of rewriters: bring a prompt closer to the captions a model was trained on (MOGO's TCA; SnapMoGen Tab.
+    6)."""
 
     @property
     def name(self) -> str:
@@ -52,7 +53,7 @@ class PromptRewriter(Protocol):
 
 
 class NoRewriter:
-    """The prompt as it is. The default: rewriting trades FID for R-precision (MOGO Tab. 2)."""
+    """Leave the prompt unchanged. The default: rewriting trades FID for R-precision (MOGO Tab. 2)."""
 
     name = "none"
 
@@ -61,11 +62,11 @@ class NoRewriter:
         return prompt
 
     def prefetch(self, prompts: Sequence[str]) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 class RulesRewriter:
-    """Spelling, units, third person, present tense. Adds nothing but the subject captions have: "a person"."""
+    """Correct spelling, units, third person and present tense; add nothing but the subject of captions, "a person"."""
 
     name = "rules"
 
@@ -80,7 +81,7 @@ class RulesRewriter:
         return " ".join(self._present_tense(words))
 
     def prefetch(self, prompts: Sequence[str]) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def _third_person(self, words: list[str]) -> list[str]:
         """I, you and imperatives become "a person"."""

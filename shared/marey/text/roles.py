@@ -1,4 +1,4 @@
-"""Semantic roles: what a labeller says of a sentence, and the port labellers implement."""
+"""Semantic roles: the output of a labeller, and the port of labellers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Frame:
 
 
 class RoleLabeller(Protocol):
-    """Finds predicates and their arguments (Shi & Lin 2019, arXiv 1904.05255)."""
+    """Port of role labellers: find predicates and their arguments (Shi & Lin 2019, arXiv 1904.05255)."""
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""Spelling of motion words: a word no dictionary knows, one slip away from a single motion word, is that word."""
+"""Spelling of motion words: an unknown word within one edit of exactly one motion word is corrected to it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Speller:
 
     @classmethod
     def load(cls) -> Speller:
-        """With MiniLM's 23,000 whole words as the dictionary.
+        """Load a speller with MiniLM's 23,000 whole words as its dictionary.
 
         Raises:
             NotFound: MiniLM is not installed.

@@ -1,4 +1,4 @@
-"""What the rewriter and its guard know of English words: verb forms, sides, directions, numbers, units."""
+"""English word tables of the rewriter and its guard: verb forms, sides, directions, numbers, units."""
 
 from __future__ import annotations
 
@@ -153,13 +153,13 @@ def third_person(base: str) -> str:
 
 
 def inflected(word: str) -> str:
-    """A verb of any form in the third person singular, its punctuation kept: "walk," → "walks,"."""
+    """A verb of any form in the third person singular, with its punctuation: "walk," → "walks,"."""
     core = bare(word)
     return word.lower().replace(core, third_person(lemma(core)), 1)
 
 
 def is_past(word: str) -> bool:
-    """Whether the word is a past form: -ed or an irregular one."""
+    """Return True if the word is a past form: -ed or an irregular one."""
     word = bare(word)
     return any(word == past for past, _ in IRREGULAR.values()) or (
         word.endswith("ed") and not word.endswith("eed") and len(word) > 4
@@ -167,7 +167,7 @@ def is_past(word: str) -> bool:
 
 
 def one_slip(wrong: str, right: str) -> bool:
-    """Whether one letter lost, added, replaced, or exchanged with its neighbour makes `right` of `wrong`."""
+    """Return True if one letter lost, added, replaced or swapped with its neighbour turns `wrong` into `right`."""
     if wrong == right or abs(len(wrong) - len(right)) > 1:
         return False
     start = 0

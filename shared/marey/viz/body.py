@@ -99,7 +99,7 @@ def part_of(skeleton: Skeleton, joint: int) -> Part:
 
 
 def forward_of(skeleton: Skeleton, places: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Where a body faces: on the floor, square to the way from its right hips and collars to its left ones.
+    """Forward direction of a body: on the floor, perpendicular to the line from its right to its left hips and collars.
 
     Args:
         skeleton: its sides are read from its joints' names.

@@ -1,4 +1,4 @@
-"""The gallery: one HTML file with many motions as small 3D players, to say of each whether to keep it.
+"""Gallery: one HTML file with many motions as small 3D players, for deciding which to keep.
 
 As in the player everything is inside, every text is escaped, and the page may fetch nothing. It changes nothing by
 itself: it shows the commands that do.
@@ -24,7 +24,7 @@ MOST_CARDS = 400
 
 @dataclass(frozen=True)
 class Card:
-    """A motion with what is told of it.
+    """A motion with its description.
 
     Args:
         id: what the commands name it by.

@@ -22,7 +22,7 @@ _HOST = re.compile(r"[A-Za-z0-9.-]+(:[0-9]{1,5})?")
 
 @dataclass(frozen=True)
 class LivePage:
-    """The page, and what it may do.
+    """The page and its permissions.
 
     Attributes:
         content: HTML, UTF-8.
@@ -56,7 +56,7 @@ class LivePage:
 
 @lru_cache(maxsize=4)
 def live_page(examples: tuple[str, ...] = ()) -> LivePage:
-    """The page, put together once a process.
+    """The page, assembled once per process.
 
     Args:
         examples: prompts that it offers.

@@ -29,7 +29,7 @@ MOST_TILES = 400
 
 
 def draw_tile(clip: MotionClip, caption: str, *, theme: Theme) -> Image.Image:
-    """One clip: caption, facts, six poses and the lanes of foot contact."""
+    """Draw one clip: caption, facts, six poses and the foot-contact tracks."""
     strip = make_strip(clip, chosen_frames(clip, POSES), CELL)
     paper = Paper(Image.new("RGB", TILE, theme.paper), theme)
     for y, size, text, colour in ((0, 15, caption, theme.ink), (21, 11, facts_of(clip), theme.muted)):

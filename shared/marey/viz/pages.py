@@ -1,6 +1,6 @@
-"""How a page with a 3D figure is put together: one HTML file with style, scripts, three.js and data inside.
+"""Assemble pages with a 3D figure: one HTML file with style, scripts, three.js and data inside.
 
-Nothing is loaded from elsewhere. What is filled in is data, whatever is in it: no text can end the element it stands in
+Nothing is loaded from elsewhere. Inserted values are data: no text can end the element it stands in
 or pass for a mark of the template.
 """
 
@@ -29,7 +29,7 @@ def asset(name: str, package: str = "marey.viz") -> str:
 
 
 def fill(template: str, parts: Mapping[str, str]) -> str:
-    """A template with each mark replaced by its text, in order and once each.
+    """Replace each mark of a template by its text, in order and once each.
 
     What is filled in is never searched for the next mark.
     """
@@ -41,15 +41,15 @@ def fill(template: str, parts: Mapping[str, str]) -> str:
 
 
 def whole_page(body: str, *, title: str, styles: Sequence[str], theme: str = "auto", sealed: bool = True) -> str:
-    """A page: the head that all share around a body.
+    """Wrap a body in the shared page head.
 
     Args:
         body: its `<body>` element, with scripts.
         title: one line of plain text.
         styles: its own, behind the one that all share.
         theme: `auto` (as the browser asks), `light` or `dark`.
-        sealed: by a content security policy of its own, it runs its own scripts and styles and fetches nothing. Else
-            whoever serves it sends one.
+        sealed: by a content security policy of its own, it runs its own scripts and styles and fetches nothing.
+            Otherwise the server sends one.
     """
     page = fill(
         asset("page.html"),

@@ -1,4 +1,4 @@
-"""Paper and ink of the drawings: colours, type, wrapped lines."""
+"""Drawing surface: colours, type, wrapped lines."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 @dataclass(frozen=True)
 class Paper:
-    """An image one writes on."""
+    """An image to write on."""
 
     image: Image.Image
     theme: Theme

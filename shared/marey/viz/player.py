@@ -1,4 +1,4 @@
-"""The player: one HTML file that shows motion in 3D, without a network.
+"""Player: one HTML file that shows motion in 3D, without a network.
 
 Everything is inside the page: style, script, three.js and the motion (root as float32, local rotations as float16,
 which keeps joints within a millimetre of the clip's; the page runs the forward kinematics). A content security policy

@@ -1,4 +1,4 @@
-"""Contact sheet: motion on one sheet of paper.
+"""Contact sheet: clips as rows of poses on one image.
 
 A clip is a row: a strip of poses along time with the lanes of foot contact under it (`strip.py`), and beside it the
 path from above. Many clips at a glance are an overview (`overview.py`).
@@ -79,7 +79,7 @@ def contact_sheet(
 
 
 def check_png(path: Path) -> None:
-    """Raise unless the name is a PNG's.
+    """Validate that the name ends in `.png`.
 
     Raises:
         InvalidInput: it is not.
@@ -89,7 +89,7 @@ def check_png(path: Path) -> None:
 
 
 def save_png(image: Image.Image, path: Path) -> Path:
-    """Write a picture, whole or not at all."""
+    """Write a picture atomically."""
     buffer = io.BytesIO()
     image.save(buffer, format="PNG", compress_level=5)
     write_atomically(path, buffer.getvalue())
@@ -118,7 +118,7 @@ def caption_of(clip: MotionClip) -> str:
 
 
 def facts_of(clip: MotionClip) -> str:
-    """One line about a clip: length, rate, seed, model, terms, and whether a model without training made it."""
+    """One line about a clip: length, rate, seed, model, terms, and a note if the weights are random."""
     facts = [f"{clip.seconds:.1f} s", f"{clip.frames} frames at {clip.fps:g} fps"]
     if clip.manifest.get("seed") is not None:
         facts.append(f"seed {clip.manifest['seed']}")
@@ -129,7 +129,7 @@ def facts_of(clip: MotionClip) -> str:
 
 
 def draw_row(clip: MotionClip, caption: str, frames: NDArray[np.intp], *, columns: int, theme: Theme) -> Image.Image:
-    """One clip: caption and facts, the poses of these frames, lanes of foot contact, and the path from above.
+    """Draw one clip: caption and facts, the poses of these frames, the foot-contact tracks, and the path from above.
 
     Args:
         columns: room for so many poses.

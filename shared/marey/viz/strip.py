@@ -1,4 +1,4 @@
-"""A strip: poses of a clip along time, each on its own patch of the floor, and under them the lanes of foot contact.
+"""Strip: poses of a clip along time, each on its own patch of the floor, with foot-contact tracks below.
 
 The patch has a grid of half metres, fixed to the world, so that travel shows; the root's trail; the figure's shadow;
 the feet that touch lit. Left is blue and right is orange everywhere.
@@ -33,7 +33,7 @@ Size = tuple[int, int]
 
 @dataclass(frozen=True)
 class Strip:
-    """The poses of a clip that are shown, and how large.
+    """The shown poses of a clip and their scale.
 
     Attributes:
         cell: width and height of one pose, pixels.
@@ -55,7 +55,7 @@ class Strip:
 
 
 def chosen_frames(clip: MotionClip, columns: int, frames: Sequence[int] | None = None) -> NDArray[np.intp]:
-    """So many frames from the first to the last, evenly spaced; or these.
+    """Evenly spaced frames from the first to the last, `columns` of them; or the given `frames`.
 
     Raises:
         InvalidInput: one of these is not in the clip, or there is none.
@@ -162,7 +162,7 @@ def _shadow(
 
 
 def draw_lanes(paper: Paper, strip: Strip, at: tuple[int, int], tall: int) -> None:
-    """Foot contact over time, one lane a side; both joints of a foot down is the full colour."""
+    """Draw foot contact over time, one track per side; full colour where both joints of a foot touch the floor."""
     if not strip.clip.skeleton.feet:
         return
     draw, theme = ImageDraw.Draw(paper.image), paper.theme

@@ -20,7 +20,7 @@ def test_each_clip_gives_a_caption_its_length_and_what_it_shows(tmp_path: Path) 
     assert reference_prompts(Bundle.open(tmp_path / JUDGE), "test") == (
         EvaluationPrompt("walk", 3.0, "walk"),
         EvaluationPrompt("walk and wave", 9.8, "walk then wave left"),
-        EvaluationPrompt("walk as a guide", 0.6, None),  # a guide's gesture is no act that is judged
+        EvaluationPrompt("walk as a guide", 0.6, None),  # a guide's gesture is no action that is judged
     )
 
 

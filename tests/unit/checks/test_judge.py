@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from marey.checks.judge import Expectation, judge, straightness
-from marey.checks.rates import ALL_EXPECTATIONS, RealClip, name_of, rates
+from marey.checks.rates import ALL_EXPECTATIONS, LabelledClip, name_of, rates
 from tests.support.bodies import FPS, Body, bower, lift, raiser, runner, steady, walker, waver
 
 MOTIONS = {
@@ -137,12 +137,12 @@ def test_straightness_measures_the_largest_distance_from_the_line():
 
 def test_rates_count_own_passes_wrong_passes_and_reasons():
     clips = [
-        RealClip("a", ("walk",), ("",), walker),
-        RealClip("b", ("dash",), ("",), runner),
-        RealClip("c", ("wave",), ("left",), lambda: waver("left")),
-        RealClip("d", ("wave",), ("left",), lambda: waver("right")),
-        RealClip("e", ("walk", "wave"), ("", "right"), walk_then_wave),
-        RealClip("f", ("guide",), ("left",), lambda: waver("left")),
+        LabelledClip("a", ("walk",), ("",), walker),
+        LabelledClip("b", ("dash",), ("",), runner),
+        LabelledClip("c", ("wave",), ("left",), lambda: waver("left")),
+        LabelledClip("d", ("wave",), ("left",), lambda: waver("right")),
+        LabelledClip("e", ("walk", "wave"), ("", "right"), walk_then_wave),
+        LabelledClip("f", ("guide",), ("left",), lambda: waver("left")),
     ]
     found = rates(clips, FPS)
     assert (found.own["walk"].share, found.own["run"].share, found.own["wave left"].share) == (1.0, 1.0, 0.5)

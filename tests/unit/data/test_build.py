@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from marey.checks.judge import Expectation, judge
-from marey.checks.rates import RealClip
+from marey.checks.rates import LabelledClip
 from marey.core.errors import Conflict, InvalidFile, NotFound
 from marey.data import compose
 from marey.data.build import LAYOUT, build, swap_sides, windows
@@ -112,7 +112,7 @@ def test_sequences_show_their_acts_in_order(data):
     made = [clip for clip in data.clips if len(clip.acts) == 2]
     verdicts = []
     for clip in made:
-        expected = RealClip(clip.id, clip.acts, clip.sides, lambda c=clip: data.joints(c)).expected()
+        expected = LabelledClip(clip.id, clip.acts, clip.sides, lambda c=clip: data.joints(c)).expected()
         assert expected is not None
         verdicts.append(judge(data.joints(clip), 20.0, expected).passed)
     assert len(made) == 12 + 3 + 4

@@ -159,7 +159,7 @@ def trained_phrases() -> set[str]:
 
 
 def joined_phrases() -> set[str]:
-    """All phrases that two acts have together."""
+    """All phrases that two actions have together."""
     out = set()
     joins = grammar().joins
     for phrase in (p for table in (joins.same, joins.pairs) for rows in table.values() for p in rows):

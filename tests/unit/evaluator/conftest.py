@@ -8,7 +8,7 @@ from marey.bundles import Bundle
 from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import assemble
 from marey.evaluator.config import TINY
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 from marey.evaluator.tmr import TMREvaluator
 from marey.evaluator.train import train_stage
 from marey.training.budget import Budget
@@ -37,5 +37,5 @@ def evaluator(bundle: Bundle) -> TMREvaluator:
 
 
 @pytest.fixture(scope="package")
-def real(bundle: Bundle) -> Reference:
-    return Reference.of(bundle)
+def real(bundle: Bundle) -> RealClips:
+    return RealClips.of(bundle)

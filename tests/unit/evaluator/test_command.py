@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from marey.bundles import Bundle
 from marey.cli.commands.train import app
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 from tests.support.prepared import write_prepared
 
 
@@ -26,6 +26,6 @@ def test_the_command_line_trains_an_evaluator_and_writes_its_bundle(tmp_path: Pa
     bundle = Bundle.open(output)
     assert made.stdout.strip() == bundle.reference
     assert bundle.manifest.parameters["train_tmr"]["learning_rate"] == 2e-3  # of `bundle`'s own configuration
-    assert len(Reference.of(bundle).split("test").clips) == 4
+    assert len(RealClips.of(bundle).split("test").clips) == 4
     again = CliRunner().invoke(app, ["evaluator", "bundle", data, *chosen, "-o", str(output)])
     assert again.exit_code != 0

@@ -13,7 +13,7 @@ from marey.evaluator.report import Baseline, Metric, MotionScore
 from marey.measures.comparing import OBEYED, RETRIEVED
 
 METRICS = {
-    OBEYED: Metric(OBEYED, "Prompts obeyed", "%", "higher", 1),
+    OBEYED: Metric(OBEYED, "Prompt adherence", "%", "higher", 1),
     RETRIEVED: Metric(RETRIEVED, "R-precision 3 of 32", "%", "higher", 1),
 }
 RNG = np.random.default_rng(0)
@@ -37,7 +37,7 @@ def test_a_run_that_obeys_clearly_less_is_worse_and_raises_an_alarm() -> None:
     assert obeyed.before > obeyed.after
     assert (retrieved.metric, retrieved.verdict) == (RETRIEVED, "no difference found")
     (alarm,) = alarms(found, METRICS)
-    assert alarm.startswith("Prompts obeyed fell from ")
+    assert alarm.startswith("Prompt adherence fell from ")
 
 
 def test_a_run_that_obeys_clearly_more_is_better_and_raises_none() -> None:

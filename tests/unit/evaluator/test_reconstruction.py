@@ -17,7 +17,7 @@ from marey.data.prepared import PreparedData
 from marey.evaluator.assembly import renew_reference
 from marey.evaluator.measuring import check
 from marey.evaluator.reconstruction import find_reconstruction, reconstruct
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 from marey.evaluator.rows import Ruler, truth_row
 from marey.evaluator.tmr import TMREvaluator
 from marey.models.hgm3.bundle import random_bundle
@@ -56,7 +56,7 @@ def judge(bundle: Bundle, tmp_path: Path) -> Bundle:
 
 
 def test_a_tokenizer_that_loses_nothing_gives_real_motion_back(
-    prepared: PreparedData, real: Reference, evaluator: TMREvaluator
+    prepared: PreparedData, real: RealClips, evaluator: TMREvaluator
 ) -> None:
     found = reconstruct(prepared, real, evaluator, GENERATOR, Perfect()).reconstruction
     values = found.values["test"]
@@ -68,7 +68,7 @@ def test_a_tokenizer_that_loses_nothing_gives_real_motion_back(
 
 
 def test_what_was_measured_is_found_for_exactly_these_two_bundles(
-    prepared: PreparedData, real: Reference, evaluator: TMREvaluator, judge: Bundle, tmp_path: Path
+    prepared: PreparedData, real: RealClips, evaluator: TMREvaluator, judge: Bundle, tmp_path: Path
 ) -> None:
     made = reconstruct(prepared, real, evaluator, GENERATOR, Perfect()).reconstruction
     assert find_reconstruction(judge, GENERATOR) is None
@@ -86,7 +86,7 @@ def test_what_was_measured_is_found_for_exactly_these_two_bundles(
 
 
 def test_other_motion_under_the_names_of_the_clips_is_refused(
-    real: Reference, evaluator: TMREvaluator, tmp_path: Path
+    real: RealClips, evaluator: TMREvaluator, tmp_path: Path
 ) -> None:
     other = PreparedData.open(write_prepared(tmp_path / "other", 240))
     with pytest.raises(InvalidInput, match="is another motion than in the evaluator's reference"):
@@ -112,27 +112,27 @@ def test_the_command_line_keeps_the_row_beside_the_evaluator_and_writes_a_report
 
 
 def test_the_reference_of_a_bundle_is_renewed_with_the_same_networks(
-    prepared: PreparedData, bundle: Bundle, real: Reference, tmp_path: Path
+    prepared: PreparedData, bundle: Bundle, real: RealClips, tmp_path: Path
 ) -> None:
     made = renew_reference(bundle, prepared.path, tmp_path / "again")
     assert made.manifest.files["motion.safetensors"] == bundle.manifest.files["motion.safetensors"]
-    assert np.array_equal(Reference.of(made).split("test").motion, real.split("test").motion)
-    assert Reference.of(made).split("test").clips == real.split("test").clips
+    assert np.array_equal(RealClips.of(made).split("test").motion, real.split("test").motion)
+    assert RealClips.of(made).split("test").clips == real.split("test").clips
     own = renew_reference(bundle, write_prepared(tmp_path / "own", 24), tmp_path / "own-judge")
-    assert len(Reference.of(own).split("test").clips) == 4
+    assert len(RealClips.of(own).split("test").clips) == 4
     assert own.reference != bundle.reference
 
 
-def test_a_bundle_from_before_joints_were_measured_says_so(real: Reference, evaluator: TMREvaluator) -> None:
+def test_a_bundle_from_before_joints_were_measured_says_so(real: RealClips, evaluator: TMREvaluator) -> None:
     split = real.split("test")
     clips = tuple(clip.model_copy(update={"quality": None, "obeyed": None}) for clip in split.clips)
-    old = Reference({"test": type(split).of(clips, split.motion)})
+    old = RealClips({"test": type(split).of(clips, split.motion)})
     row = truth_row(Ruler(evaluator, old, ("test",), seed=0))
     assert row.values["jerk"].mean is None
     assert "before it carried" in row.values["jerk"].note
 
 
-def test_what_the_joints_of_a_real_clip_say_is_what_the_checker_says(prepared: PreparedData, real: Reference) -> None:
+def test_what_the_joints_of_a_real_clip_say_is_what_the_checker_says(prepared: PreparedData, real: RealClips) -> None:
     kept = real.split("test").clips[0]
     clip = next(clip for clip in prepared.clips if clip.id == kept.id)
     found = check(prepared.layout.decode(prepared.features(clip)), 20.0, None)

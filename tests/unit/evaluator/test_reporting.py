@@ -15,7 +15,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.prepared import PreparedData
 from marey.evaluations import EarlierRun, EvaluationJob, EvaluationRequest, MadeItem
 from marey.evaluator.measuring import TOGETHER, Broken, Measured, check_measured, embed_prompts, encoded, measure
-from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import Report, from_json, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
 from marey.evaluator.scoring import REPEATS, label_ceilings
@@ -43,7 +43,7 @@ def files(prepared: PreparedData) -> list[bytes]:
 
 
 def source_of(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference, *, repeats: int = 1, **changes: object
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips, *, repeats: int = 1, **changes: object
 ) -> ScoreInput:
     """An evaluation whose motions are these files, each `repeats` times."""
     store = {sha256(data): data for data in files}
@@ -67,7 +67,7 @@ def measured_of(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
 
 
 @pytest.fixture(scope="module")
-def source(files: list[bytes], evaluator: TMREvaluator, real: Reference) -> ScoreInput:
+def source(files: list[bytes], evaluator: TMREvaluator, real: RealClips) -> ScoreInput:
     return source_of(files, evaluator, real)
 
 
@@ -77,7 +77,7 @@ def measured(source: ScoreInput, evaluator: TMREvaluator) -> Measured:
 
 
 @pytest.fixture(scope="module")
-def report(source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference) -> Report:
+def report(source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips) -> Report:
     return report_of(source, measured, evaluator, real)
 
 
@@ -120,10 +120,10 @@ def test_the_report_says_how_motions_came_and_what_made_them(report: Report, eva
 
 
 def test_a_report_is_heard_of_in_each_repeat_of_each_number_that_takes_long(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips
 ) -> None:
     heard: list[None] = []
-    report_of(source, measured, evaluator, real, beat=lambda: heard.append(None))
+    report_of(source, measured, evaluator, real, progress=lambda: heard.append(None))
     drawn, rows = ("clip_score", "mm_dist", "diversity"), ("ground truth", "raw", "exported")
     assert len(heard) >= REPEATS * len(drawn) * len(rows)
 
@@ -137,7 +137,7 @@ def test_sentences_are_embedded_a_few_at_a_time_and_each_once(evaluator: TMREval
 
 
 def test_fewer_motions_than_a_pool_make_a_report_without_retrieval(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips
 ) -> None:
     source = source_of(files[:20], evaluator, real)
     found = report_of(source, measured_of(source, evaluator), evaluator, real)
@@ -147,24 +147,24 @@ def test_fewer_motions_than_a_pool_make_a_report_without_retrieval(
 
 
 def test_sequences_stand_in_one_line_of_the_heat_map_and_single_acts_in_their_own(
-    source: ScoreInput, evaluator: TMREvaluator, real: Reference
+    source: ScoreInput, evaluator: TMREvaluator, real: RealClips
 ) -> None:
     expected = ("walk", "walk then bow", "bow then walk", "walk then bow then run")
     items = tuple(replace(item, expected=expected[item.index % 4]) for item in source.items)
     mixed = replace(source, items=items)
     heat = report_of(mixed, measured_of(mixed, evaluator), evaluator, real).heat
     trials = {act: sum(cell.trials for cell in heat if cell.act == act) for act in {cell.act for cell in heat}}
-    assert trials == {"walk": 10, "2 acts in order": 20, "3 acts in order": 10}
+    assert trials == {"walk": 10, "2 actions in order": 20, "3 actions in order": 10}
 
 
 def test_all_three_files_are_written_and_the_numbers_can_be_read_back(report: Report) -> None:
     assert b"<canvas" in to_html(report)
-    assert b"Prompts obeyed" in to_markdown(report)
+    assert b"Prompt adherence" in to_markdown(report)
     assert from_json(to_json(report)).scores == report.scores
     assert len(report.scores) == 40
 
 
-def test_real_motion_stands_beside_with_what_its_joints_say(report: Report, real: Reference) -> None:
+def test_real_motion_stands_beside_with_what_its_joints_say(report: Report, real: RealClips) -> None:
     truth = report.row("ground_truth").values
     qualities = [clip.quality for clip in real.split("test").clips]
     assert truth["jerk"].mean == pytest.approx(np.mean([q.jerk for q in qualities if q is not None]))
@@ -174,11 +174,11 @@ def test_real_motion_stands_beside_with_what_its_joints_say(report: Report, real
 
 
 def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips
 ) -> None:
     clips, motion = real.split("test").clips, real.split("test").motion
     parts = {"test": slice(0, 26), "compositional": slice(26, 40)}
-    two = Reference({name: ReferenceSplit.of(clips[at], motion[at]) for name, at in parts.items()})
+    two = RealClips({name: ReferenceSplit.of(clips[at], motion[at]) for name, at in parts.items()})
     base = source_of(files, evaluator, real)
     source = replace(base, request=replace(base.request, source="test+compositional"))
     items = tuple(replace(item, expected="kick" if item.index < 26 else None) for item in source.items)
@@ -200,7 +200,7 @@ def test_prompts_of_two_splits_have_columns_for_the_compositional_one(
 
 
 def test_the_same_evaluation_gives_the_same_numbers(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference, report: Report
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips, report: Report
 ) -> None:
     again = report_of(source, measured_of(source, evaluator), evaluator, real)
     assert again.rows == report.rows
@@ -208,7 +208,7 @@ def test_the_same_evaluation_gives_the_same_numbers(
 
 
 def test_repeats_give_an_interval_to_what_is_measured_on_joints(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips
 ) -> None:
     source = source_of(files[:34], evaluator, real, repeats=2)
     found = report_of(source, measured_of(source, evaluator), evaluator, real)
@@ -218,7 +218,7 @@ def test_repeats_give_an_interval_to_what_is_measured_on_joints(
 
 
 def test_a_run_whose_motions_stop_doing_what_they_should_has_regressed(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference, report: Report
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips, report: Report
 ) -> None:
     scores = tuple(replace(score, obeyed=1.0) for score in report.scores)
     data = to_json(replace(report, scores=scores))
@@ -229,12 +229,12 @@ def test_a_run_whose_motions_stop_doing_what_they_should_has_regressed(
     source = replace(source, items=tuple(replace(item, expected="kick") for item in source.items))
     found = report_of(source, measured_of(source, evaluator), evaluator, real)
     assert found.regressed is True
-    assert found.alarms[0].startswith("Prompts obeyed fell from 100.0")
+    assert found.alarms[0].startswith("Prompt adherence fell from 100.0")
     assert [point.evaluation for point in found.trend] == [str(before.id), str(source.evaluation)]
 
 
 def test_a_motion_that_is_lost_or_broken_is_named_and_counts_in_no_number(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips
 ) -> None:
     base = source_of(files, evaluator, real)
     bad = AssetDigest("0" * 64, 3, "application/x-npz")
@@ -258,7 +258,7 @@ def test_a_motion_that_is_lost_or_broken_is_named_and_counts_in_no_number(
 
 
 def test_motions_that_hold_nan_are_broken_and_more_than_one_percent_of_them_fail_the_report(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips
 ) -> None:
     good = parse_npz(files[0])
     features = good.features.copy()
@@ -283,7 +283,7 @@ def test_a_hundredth_of_the_motions_may_be_missing(measured: Measured) -> None:
 
 
 def test_the_command_to_repeat_it_is_one_that_a_shell_reads_as_it_was(
-    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: Reference
+    source: ScoreInput, measured: Measured, evaluator: TMREvaluator, real: RealClips
 ) -> None:
     settings = {"guidance": 4.123456789, "steps": 10.0}
     request = replace(source.request, source="our prompts (new).csv", settings=settings)
@@ -293,7 +293,7 @@ def test_the_command_to_repeat_it_is_one_that_a_shell_reads_as_it_was(
 
 
 def test_the_ceiling_of_a_model_that_knows_labels_alone_stands_beside_retrieval(
-    report: Report, real: Reference
+    report: Report, real: RealClips
 ) -> None:
     truth = report.row("ground_truth").values
     labels = real.split("test").labels
@@ -304,7 +304,7 @@ def test_the_ceiling_of_a_model_that_knows_labels_alone_stands_beside_retrieval(
 
 
 def test_motions_of_another_feature_layout_are_refused(
-    files: list[bytes], evaluator: TMREvaluator, real: Reference, prepared: PreparedData
+    files: list[bytes], evaluator: TMREvaluator, real: RealClips, prepared: PreparedData
 ) -> None:
     clip = finish_motion(np.array(prepared.features(prepared.clips[0])), HUMANML3D_263)
     narrow = replace(clip, features=clip.features[:, :251]).to_npz()

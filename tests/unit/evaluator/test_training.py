@@ -105,7 +105,7 @@ def test_the_evaluator_learns_which_caption_belongs_to_which_motion(prepared: Pr
     config = replace(TINY, network=replace(TINY.network, width=48, feedforward=96, heads=4))
     config = replace(config, train_tmr=replace(config.train_tmr, batch=32, learning_rate=5e-3))
     found = train_stage("tmr", replace(options(prepared, tmp_path, 100), config=config))
-    assert found["test/distinct_r1"] > 0.4  # 0.03 by chance; the clips are new, the acts are not
+    assert found["test/distinct_r1"] > 0.4  # 0.03 by chance; the clips are new, the actions are not
     assert found["test/median_rank"] < 5  # of 37; 19 by chance
 
 
@@ -161,7 +161,7 @@ def test_the_bundle_ships_two_encoders_and_no_decoder(bundle: Bundle) -> None:
 def test_the_reference_holds_captions_labels_lengths_and_what_the_bundle_makes_of_the_motions(
     bundle: Bundle, prepared: PreparedData, evaluator: TMREvaluator
 ) -> None:
-    reference = Reference.of(bundle)
+    reference = RealClips.of(bundle)
     assert set(reference.splits) == {"val", "test"}  # the folder has no compositional clips
     split = reference.split("test")
     clips = prepared.split("test")
@@ -183,11 +183,11 @@ def test_a_reference_whose_halves_do_not_fit_is_refused(bundle: Bundle, tmp_path
     rows["test"] = rows["test"][1:]
     change(folder, FILE, json.dumps(rows).encode())
     with pytest.raises(InvalidBundle, match="do not fit the clips"):
-        Reference.of(Bundle.open(folder))
+        RealClips.of(Bundle.open(folder))
     rows["test"][0]["joints"] = [0.0]
     change(folder, FILE, json.dumps(rows).encode())
     with pytest.raises(InvalidBundle, match="is no reference"):
-        Reference.of(Bundle.open(folder))
+        RealClips.of(Bundle.open(folder))
 
 
 def test_a_bundle_of_another_layout_or_model_is_refused(bundle: Bundle, encoder: TextEncoder) -> None:

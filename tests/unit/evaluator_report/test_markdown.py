@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from marey.evaluator.report import HeatCell, Reference, Report, Row, to_markdown
+from marey.evaluator.report import ArtifactReference, HeatCell, Report, Row, to_markdown
 from tests.support.reports import sample_report
 
 HOSTILE = (
@@ -21,7 +21,7 @@ def hostile_report(report: Report) -> Report:
     return dataclasses.replace(
         report,
         title=HOSTILE,
-        generator=Reference(HOSTILE, HOSTILE),
+        generator=ArtifactReference(HOSTILE, HOSTILE),
         rows=rows,
         worst=(exhibit,),
         heat=(HeatCell(HOSTILE, HOSTILE, 3, 1),),
@@ -68,7 +68,7 @@ def test_a_text_that_would_begin_a_list_or_a_rule_stays_a_text(report: Report) -
 
 def test_the_outcome_comes_before_every_number(report: Report) -> None:
     blocks = to_markdown(report).decode().split("\n\n")
-    assert blocks[2].startswith("> **Regressed.** Prompts obeyed fell")
+    assert blocks[2].startswith("> **Regressed.** Prompt adherence fell")
     assert all(not block.startswith("|") for block in blocks[:3])
 
 

@@ -129,14 +129,14 @@ def test_parts_refuse_impossible_counts() -> None:
 
 
 def test_a_sentence_says_what_moved_how_far_and_how_sure() -> None:
-    obeyed = Metric("obeyed", "Prompts obeyed", "%", "higher", 1)
+    obeyed = Metric("obeyed", "Prompt adherence", "%", "higher", 1)
     fell = Change("obeyed", "last run", 94.4, 88.1, -9.8, -2.9, "worse")
     assert sentence_of(fell, obeyed).replace("\u00a0", " ") == (
-        "Prompts obeyed fell from 94.4 % to 88.1 % against the last run "
+        "Prompt adherence fell from 94.4 % to 88.1 % against the last run "
         "(95 % interval of the difference: −9.8 to −2.9)."
     )
     same = Change("obeyed", "pinned baseline", 94.4, 94.8, -1.0, 1.9, "no difference found")
     assert sentence_of(same, obeyed).replace("\u00a0", " ") == (
-        "Prompts obeyed rose from 94.4 % to 94.8 % against the pinned baseline "
+        "Prompt adherence rose from 94.4 % to 94.8 % against the pinned baseline "
         "(95 % interval of the difference: −1.0 to +1.9; no difference found)."
     )

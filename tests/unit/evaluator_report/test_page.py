@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from marey.evaluator.report import (
+    ArtifactReference,
     Baseline,
     Exhibit,
     HeatCell,
     Metric,
-    Reference,
     Report,
     Row,
     TrendPoint,
@@ -100,9 +100,9 @@ def hostile(report: Report) -> Report:
         report,
         title=HOSTILE,
         evaluation=HOSTILE,
-        generator=Reference(HOSTILE, HOSTILE),
+        generator=ArtifactReference(HOSTILE, HOSTILE),
         licence=HOSTILE,
-        source=Reference(HOSTILE, HOSTILE),
+        source=ArtifactReference(HOSTILE, HOSTILE),
         comparability=HOSTILE,
         metrics=metrics,
         rows=tuple(Row(r.key, HOSTILE, HOSTILE, r.values) for r in report.rows),

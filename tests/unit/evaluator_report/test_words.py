@@ -17,7 +17,7 @@ def test_a_regressed_run_says_so_and_its_first_alarm_says_why(report: Report) ->
     head = headline(report)
     assert (head.word, head.kind, head.sentence) == ("Regressed", "worse", report.alarms[0])
     assert head.more[:-1] == report.alarms[1:]
-    assert "Foot skate are better, Prompts obeyed is worse" in head.more[-1]
+    assert "Foot skate are better, Prompt adherence is worse" in head.more[-1]
 
 
 def test_a_run_without_alarm_names_what_became_better_and_what_stayed(report: Report) -> None:

@@ -68,24 +68,24 @@ def test_tokens_are_equal_in_any_batch_with_bfloat16_matrices(generator: Generat
 
 
 @pytest.fixture
-def in_lanes(generator: Generator) -> Iterator[Generator]:
-    """The same bundle in two lanes."""
+def on_two_threads(generator: Generator) -> Iterator[Generator]:
+    """The same bundle on two batch threads."""
     before = torch.get_num_threads()
     yield Generator.load(generator.bundle, device="cpu", threads=2, dtype=generator.dtype)
     torch.set_num_threads(before)
 
 
-def test_motions_are_equal_in_two_lanes(in_lanes: Generator, reference: list[Generated | None]) -> None:
-    assert in_lanes.lanes.count == 2
-    assert equal(reference, in_lanes.generate(requests()))
-    assert equal(reference[:3], in_lanes.generate(requests()[:3]))
-    assert equal(reference[7:8], in_lanes.generate(requests()[7:8]))  # its two branches of guidance
+def test_motions_are_equal_on_two_threads(on_two_threads: Generator, reference: list[Generated | None]) -> None:
+    assert on_two_threads.batch_threads.count == 2
+    assert equal(reference, on_two_threads.generate(requests()))
+    assert equal(reference[:3], on_two_threads.generate(requests()[:3]))
+    assert equal(reference[7:8], on_two_threads.generate(requests()[7:8]))  # its two branches of guidance
 
 
-def test_a_request_dropped_in_two_lanes_ends_and_the_others_stay_the_same(
-    in_lanes: Generator, reference: list[Generated | None]
+def test_a_request_dropped_on_two_threads_ends_and_the_others_stay_the_same(
+    on_two_threads: Generator, reference: list[Generated | None]
 ) -> None:
-    made = in_lanes.generate(requests()[:3], control=Dropper())
+    made = on_two_threads.generate(requests()[:3], control=Dropper())
     assert made[1] is None
     assert equal([reference[0], reference[2]], [made[0], made[2]])
 

@@ -172,7 +172,7 @@ def test_the_residual_transformer_predicts_each_samples_own_level(compact: bool)
     torch.manual_seed(0)
     model = ResidualTransformer(replace(TINY, compact=compact)).eval()
     if compact:
-        torch.nn.init.normal_(model.leave.weight)  # training starts at zero
+        torch.nn.init.normal_(model.out_proj.weight)  # training starts at zero
     model.set_codebooks(torch.randn(3, 32, 16))
     total = torch.randn(1, 8, 16 if compact else 32).repeat(2, 1, 1)
     valid = torch.ones(2, 8, dtype=torch.bool)
@@ -311,7 +311,7 @@ def test_guidance_in_front_of_the_last_matrix_equals_guidance_of_logits(compact:
     residual.set_codebooks(torch.randn(3, 32, 16))
     torch.nn.init.normal_(residual.bias)
     if compact:
-        torch.nn.init.normal_(residual.leave.weight)
+        torch.nn.init.normal_(residual.out_proj.weight)
     valid = torch.arange(8)[None].repeat(4, 1) < torch.tensor([[5], [8], [5], [8]])
     visible = torch.zeros(4, 25, dtype=torch.bool)
     visible[:, 0] = True

@@ -64,7 +64,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Bundle:
 
 @pytest.fixture
 def obeying(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Lets the checker find that one act is obeyed, and no other."""
+    """Lets the checker find that one action is obeyed, and no other."""
 
     def only(act: str) -> None:
         def verdict(_joints: object, _fps: float, expected: Sequence[Expectation]) -> Verdict:

@@ -1,4 +1,4 @@
-"""How long ago an act began, in training and while it streams."""
+"""How long ago an action began, in training and while it streams."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_training_keeps_the_time_of_some_acts_to_itself_each_whole() -> None:
     assert torch.equal(found, torch.stack([first] * 3 + [second] * 3, 1))
     for act in (first, second):
         assert 0.35 < float(act.float().mean()) < 0.65
-    assert 0.35 < float((first == second).float().mean()) < 0.65  # each act by itself
+    assert 0.35 < float((first == second).float().mean()) < 0.65  # each action by itself
     assert made.eval().of_acts(400, 6, None, None).any(-1).all()
 
 

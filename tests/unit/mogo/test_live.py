@@ -176,7 +176,7 @@ ACTS = replace(
 
 
 def in_second_act(generator: Generator, room: LiveSessionPool) -> tuple[int, list[LiveFrame], int]:
-    """A session five frames into its second act: its name, its frames, and the one at which that act began."""
+    """A session five frames into its second action: its name, its frames, and the one at which that action began."""
     session = room.start(ACTS, 7)
     made = run(room, session, 1)
     while made[-1].act == 0:
@@ -205,7 +205,7 @@ def test_an_act_that_plays_ends_when_it_would_have_ended(generator: Generator) -
     resumed = room.start(ACTS, 7, past=tokens, prompt=0, began=ActionStart(0, 0))
     acts = [room.step()[resumed].act for _ in range(generator.acts(ACTS)[1][0])]
     assert 0 in acts[:1]
-    assert acts.index(1) + began - 3 <= generator.acts(ACTS)[1][0]  # not a whole first act from here on
+    assert acts.index(1) + began - 3 <= generator.acts(ACTS)[1][0]  # not a whole first action from here on
 
 
 def test_a_place_that_the_prompt_does_not_have_is_refused(generator: Generator) -> None:

@@ -47,7 +47,7 @@ def test_more_padding_and_another_batch_change_no_bit() -> None:
 @pytest.mark.parametrize("dtype", PACKED_TYPES)
 def test_more_padding_and_another_batch_change_no_bit_after_packing(dtype: torch.dtype) -> None:
     model = transformer()
-    model.lower(dtype)
+    model.prepare_inference(dtype)
     x = torch.randn(3, 48, 32)
     valid = torch.arange(48)[None] < torch.tensor([[23], [24], [13]])
     whole = model(x, valid)
@@ -67,7 +67,7 @@ def test_rows_without_padding_equal_padded_ones(norm_first: bool) -> None:
     x, valid = torch.randn(4, 21, 32), torch.rand(4, 21) < 0.6
     valid[:, 3] = True
     padded = model(x, valid, 9)
-    model.lower(torch.float32)
+    model.prepare_inference(torch.float32)
     assert model.packed
     exists = valid[:, :9]
     torch.testing.assert_close(model(x, valid, 9)[exists], padded[exists], atol=1e-5, rtol=1e-5)

@@ -1,7 +1,8 @@
 """Does a motion do what a prompt says? Judged on joints (T, 22, 3) and frames a second alone.
 
 Thresholds were set on the training clips of the Bandai-Namco sets; the checker's own rate on their test clips, and how
-often it passes clips of other acts, stand in the report of `rates.py` beside every number it gives on generated motion.
+often it passes clips of other actions, stand in the report of `rates.py` beside every number it gives on generated
+motion.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ from marey.checks.strikes import is_lively, kicks, punches, slashes
 Act = Literal["walk", "run", "walk_back", "turn", "wave", "raise", "bow", "kick", "punch", "slash", "dance"]
 Side = Literal["", "left", "right", "both"]
 
-_LEAST_PART = 0.8  # seconds that each act of a sequence needs
+_LEAST_PART = 0.8  # seconds that each action of a sequence needs
 _SPLIT_STEP = 0.2  # seconds between the moments at which a sequence is tried to be split
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """One act that a prompt asks for.
+    """One action that a prompt asks for.
 
     Attributes:
-        act: what is done.
+        action: what is done.
         side: for turns left or right; for hands left, right or both.
         straight: the way must be straight (for walking, running and walking backward).
     """
@@ -54,7 +55,7 @@ class Verdict:
     reason: str = ""
 
 
-# -- single acts ---------------------------------------------------------------------------------------------------
+# -- single actions ---------------------------------------------------------------------------------------------------
 
 
 def _travels(m: Stretch, want: Expectation, *, run: bool) -> str:
@@ -206,7 +207,7 @@ def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict
     Args:
         joints: (T, 22, 3) metres, Y up, anywhere and facing anywhere.
         fps: frames a second.
-        expected: one act, or several in their order.
+        expected: one action, or several in their order.
     """
     motion = Stretch(joints, fps)
     if len(expected) == 1:
@@ -217,7 +218,7 @@ def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict
 
 
 def _in_order(motion: Stretch, expected: list[Expectation]) -> str:
-    """Look for moments that part the motion so that each part does its act, and does not do the next one already."""
+    """Look for moments that part the motion so that each part does its action, and does not do the next one already."""
     step, least = round(_SPLIT_STEP * motion.fps), round(_LEAST_PART * motion.fps)
     frames = len(motion.joints)
     rest = (len(expected) - 1) * least

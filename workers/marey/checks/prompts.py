@@ -2,7 +2,8 @@
 
 `prompts.toml` are the 200 that bars are set on; `prompts_blind.toml` was written by somebody who knew neither the
 training captions nor those, and nothing is ever chosen by it; `prompts_development.toml` by a third one in the same
-way: settings, weights and data are chosen by it. `prompts_fresh.toml`, by a fourth, asks for two acts in two thirds of
+way: settings, weights and data are chosen by it. `prompts_fresh.toml`, by a fourth, asks for two actions in two thirds
+    of
 its prompts; nothing is chosen by it either."""
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ class EvaluationPrompt:
     Attributes:
         text: as a user types it.
         group: what it is counted under.
-        expected: acts in order.
+        expected: actions in order.
         separate: reported apart from the rest (kick, punch, slash, dance).
     """
 
@@ -34,7 +35,7 @@ class EvaluationPrompt:
 
     @property
     def sided(self) -> bool:
-        """Whether a side or hand is asked for, in one act."""
+        """Whether a side or hand is asked for, in one action."""
         return len(self.expected) == 1 and self.expected[0].side != ""
 
 

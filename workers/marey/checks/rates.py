@@ -23,8 +23,8 @@ ALL_EXPECTATIONS: tuple[Expectation, ...] = (
 
 
 @dataclass(frozen=True)
-class RealClip:
-    """A clip whose acts are known."""
+class LabelledClip:
+    """A clip whose actions are known."""
 
     id: str
     acts: tuple[str, ...]
@@ -32,12 +32,12 @@ class RealClip:
     joints: Callable[[], NDArray[np.float32]]
 
     def expected(self) -> tuple[Expectation, ...] | None:
-        """What the clip shows as expectations; None when there is no check for one of its acts."""
+        """What the clip shows as expectations; None when there is no check for one of its actions."""
         return expectations(self.acts, self.sides)
 
 
 def expectations(acts: Sequence[str], sides: Sequence[str]) -> tuple[Expectation, ...] | None:
-    """Acts and the measured side of each as expectations, in order; None when there is no check for one of them."""
+    """Actions and the measured side of each as expectations, in order; None when there is no check for one of them."""
     out: list[Expectation] = []
     for act, side in zip(acts, sides, strict=True):
         act = _JUDGED_AS.get(act, act)
@@ -90,8 +90,8 @@ def name_of(expected: Iterable[Expectation]) -> str:
     return " then ".join(f"{e.act} {e.side}".strip() for e in expected)
 
 
-def rates(clips: Iterable[RealClip], fps: float) -> Rates:
-    """Judge clips by their own check and, if they show one act, by every other."""
+def rates(clips: Iterable[LabelledClip], fps: float) -> Rates:
+    """Judge clips by their own check and, if they show one action, by every other."""
     shown, passed = Counter[str](), Counter[str]()
     tried, wrong = Counter[tuple[str, str]](), Counter[tuple[str, str]]()
     failures: list[tuple[str, str]] = []

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from marey.data.describe import LOCOMOTION, Facts
 from marey.data.english import conjugate, mentioned_again, possessive, sentence, with_adjective
 from marey.data.grammar import grammar
+from marey.data.human_captions import human_caption, human_sequence
 from marey.data.phrases import details, fields, fill, filled, phrase_of, with_adverb
-from marey.data.told import told_caption, told_sequence
 
 _UNADJECTIVED = ("he", "she", "someone", "somebody")
 LONG_WORDS = (30, 60)
-TOLD_SHARE = 0.5
-APART_SHARE = 0.4  # of the captions of several acts
-APART_WORDS = 18
+HUMAN_SHARE = 0.5
+SEPARATE_SHARE = 0.4  # of the captions of several actions
+SEPARATE_WORDS = 18
 NOUN_SHARE, WHOLE_SHARE, WHO_SHARE, PAIR_SHARE = 0.07, 0.1, 0.15, 0.35
 
 
@@ -65,7 +65,7 @@ def _voice_of(subject: str, rng: random.Random) -> _Voice:
 
 
 def short_caption(facts: Facts, rng: random.Random) -> str:
-    """A few words: the act, and its style as an adverb, an adjective or not at all."""
+    """A few words: the action, and its style as an adverb, an adjective or not at all."""
     style = grammar().styles[facts.style]
     words = grammar().acts[facts.act]
     if verbless := _verbless(facts, rng):
@@ -123,7 +123,7 @@ _AGAIN = ("In other words,", "Seen from outside,", "That is to say,", "To put it
 
 
 def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """Two or three acts in their order, with verbs of each."""
+    """Two or three actions in their order, with verbs of each."""
     g = grammar()
     same = len({facts.style for facts in parts}) == 1
     style = g.styles[parts[0].style]
@@ -135,8 +135,8 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
     return _loosen(f"{_spoken(text, voice)} {after}", rng)
 
 
-def apart_caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """Each act by a caption of its own: whatever people say of one act they say of one of several, too."""
+def separate_caption(parts: Sequence[Facts], rng: random.Random) -> str:
+    """Each action by a caption of its own: whatever people say of one action they say of one of several, too."""
     first, *others = (_act_alone(facts, rng) for facts in parts)
     join = rng.choice(_THEN)
     return _loosen("".join([first, *(join + text for text in others)]), rng)
@@ -145,9 +145,9 @@ def apart_caption(parts: Sequence[Facts], rng: random.Random) -> str:
 def _act_alone(facts: Facts, rng: random.Random) -> str:
     """A caption of one short sentence, without its full stop."""
     for _ in range(20):
-        text = (rng.random() < TOLD_SHARE and told_caption(facts, rng)) or short_caption(facts, rng)
+        text = (rng.random() < HUMAN_SHARE and human_caption(facts, rng)) or short_caption(facts, rng)
         text = text.removesuffix(".")
-        if "." not in text and len(text.split()) <= APART_WORDS:
+        if "." not in text and len(text.split()) <= SEPARATE_WORDS:
             return text if text.startswith("I ") else text[:1].lower() + text[1:]
     return short_caption(facts, rng).removesuffix(".")
 
@@ -156,7 +156,7 @@ _THEN = (", then ", ", and then ", " and then ", ". Then ", ". After that, ", ",
 
 
 def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """The words that two acts have together ("slows to a walk"); None where they have none."""
+    """The words that two actions have together ("slows to a walk"); None where they have none."""
     joins, (first, second) = grammar().joins, parts
     phrases = joins.pairs.get(f"{first.act}-{second.act}", ())
     if first.act == second.act:
@@ -169,7 +169,7 @@ def _pair(parts: Sequence[Facts], rng: random.Random) -> str | None:
 
 
 def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: bool) -> str:
-    """A frame with the phrase of each act in its place."""
+    """A frame with the phrase of each action in its place."""
     g = grammar()
     frames = g.joins.two if len(parts) == 2 else g.joins.three
     if len(parts) == 2 and parts[0].act in LOCOMOTION and parts[1].act not in LOCOMOTION:
@@ -186,7 +186,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random, voice: _Voice, *, same: 
 
 def _spoken(text: str, voice: _Voice) -> str:
     """Put the subject where it belongs, and verbs into its form."""
-    if text.startswith(("after ", "having ", "once ", "when ")):  # the subject stands behind the first act
+    if text.startswith(("after ", "having ", "once ", "when ")):  # the subject stands behind the first action
         return conjugate(text, "gerund" if voice.form == "progressive" else voice.form)
     for opening in ("first ", "initially "):
         if text.startswith(opening) and voice.subject:
@@ -204,8 +204,8 @@ LONG_SHARE = 0.5  # of the captured clips; a long caption is nearly always a new
 
 
 PHRASINGS = {"walk_back": 12, "bow": 8, "walk": 6, "run": 4, "turn": 4}
-"""Captions of a clip of one act that is drawn often and has few clips. With two each, those of 159 clips backward were
-drawn 50 times in an hour of training: known captions were obeyed at 98 %, words by another author at 67 %."""
+"""Captions of a clip of one action that is drawn often and has few clips. With two each, those of 159 clips backward
+were drawn 50 times in an hour of training: known captions were obeyed at 98 %, words by another author at 67 %."""
 
 
 def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
@@ -217,20 +217,20 @@ def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:
     """One caption: by the grammar, or as other people tell it."""
-    if len(parts) > 1 and rng.random() < APART_SHARE:
-        return apart_caption(parts, rng)
-    if rng.random() < TOLD_SHARE:
-        text = told_caption(parts[0], rng) if len(parts) == 1 else told_sequence(parts, rng)
+    if len(parts) > 1 and rng.random() < SEPARATE_SHARE:
+        return separate_caption(parts, rng)
+    if rng.random() < HUMAN_SHARE:
+        text = human_caption(parts[0], rng) if len(parts) == 1 else human_sequence(parts, rng)
         if text is not None:
             return _loosen(text, rng) if text.endswith(".") else text
     return short_caption(parts[0], rng) if len(parts) == 1 else joined_caption(parts, rng)
 
 
 def captions(parts: Sequence[Facts], seed: str, count: int = 3) -> tuple[str, ...]:
-    """Different captions of a clip, all true of it: short ones, and for half the clips of one act a long one.
+    """Different captions of a clip, all true of it: short ones, and for half the clips of one action a long one.
 
     Args:
-        parts: the acts of the clip in order.
+        parts: the actions of the clip in order.
         seed: the clip's id: the same clip has the same captions everywhere.
         count: how many.
     """

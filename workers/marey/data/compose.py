@@ -1,8 +1,8 @@
-"""Which clips are joined: sequences of two and three acts, longer and shorter versions of single ones.
+"""Which clips are joined: sequences of two and three actions, longer and shorter versions of single ones.
 
-Captured takes are 1 to 6 s of one act. Here walks go on, waves last longer or shorter, bows come twice, and acts follow
-each other, so that every act is seen at many lengths up to 9.8 s and graphs with two and three verbs occur in training.
-Everything is drawn by seeds from clips of one split; facts are measured again on what came out.
+Captured takes are 1 to 6 s of one action. Here walks go on, waves last longer or shorter, bows come twice, and actions
+follow each other, so that every action is seen at many lengths up to 9.8 s and graphs with two and three verbs occur in
+training. Everything is drawn by seeds from clips of one split; facts are measured again on what came out.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from marey.data.splice import join_clips
 
 Array = NDArray[np.floating]
 
-# How often an act is drawn for a sequence. Travel and greetings are what prompts ask for; the acts of one or two clips
-# stay rare, or the model would learn those clips by heart.
+# How often an action is drawn for a sequence. Travel and greetings are what prompts ask for; the actions of one or two
+# clips stay rare, or the model would learn those clips by heart.
 SEQUENCE_WEIGHTS: dict[str, float] = {
     "walk": 3.0,
     "run": 2.0,
@@ -51,7 +51,7 @@ OTHER_SIDE_SHARE = 0.15  # how often one of these is followed by itself with ano
 REVERSALS = {"walk": "walk_back", "walk_back": "walk", "run": "walk"}
 REVERSAL_SHARE = 0.2
 # Gestures at lengths at which they were not captured (raises take 1 to 5 s, waves 5 to 8): without them a
-# model takes the length for the act, and a raise of 6 s becomes a wave. Frames.
+# model takes the length for the action, and a raise of 6 s becomes a wave. Frames.
 SLOW_RAISES = range(100, LIMIT + 1)
 QUICK_WAVES = range(36, 91)
 LONG_TURNS = range(140, LIMIT + 1)
@@ -90,8 +90,8 @@ class Composed:
     Attributes:
         parts: the clips it was made of, in order.
         joints: (T, 22, 3).
-        facts: one an act.
-        seams: first frame of each act but the first.
+        facts: one an action.
+        seams: first frame of each action but the first.
     """
 
     name: str
@@ -114,7 +114,7 @@ class Composer:
         self.acts = sorted(self.by_act)
 
     def sequence(self, name: str, count: int) -> Composed | None:
-        """Two or three different acts, or None when what was drawn does not fit."""
+        """Two or three different actions, or None when what was drawn does not fit."""
         rng = seeded("sequence", name)
         acts = self._draw_acts(rng, count)
         same_style = rng.random() < 0.75
@@ -174,7 +174,7 @@ class Composer:
                 best, least = (part, i, j), cost
         return best
 
-    # -- one act, another length ------------------------------------------------------------------------------------
+    # -- one action, another length ------------------------------------------------------------------------------------
 
     def gesture(self, name: str, act: str, lengths: range) -> Composed | None:
         """A gesture of one of these lengths, done once."""
@@ -185,7 +185,7 @@ class Composer:
         return self._measured_again(name, part, stretch(part, rng.choice(lengths), rng, repeat_share=0))
 
     def retimed(self, name: str) -> Composed | None:
-        """One act, longer or shorter than it was captured."""
+        """One action, longer or shorter than it was captured."""
         rng = seeded("retimed", name)
         weights = [len(self.by_act[a]) ** 0.25 * (0.4 if a in ("dash", "walk_diagonal") else 1.0) for a in self.acts]
         act = rng.choices(self.acts, weights)[0]
@@ -229,7 +229,7 @@ class Composer:
 
 
 def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
-    """Whether the act can still be told from others: a hand held by loops must not seem to wave, a loop not bend the
+    """Whether the action can still be told from others: a hand held by loops must not seem to wave, a loop not bend the
     way."""
     act = "run" if facts.act == "dash" else facts.act
     if repeats > 1 or act not in get_args(Act):
@@ -265,7 +265,7 @@ def _leave_range(part: Part, start: int, rng: random.Random, budget: int) -> ran
 
 
 def with_brief_waves(parts: Sequence[Part]) -> list[Part]:
-    """The same clips with waves cut short: two acts fit into 9.8 s where a captured wave takes 5 to 8 of them."""
+    """The same clips with waves cut short: two actions fit into 9.8 s where a captured wave takes 5 to 8 of them."""
     out: list[Part] = []
     for part in parts:
         if part.facts.act != "wave":
@@ -289,7 +289,7 @@ def _measured(part: Part, joints: Array) -> Facts | None:
 
 
 def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> Composed | None:
-    """Measure each act again in its stretch of the result."""
+    """Measure each action again in its stretch of the result."""
     if len(joints) > LIMIT:
         return None
     facts = []

@@ -1,4 +1,4 @@
-"""Where a captured clip may be cut: outside the core of its act, and where a seam costs least."""
+"""Where a captured clip may be cut: outside the core of its action, and where a seam costs least."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ARMS = {"left": (0,), "right": (1,), "both": (0, 1)}
 
 
 def core(part: Part) -> tuple[int, int]:
-    """First and last frame between which the act is done; a clip may be cut before and after, not within.
+    """First and last frame between which the action is done; a clip may be cut before and after, not within.
 
     Travel has none: it may be cut anywhere (0, 0).
     """

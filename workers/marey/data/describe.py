@@ -13,7 +13,7 @@ from marey.checks.strikes import is_lively, kicks, punches, slashes
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
 
-# content label -> act; the side is always measured
+# content label -> action; the side is always measured
 ACTS: dict[str, str] = {
     "1/walk": "walk",
     "2/walk": "walk",
@@ -54,11 +54,11 @@ class Facts:
     """A clip in words and numbers.
 
     Attributes:
-        act: key of the caption grammar.
+        action: key of the caption grammar.
         style: key of the caption grammar; `normal` where there is none.
         side: left, right, both, or empty.
         gait, hands, lean: what was measured; lean is the deepest forward lean over the standing one, degrees.
-        repeats: how often the act is done (a spliced loop of raises, for instance).
+        repeats: how often the action is done (a spliced loop of raises, for instance).
         text: a caption of the source's own, where it has one.
     """
 

@@ -21,13 +21,13 @@ class Style:
 
 @dataclass(frozen=True)
 class Words:
-    """How an act is said.
+    """How an action is said.
 
     Attributes:
         phrases: verb phrases.
         nouns: without a verb ("a wave of the left hand").
         whole: sentences whose subject is the limb ("the left hand goes up").
-        who: subjects that go with the act ("a runner").
+        who: subjects that go with the action ("a runner").
         manners: verb phrases that say a style as well, by style ("trudges").
     """
 
@@ -40,13 +40,13 @@ class Words:
 
 @dataclass(frozen=True)
 class Joins:
-    """How acts follow each other.
+    """How actions follow each other.
 
     Attributes:
-        two, three: frames for any acts.
-        halt: frames for an act in place after travel.
-        same: by act, for two sides of one act.
-        pairs: by `first-second`, for two acts that have words of their own together.
+        two, three: frames for any actions.
+        halt: frames for an action in place after travel.
+        same: by action, for two sides of one action.
+        pairs: by `first-second`, for two actions that have words of their own together.
     """
 
     two: tuple[str, ...]
@@ -58,7 +58,7 @@ class Joins:
 
 @dataclass(frozen=True)
 class Detail:
-    """How a measured detail is said: behind the act, or as a sentence."""
+    """How a measured detail is said: behind the action, or as a sentence."""
 
     clause: tuple[str, ...]
     sentence: tuple[str, ...]

@@ -17,12 +17,12 @@ class Summary(BaseModel):
     Attributes:
         splits: clips by split.
         hours: of all clips, mirrored and spliced ones included.
-        kinds: captured, mirrored, looped (another length of one act), spliced (several acts).
-        acts: captured and mirrored clips by act and side, then by split.
-        sequences: spliced clips by their acts, the most frequent ones.
+        kinds: captured, mirrored, looped (another length of one action), spliced (several actions).
+        actions: captured and mirrored clips by action and side, then by split.
+        sequences: spliced clips by their actions, the most frequent ones.
         styles: captured and mirrored clips by style, then by split.
         lengths: clips by whole seconds, by split.
-        captions: different captions, and examples by act.
+        captions: different captions, and examples by action.
         left_out: reasons with the number of clips left out for each.
         megabytes: of each file.
     """
@@ -64,7 +64,7 @@ def summarize(data: PreparedData) -> Summary:
 
 
 def act_of(clip: Clip) -> str:
-    """First act with its side, such as `wave left`."""
+    """First action with its side, such as `wave left`."""
     return f"{clip.acts[0]} {clip.sides[0] if clip.sides else ''}".strip()
 
 

@@ -81,9 +81,9 @@ class Clip(BaseModel):
     """One line of `clips.jsonl`.
 
     `content` and `style` are those of the archive, with sides exchanged in mirrored clips; a spliced clip has those of
-    its first part. `acts` are the acts in order, as the caption grammar calls them, `sides` the measured side of each:
-    left, right, both, or empty. Where several acts were joined, `seams` are the first frames of all but
-    the first act, and `act_captions` say each act alone.
+    its first part. `acts` are the actions in order, as the caption grammar calls them, `sides` the measured side of
+    each: left, right, both, or empty. Where several actions were joined, `seams` are the first frames of all but the
+    first action, and `act_captions` say each action alone.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

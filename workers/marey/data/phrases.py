@@ -1,4 +1,5 @@
-"""What may be said of one act: a phrase whose field was not measured, or whose condition does not hold, is not used."""
+"""What may be said of one action: a phrase whose field was not measured, or whose condition does not hold, is not
+used."""
 
 from __future__ import annotations
 
@@ -135,7 +136,7 @@ def filled_if_any(phrases: Sequence[str], values: dict[str, str], rng: random.Ra
 
 
 def phrase_of(facts: Facts, rng: random.Random, pronoun: str) -> str:
-    """A verb phrase of the act, filled; verbs in angle brackets. After a pace it ends in `and` (`with_adverb`)."""
+    """A verb phrase of the action, filled; verbs in angle brackets. After a pace it ends in `and` (`with_adverb`)."""
     words = grammar().acts[facts.act]
     manners = words.manners.get(facts.style, ())
     values = fields(facts, rng, pronoun)

@@ -189,7 +189,7 @@ def _read_clips(path: Path) -> Iterable[Clip]:
 
 
 def _check_clips(clips: tuple[Clip, ...], manifest: Manifest, path: Path) -> None:
-    """Each clip lies within the arrays, behind the one before it, and so do its acts."""
+    """Each clip lies within the arrays, behind the one before it, and so do its actions."""
     if len(clips) != manifest.clips:
         raise InvalidFile(f"holds {len(clips)} clips, the manifest says {manifest.clips}", where=str(path))
     frame, row = 0, 0

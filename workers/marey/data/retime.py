@@ -1,4 +1,4 @@
-"""One act, longer or shorter than it was captured."""
+"""One action, longer or shorter than it was captured."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LIMIT = MAX_FRAMES + 1  # poses
 _LEAST_STEPS = 15
 _WORST_STEP = WORST_SEAM / 4
 Made = tuple[Array, tuple[Part, ...], int]
-"""Joints (T, 22, 3), the clips they are from, and how often the act is done."""
+"""Joints (T, 22, 3), the clips they are from, and how often the action is done."""
 
 
 def crop(part: Part, target: int, rng: random.Random) -> Made:

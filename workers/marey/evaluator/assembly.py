@@ -1,4 +1,4 @@
-"""From the trained part of a run to a bundle."""
+"""Assemble an evaluator bundle from the trained part of a run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marey.evaluator.bundle import load_networks, write_bundle
 from marey.evaluator.card import card_of
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.model import TMR, MotionEncoder
-from marey.evaluator.reference import SPLITS, Reference, ReferenceClip, ReferenceSplit
+from marey.evaluator.reference import SPLITS, RealClips, ReferenceClip, ReferenceSplit
 from marey.evaluator.sentences import open_encoder, spec_of
 from marey.evaluator.tmr import embed_motions
 from marey.training.assembly import gather
@@ -67,8 +67,8 @@ def assemble(
 
 
 def renew_reference(bundle: Bundle, prepared: Path, output: Path, *, overwrite: bool = False) -> Bundle:
-    """Write a bundle's networks again with a reference of these data: your own test clips, or what newer versions
-    measure on the old ones. It is another exact bundle, and its numbers are compared with its own alone.
+    """Write a bundle's networks again with the reference of these data: your own test clips, or new measurements of the
+    old ones. The result is another exact bundle, and its numbers compare with its own alone.
 
     The card is written anew; metrics stay those of the training.
 
@@ -105,8 +105,8 @@ def _as_stored(state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     }
 
 
-def reference_of(data: PreparedData, motion: MotionEncoder, config: EvaluatorConfig) -> Reference:
-    """What a bundle with these networks keeps of the captioned clips of prepared data.
+def reference_of(data: PreparedData, motion: MotionEncoder, config: EvaluatorConfig) -> RealClips:
+    """The reference that a bundle with these networks stores for the captioned clips of prepared data.
 
     Joints are decoded from the features, as those of generated motions are.
     """
@@ -122,4 +122,4 @@ def reference_of(data: PreparedData, motion: MotionEncoder, config: EvaluatorCon
                 for clip, each in zip(clips, joints, strict=True)
             ]
             splits[name] = ReferenceSplit.of(rows, embed_motions(motion, features))
-    return Reference(splits)
+    return RealClips(splits)

@@ -14,7 +14,7 @@ from marey.bundles import Bundle, BundleWriter, TextSpec
 from marey.evaluator.config import EvaluatorConfig
 from marey.evaluator.model import MotionEncoder, SentenceEncoder
 from marey.evaluator.networks import KIND, open_networks
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 from marey.motion.features import layout
 from marey.nn.bundling import NOT_STORED
 
@@ -36,7 +36,7 @@ def write_bundle(
     config: EvaluatorConfig,
     parts: Mapping[str, Mapping[str, Tensor]],
     statistics: Statistics,
-    reference: Reference,
+    reference: RealClips,
     *,
     text: TextSpec,
     card: str,

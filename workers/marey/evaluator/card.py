@@ -1,4 +1,4 @@
-"""The model card of a TMR-style evaluator, written from what the manifest says."""
+"""Model card of a TMR-style evaluator, generated from the manifest."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from marey.bundles import TextSpec
 from marey.evaluator.config import EvaluatorConfig
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 
 TEXT = """# {name}: motions and captions in one space, to evaluate text-to-motion models
 
@@ -53,7 +53,7 @@ evaluate. Neither joints nor features of captured motion are in here.
 
 
 def card_of(
-    name: str, config: EvaluatorConfig, text: TextSpec, manifest: Mapping[str, Any], reference: Reference
+    name: str, config: EvaluatorConfig, text: TextSpec, manifest: Mapping[str, Any], reference: RealClips
 ) -> str:
     """The card.
 

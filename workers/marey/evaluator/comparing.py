@@ -1,4 +1,4 @@
-"""Two evaluations of the same prompts, as a report tells it: what changed, and what is an alarm.
+"""Compare two evaluations of the same prompts: changes and alarms.
 
 Alarms go by prompt checks and R-precision (`marey.measures.comparing`); a distance of distributions raises none.
 """
@@ -21,7 +21,7 @@ class Earlier:
 
 
 def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tuple[Change, ...]:
-    """What became of each metric that can be paired.
+    """Changes of all metrics that can be paired.
 
     Raises:
         InvalidInput: the runs have no motions in common.
@@ -43,5 +43,5 @@ def changes(earlier: Earlier, scores: Sequence[MotionScore], *, seed: int) -> tu
 
 
 def alarms(found: Sequence[Change], metrics: Mapping[str, Metric]) -> tuple[str, ...]:
-    """A sentence for each change for the worse."""
+    """One sentence for each regression."""
     return tuple(sentence_of(change, metrics[change.metric]) for change in found if change.verdict == "worse")

@@ -1,4 +1,4 @@
-"""The work of the queue `evaluator`: one item, one evaluation, from its motions to its report."""
+"""Handler of the queue `evaluator`: an item is one evaluation, from its motions to its report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from marey.evaluator.loading import load_evaluator
 from marey.evaluator.measuring import check_measured, measure
 from marey.evaluator.port import Evaluator
 from marey.evaluator.reconstruction import find_reconstruction
-from marey.evaluator.reference import Reference
+from marey.evaluator.reference import RealClips
 from marey.evaluator.report import headline, to_html, to_json, to_markdown
 from marey.evaluator.reporting import report_of, summary_of
 from marey.jobs import EVALUATOR_QUEUE, ClaimedItem
@@ -24,7 +24,7 @@ from marey.runtime.scoring import ScoreInput
 class _Loaded:
     bundle: Bundle
     evaluator: Evaluator
-    real: Reference
+    real: RealClips
 
 
 class EvaluatorHandler:
@@ -34,19 +34,19 @@ class EvaluatorHandler:
     batch_size = 1
 
     def __init__(self, device: str) -> None:
-        """Nothing is loaded yet; `device` as in the settings."""
+        """Create a handler without a loaded bundle; `device` as in the settings."""
         self._device = device
         self._loaded: _Loaded | None = None
 
     def load(self, bundle: str) -> None:
-        """Load an evaluator with the real clips that it knows.
+        """Load an evaluator with the real clips of its reference.
 
         Raises:
             NotFound, InvalidBundle, Refused: see `find_bundle`.
             InvalidInput: there is no such device.
         """
         found = find_bundle(bundle)
-        self._loaded = _Loaded(found, load_evaluator(found, device=self._device), Reference.of(found))
+        self._loaded = _Loaded(found, load_evaluator(found, device=self._device), RealClips.of(found))
 
     def buckets(self, batch: Batch) -> Sequence[Sequence[ClaimedItem]]:
         """One item at a time."""
@@ -73,7 +73,7 @@ def _scored(item: ClaimedItem, source: ScoreInput, loaded: _Loaded, control: Bat
     reconstruction = find_reconstruction(loaded.bundle, source.request.bundle)
     made = len(measured.motions)
     report = report_of(
-        source, measured, loaded.evaluator, loaded.real, reconstruction, beat=lambda: control.progress(made, made)
+        source, measured, loaded.evaluator, loaded.real, reconstruction, progress=lambda: control.progress(made, made)
     )
     files = (
         ExportedFile("html", to_html(report), "text/html; charset=utf-8"),
@@ -84,5 +84,5 @@ def _scored(item: ClaimedItem, source: ScoreInput, loaded: _Loaded, control: Bat
 
 
 def create_handler() -> Handler:
-    """The handler of this process's settings."""
+    """Create the handler from this process's settings."""
     return EvaluatorHandler(settings().device)

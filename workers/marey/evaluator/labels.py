@@ -1,11 +1,11 @@
-"""What a clip is called: two clips of one label are right answers to each other's captions.
+"""Labels of clips: clips with equal labels are correct answers to each other's captions.
 
-A label is what captions can tell apart: the acts in order, the measured side of each, and the style by the name that
-the captions use. It is not the archive's content label: that names the data set ("1/walk", "2/walk"), one act twice
+A label holds what captions distinguish: the actions in order, the measured side of each, and the style by the name that
+the captions use. It is not the archive's content label: that names the data set ("1/walk", "2/walk"), one action twice
 ("bye", "wave-right-hand"), and a side that the motion may contradict, none of which a caption says. Numbers that some
-captions give (steps, metres, degrees) make no label, nor do the styles of later acts, which the clips do not carry:
+captions give (steps, metres, degrees) make no label, nor do the styles of later actions, which the clips do not carry:
 there labels are coarser than the finest captions, so that no true answer counts as a wrong one. They are finer than
-the captions that leave the style out, one in seven of those of one act, a third of the sequences': an answer in
+the captions that leave the style out, one in seven of those of one action, a third of the sequences': an answer in
 another style counts as wrong there.
 """
 
@@ -20,7 +20,7 @@ from marey.data.describe import STYLE_NAMES
 from marey.data.manifest import Clip
 
 FREE_TEXT = "cmu"
-"""Act of clips whose captions are their source's own words: their content is what tells them apart."""
+"""Action of clips with free-text captions: their content distinguishes them."""
 
 
 def label_of(clip: Clip) -> str:

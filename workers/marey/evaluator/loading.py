@@ -1,4 +1,4 @@
-"""The evaluator of a bundle, whichever network it is."""
+"""Load an evaluator of any kind from its bundle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motions of an evaluation, each measured by itself: what the checker says, how it moves, where it is embedded.
+"""Measure each motion of an evaluation: the checker's verdict, quality, and embedding.
 
 Two rows stand beside each other. `raw` are the features as the network generated them; `exported` are features encoded
 again from the joints of the npz, after rotations were solved and feet locked: what users get.
@@ -18,7 +18,7 @@ from marey.checks.judge import Act, Expectation, Side, Verdict, judge
 from marey.checks.quality import Quality, quality
 from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.evaluations import MAX_MISSING, MadeItem
-from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
+from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
 from marey.items.expected import read_expected
 from marey.motion.clip import MotionClip, parse_npz
 from marey.motion.features import FeatureLayout, layout
@@ -31,20 +31,20 @@ TOGETHER = 64
 
 @dataclass(frozen=True)
 class Checked:
-    """What the joints of a motion say; `verdict` is None where nothing is expected of it."""
+    """Measurements on the joints of a motion; `verdict` is None if nothing is expected of it."""
 
     verdict: Verdict | None
     quality: Quality
 
     @property
     def obeyed(self) -> bool | None:
-        """Whether it does what is expected."""
+        """Return True if the motion does what is expected; None if nothing is expected."""
         return None if self.verdict is None else self.verdict.passed
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One motion and what was found on it, as the network made it and as users get it."""
+    """One motion and its measurements, as generated and as exported."""
 
     item: MadeItem
     raw: Checked
@@ -53,7 +53,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Broken:
-    """A motion that was made, but that nothing can be measured on."""
+    """A generated motion that cannot be measured."""
 
     item: MadeItem
     reason: str
@@ -135,7 +135,7 @@ def measure(
 
 
 def check_measured(measured: Measured, asked: int) -> None:
-    """Refuse to report where too many motions are missing: the numbers would be those of another set.
+    """Refuse a report if too many motions are missing: its numbers would describe another set.
 
     Args:
         measured: what could be measured, and what was made but could not.
@@ -155,7 +155,7 @@ def check_measured(measured: Measured, asked: int) -> None:
 
 
 def check(joints: NDArray[np.floating], fps: float, expected: str | None) -> Checked:
-    """Measure a motion (T, 22, 3) in metres, and judge it by what is expected (`marey.items.expected`)."""
+    """Measure a motion (T, 22, 3) in metres and judge it by the expectation (`marey.items.expected`)."""
     verdict = None
     if expected is not None:
         acts = read_expected(expected)
@@ -191,14 +191,14 @@ def _read(
     return clip if clip.fps == space.fps else resample(clip, space.fps)
 
 
-def embed_prompts(prompts: Sequence[str], evaluator: Evaluator, beat: Beat = unheard) -> Embeddings:
-    """(N, E); a prompt that stands there several times is read once."""
+def embed_prompts(prompts: Sequence[str], evaluator: Evaluator, progress: ProgressCallback = no_progress) -> Embeddings:
+    """Embeddings (N, E) of prompts; equal prompts are embedded once."""
     distinct = list(dict.fromkeys(prompts))
     rows = {prompt: row for row, prompt in enumerate(distinct)}
     found = [np.zeros((0, evaluator.width), np.float32)]
     for some in _chunks(distinct, TOGETHER):
         found.append(evaluator.embed_text(some))
-        beat()
+        progress()
     return np.concatenate(found)[[rows[prompt] for prompt in prompts]]
 
 

@@ -6,7 +6,7 @@
 Both encoders are ACTOR's (Petrovich et al. 2021): a transformer over two learned tokens and the sequence, whose first
 two outputs are mean and log-variance. The appendix appends the two tokens, TMR puts them in front; attention does not
 care. Mean vectors are the embeddings. Weights start as torch's layers do, as TMR's: at the 0.02 of the generators the
-learned tokens hear so little of the sequence that all embeddings begin alike.
+learned tokens attend so little to the sequence that all embeddings begin alike.
 
 Shapes: B batch, T frames, n motion tokens, S text tokens, D features, I those that are read, W text width, E latent
 width.
@@ -66,7 +66,7 @@ class DistributionEncoder(nn.Module):
 
     def pack(self) -> None:
         """Pack the matrices for inference on a CPU: what stands beside a row then changes none of its bits."""
-        self.transformer.lower(torch.float32)
+        self.transformer.prepare_inference(torch.float32)
         pack_linears(self)
 
     def _outputs(self, x: Tensor, valid: Tensor, rows: int) -> Tensor:

@@ -1,4 +1,4 @@
-"""An evaluator's two networks out of its bundle: what every kind of evaluator does alike."""
+"""Load the two networks of an evaluator bundle; shared by all kinds of evaluators."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ T = TypeVar("T", bound=nn.Module)
 
 
 class Loaded(Generic[C, M, T]):
-    """What `Evaluator` says of a bundle, with its two encoders where they run."""
+    """The parts of `Evaluator` that a bundle determines, with its two encoders on their device."""
 
     def __init__(self, bundle: Bundle, config: C, motion: M, text: T, device: torch.device) -> None:
         """Move the encoders to the device."""

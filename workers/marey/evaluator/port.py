@@ -1,6 +1,6 @@
-"""What every evaluator does: motions and sentences into one space, where near means alike.
+"""Port of evaluators: motions and sentences embedded in one space where matches are near.
 
-Two adapters stand behind it: `marey.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `marey.evaluator.t2m` (the
+There are two adapters: `marey.evaluator.tmr` (ours, after SnapMoGen App. B.2) and `marey.evaluator.t2m` (the
 public network of Guo et al. 2022). Both take what people have, strings and raw features: which text encoder or word
 vectors read the strings, and which mean and deviation normalise the features, is part of the evaluator. The statistics
 of the model that generated the motion are never the right ones.
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from marey.core.errors import InvalidInput
 from marey.evaluator.metrics.retrieval import Distance
 
-Beat = Callable[[], None]
-"""Called now and then by what takes long: whoever waits hears that it goes on."""
+ProgressCallback = Callable[[], None]
+"""Called regularly during long work, so that the caller can report progress."""
 
 Motion = NDArray[np.float32]
 Embeddings = NDArray[np.float32]
@@ -49,7 +49,7 @@ class Evaluator(Protocol):
 
     @property
     def distance(self) -> Distance:
-        """What "near" means in its space; retrieval by the other one is not this evaluator's."""
+        """The distance of its space; retrieval by another one is not this evaluator's."""
         ...
 
     def embed_motion(self, motions: Sequence[Motion]) -> Embeddings:
@@ -82,8 +82,8 @@ class Evaluator(Protocol):
         ...
 
 
-def unheard() -> None:
-    """The `Beat` of those for whom nobody waits."""
+def no_progress() -> None:
+    """Do nothing: the default `ProgressCallback`."""
 
 
 def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest: int) -> None:

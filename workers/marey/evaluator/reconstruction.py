@@ -1,6 +1,6 @@
-"""Real clips through a generator's tokenizer alone: the row that says what the transformers behind it start from.
+"""Reconstruction of real clips by a generator's tokenizer: the upper bound for the transformers behind it.
 
-Whoever evaluates has no captured motion. So this is measured where the prepared data are and kept beside the
+An evaluating server has no captured motion, so this is measured where the prepared data are and kept beside the
 evaluator's bundle, in `reconstructions/{exact generator}.json`: outside the bundle's own hash, which is older than the
 generators that it judges, and bound to both by their exact references.
 """
@@ -27,9 +27,9 @@ from marey.evaluations import BUNDLE_SOURCES
 from marey.evaluator.heat import heat_of, style_of
 from marey.evaluator.measuring import Checked, check
 from marey.evaluator.port import Embeddings, Evaluator
-from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import HeatCell, Value
-from marey.evaluator.rows import Ruler, real_side
+from marey.evaluator.rows import Ruler, real_set
 from marey.motion.features import FeatureLayout, layout
 from marey.nn.motion_tokenizer import MotionTokenizer
 
@@ -43,7 +43,7 @@ Features = NDArray[np.float32]
 
 
 class Reconstruction(BaseModel):
-    """What a tokenizer makes of the real clips of an evaluator's reference."""
+    """Metrics of the real clips of an evaluator's reference after a tokenizer's encoding and decoding."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -58,7 +58,7 @@ class Reconstruction(BaseModel):
     """The row by source and metric."""
 
     def note(self, source: str) -> str:
-        """What the row is, in a few words."""
+        """Describe the row in a few words."""
         return f"{self.clips[source]} real clips through the tokenizer, {self.error_mm[source]:.1f} mm off"
 
     def save(self, evaluator: Bundle) -> Path:
@@ -70,7 +70,7 @@ class Reconstruction(BaseModel):
 
 
 def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | None:
-    """What was measured of an exact generator by this exact evaluator; None = nothing.
+    """The reconstruction of an exact generator measured by this exact evaluator; None if there is none.
 
     Raises:
         InvalidFile: it is damaged, or was measured by another evaluator.
@@ -93,7 +93,7 @@ def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | N
 
 @dataclass(frozen=True)
 class Rebuilt:
-    """A reconstruction, and its prompt checks by act and style, which are for a report of its own."""
+    """A reconstruction with its prompt checks by action and style, for a report of its own."""
 
     reconstruction: Reconstruction
     heat: tuple[HeatCell, ...]
@@ -101,7 +101,7 @@ class Rebuilt:
 
 def reconstruct(
     data: PreparedData,
-    real: Reference,
+    real: RealClips,
     evaluator: Evaluator,
     generator: str,
     tokenizer: MotionTokenizer,
@@ -147,8 +147,8 @@ def reconstruct(
         error_mm={source: round(float(1000 * errors[at].mean()), 3) for source, at in rows.items()},
         values=found,
     )
-    told = zip(whole.clips, checked, strict=True)
-    heat = heat_of((expected_of(c.acts, c.sides), style_of(c.label), each.obeyed) for c, each in told)
+    pairs = zip(whole.clips, checked, strict=True)
+    heat = heat_of((expected_of(c.acts, c.sides), style_of(c.label), each.obeyed) for c, each in pairs)
     return Rebuilt(reconstruction, heat)
 
 
@@ -165,9 +165,9 @@ def rebuilt(tokenizer: MotionTokenizer, clips: Sequence[Features]) -> list[Featu
 
 def _measured(ruler: Ruler, motion: Embeddings, checked: Sequence[Checked]) -> dict[str, Value]:
     split = ruler.real.joined(ruler.splits)
-    side = real_side(split, motion, ruler)
+    embeddings = real_set(split, motion, ruler)
     found = [(each.obeyed, each.quality) for each in checked]
-    return ruler.values(side, found, np.arange(len(found)), distances=True)
+    return ruler.values(embeddings, found, np.arange(len(found)), distances=True)
 
 
 def _features(data: PreparedData, split: ReferenceSplit, rate: int, evaluator: Evaluator) -> list[Features]:
@@ -193,7 +193,7 @@ def _features(data: PreparedData, split: ReferenceSplit, rate: int, evaluator: E
 def _joints(
     space: FeatureLayout, split: ReferenceSplit, truth: Sequence[Features], made: Sequence[Features]
 ) -> tuple[list[Checked], NDArray[np.float64]]:
-    """What the joints of each clip say, and how far they are off, in metres."""
+    """Measurements on the joints of each clip, and the joint error in metres."""
     checked: list[Checked] = []
     errors: list[float] = []
     for clip, before, after in zip(split.clips, truth, made, strict=True):
@@ -204,8 +204,8 @@ def _joints(
     return checked, np.array(errors)
 
 
-def _rows(real: Reference, sources: Mapping[str, Sequence[str]]) -> dict[str, NDArray[np.int64]]:
-    """Of each source the rows of its clips among those of all splits, joined in the order of the sources."""
+def _rows(real: RealClips, sources: Mapping[str, Sequence[str]]) -> dict[str, NDArray[np.int64]]:
+    """Rows of each source's clips among those of all splits, joined in the order of the sources."""
     at, first = {}, 0
     for name in (name for name in sources if name in real.splits):
         count = len(real.split(name).clips)

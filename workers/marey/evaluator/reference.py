@@ -1,6 +1,6 @@
-"""What an evaluator's bundle knows of real clips, so that a server without capture data can evaluate: captions to
-generate from, the label and length of each, the embedding of the motion that was captured, and what its joints say: the
-checker's verdict and its quality. Neither joints nor features."""
+"""The reference of an evaluator's bundle, so that a server without capture data can evaluate: captions to generate
+from, and label, length, motion embedding, verdict and quality of each real clip. It holds neither joints nor
+features."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from marey.evaluator.labels import label_ids, label_of
 from marey.evaluator.measuring import check
 
 SPLITS = ("val", "test", "compositional")
-"""`test` judges; `val` is to choose by; `compositional` are pairs of act and style that training never saw."""
+"""`test` is for evaluation, `val` for model selection; `compositional` has pairs of action and style unseen in
+training."""
 
 
 class ReferenceClip(BaseModel):
@@ -33,19 +34,19 @@ class ReferenceClip(BaseModel):
     """See `marey.evaluator.labels`."""
     acts: tuple[str, ...]
     sides: tuple[str, ...]
-    """Of each act; what the kinematic checks of prompts expect."""
+    """Side of each action, as the kinematic checks expect it."""
     frames: int
     captured: bool
     """Neither a mirror image nor looped or spliced."""
     captions: tuple[str, ...]
     obeyed: bool | None = None
-    """Whether the checker sees in the clip what its captions ask for; None = it checks no such act."""
+    """The checker's verdict on the captions' actions; None = it checks no such action."""
     quality: Quality | None = None
     """None in bundles that were made before it was measured."""
 
     @classmethod
     def of(cls, clip: Clip, joints: NDArray[np.float32], fps: float, max_frames: int) -> ReferenceClip:
-        """What is kept of a prepared clip whose joints are (T, J, 3)."""
+        """The stored facts of a prepared clip whose joints are (T, J, 3)."""
         sides = clip.sides or ("",) * len(clip.acts)
         checked = check(joints, fps, expected_of(clip.acts, sides))
         return cls(
@@ -86,8 +87,8 @@ class ReferenceSplit:
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """Real clips by split."""
+class RealClips:
+    """The real clips of an evaluator's reference, by split."""
 
     splits: Mapping[str, ReferenceSplit]
 
@@ -102,7 +103,7 @@ class Reference:
         return self.splits[name]
 
     def joined(self, names: Sequence[str]) -> ReferenceSplit:
-        """Several splits as one, in this order.
+        """Several splits as one, in the given order.
 
         Raises:
             NotFound: see `split`.
@@ -115,7 +116,7 @@ class Reference:
         )
 
     def add_to(self, writer: BundleWriter) -> None:
-        """Put it into a bundle that is being written."""
+        """Add the reference to a bundle that is being written."""
         rows = {name: list(split.clips) for name, split in self.splits.items()}
         writer.add_json(
             FILE, {name: [c.model_dump(mode="json", exclude_none=True) for c in clips] for name, clips in rows.items()}
@@ -123,7 +124,7 @@ class Reference:
         writer.add_part(PART, {name: split.motion for name, split in self.splits.items()})
 
     @classmethod
-    def of(cls, bundle: Bundle) -> Reference:
+    def of(cls, bundle: Bundle) -> RealClips:
         """The reference of an evaluator's bundle.
 
         Raises:

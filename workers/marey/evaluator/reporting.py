@@ -1,4 +1,4 @@
-"""A measured evaluation told as a `Report`: rows beside real motion, what changed, where it fails, how to repeat it."""
+"""Build the `Report` of a measured evaluation."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from marey.evaluations import TEST_SPLIT, EarlierRun
 from marey.evaluator.comparing import Earlier, alarms, changes
 from marey.evaluator.heat import heat_of, style_of
 from marey.evaluator.measuring import Measured, Motion
-from marey.evaluator.port import Beat, Evaluator, unheard
+from marey.evaluator.port import Evaluator, ProgressCallback, no_progress
 from marey.evaluator.reconstruction import Reconstruction
-from marey.evaluator.reference import Reference as RealClips
+from marey.evaluator.reference import RealClips
 from marey.evaluator.report import (
+    ArtifactReference,
     Baseline,
     Exhibit,
     HeatCell,
     Metric,
     MotionScore,
-    Reference,
     Repeats,
     Report,
     Row,
@@ -33,8 +33,8 @@ from marey.evaluator.report import (
     from_json,
 )
 from marey.evaluator.report.model import MOST_EXHIBITS, Against
-from marey.evaluator.rows import Ruler, generated_rows, reconstruction_row, sides_of, truth_row
-from marey.evaluator.scoring import REPEATS, Side, metrics_of, retrieved
+from marey.evaluator.rows import Ruler, embedded_sets, generated_rows, reconstruction_row, truth_row
+from marey.evaluator.scoring import REPEATS, EmbeddedSet, metrics_of, retrieved
 from marey.measures.comparing import OBEYED, RETRIEVED
 from marey.motion.clip import parse_npz
 from marey.runtime.scoring import ScoreInput
@@ -50,9 +50,9 @@ def report_of(
     real: RealClips,
     reconstruction: Reconstruction | None = None,
     *,
-    beat: Beat = unheard,
+    progress: ProgressCallback = no_progress,
 ) -> Report:
-    """The report of an evaluation.
+    """Build the report of an evaluation.
 
     Args:
         source: what was asked for, and the runs to compare with.
@@ -61,7 +61,7 @@ def report_of(
         real: the clips that the evaluator's bundle knows. Those that the prompts describe are the ground truth; of own
             prompts, the split `test`.
         reconstruction: what was measured of the generator's tokenizer.
-        beat: heard while it is measured, which takes minutes for many motions.
+        progress: called while it is measured, which takes minutes for many motions.
 
     Raises:
         InvalidInput: a run to compare with is of other prompts.
@@ -69,11 +69,11 @@ def report_of(
         Unreachable: the store does not answer.
     """
     seed = source.request.seed
-    ruler = Ruler(evaluator, real, source.request.splits or (TEST_SPLIT,), seed, beat)
+    ruler = Ruler(evaluator, real, source.request.splits or (TEST_SPLIT,), seed, progress)
     metrics = metrics_of(evaluator, ruler.splits)
-    sides = sides_of(measured, _labels(source, measured, real), beat)
-    raw, exported = generated_rows(measured, sides, ruler)
-    scores = _scores(measured, sides[1], evaluator, seed)
+    sets = embedded_sets(measured, _labels(source, measured, real), progress)
+    raw, exported = generated_rows(measured, sets, ruler)
+    scores = _scores(measured, sets[1], evaluator, seed)
     earlier = _earlier(source)
     found = tuple(change for run in earlier for change in changes(run, scores, seed=seed))
     why = alarms(found, {metric.key: metric for metric in metrics})
@@ -86,7 +86,7 @@ def report_of(
         generator=bundle_of(source.request.bundle),
         licence=next((motion.item.licence or "" for motion in measured.motions), ""),
         evaluator=bundle_of(evaluator.name),
-        source=Reference(source.request.source, source.prompts),
+        source=ArtifactReference(source.request.source, source.prompts),
         prompts=len({item.index for item in source.items}),
         motions=len(measured.motions),
         failed=len(source.items) - len(measured.motions),
@@ -99,7 +99,7 @@ def report_of(
         alarms=why,
         trend=_trend(source, exported, now),
         heat=_heat(source, measured, real),
-        ranked_by="prompts obeyed, then R-precision",
+        ranked_by="prompt adherence, then R-precision",
         best=best,
         worst=worst,
         speed=_speed(source, measured),
@@ -125,9 +125,9 @@ def _labels(source: ScoreInput, measured: Measured, real: RealClips) -> NDArray[
     return np.array([numbers.setdefault(m.item.prompt, len(numbers)) for m in measured.motions], np.int64)
 
 
-def _scores(measured: Measured, side: Side, evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
-    """What later runs are paired with."""
-    found = retrieved(side, evaluator, seed)
+def _scores(measured: Measured, embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> tuple[MotionScore, ...]:
+    """Scores of each motion that later runs are paired with."""
+    found = retrieved(embeddings, evaluator, seed)
     return tuple(
         MotionScore(
             motion.item.index,
@@ -143,7 +143,7 @@ def _reconstruction(found: Reconstruction | None, ruler: Ruler, metrics: Sequenc
     source = "+".join(ruler.splits)
     if found is None or source not in found.values:
         return reconstruction_row(None, "real motion through the tokenizer")
-    known = {metric.key for metric in metrics}  # of whoever measured it, which may be another version
+    known = {metric.key for metric in metrics}  # the measuring version may be another
     values = {key: value for key, value in found.values[source].items() if key in known}
     return reconstruction_row(values, found.note(source))
 
@@ -173,7 +173,7 @@ def _trend(source: ScoreInput, row: Row, now: datetime) -> tuple[TrendPoint, ...
 
 
 def _heat(source: ScoreInput, measured: Measured, real: RealClips) -> tuple[HeatCell, ...]:
-    """By style only where the prompts are captions of clips whose style is known."""
+    """The heat map; by style only if the prompts are captions of clips with known style."""
     splits = source.request.splits
     styles = [style_of(clip.label) for clip in real.joined(splits).clips] if splits else []
     return heat_of(
@@ -198,7 +198,7 @@ def _exhibits(
 
 
 def _rank(score: MotionScore) -> float:
-    """Whether it does what was asked counts first; where nothing is expected, retrieval alone."""
+    """Sort key of exhibits: adherence first; if nothing is expected, retrieval alone."""
     return (0.0 if score.obeyed is None else score.obeyed) + 0.5 * (score.retrieved or 0.0)
 
 
@@ -222,7 +222,7 @@ def _exhibit(source: ScoreInput, motion: Motion, score: float) -> Exhibit:
 
 
 def _speed(source: ScoreInput, measured: Measured) -> Speed | None:
-    """Of the whole job, waiting included: what users get."""
+    """Speed of the whole job, waiting included, as users experience it."""
     job = source.generation
     elapsed = [motion.item.elapsed for motion in measured.motions if motion.item.elapsed is not None]
     if job.started is None or job.finished is None or not elapsed:
@@ -232,14 +232,14 @@ def _speed(source: ScoreInput, measured: Measured) -> Speed | None:
     return Speed(len(measured.motions) / max(seconds, 1e-3), statistics.median(elapsed), note)
 
 
-def bundle_of(reference: str) -> Reference:
+def bundle_of(reference: str) -> ArtifactReference:
     """An exact bundle, as a report names it."""
     name, _, sha256 = reference.partition("@")
-    return Reference(name, sha256)
+    return ArtifactReference(name, sha256)
 
 
 def _command(source: ScoreInput) -> str:
-    """What a person types to run it again; a file of prompts may have any name."""
+    """The command line that repeats the evaluation; file names are quoted."""
     request = source.request
     words = ["marey", "eval", "run", "--bundle", request.bundle, "--evaluator", str(request.evaluator)]
     words += ["--split", request.source, "--repeats", str(request.repeats), "--seed", str(request.seed)]
@@ -250,7 +250,7 @@ def _command(source: ScoreInput) -> str:
 
 
 def _software(measured: Measured, source: ScoreInput) -> Mapping[str, str]:
-    """That of the workers which generated, as their motions say; a report of several says so."""
+    """Software versions of the workers that generated, from their motions; several versions are noted."""
     found: dict[str, set[str]] = defaultdict(set)
     for motion in measured.motions[:: max(1, len(measured.motions) // 8)]:
         manifest = parse_npz(source.npz(motion.item)).manifest

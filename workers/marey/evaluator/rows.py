@@ -1,4 +1,4 @@
-"""The rows of a report: real motion, real motion through a tokenizer, and what a model generated."""
+"""Rows of a report: real motion, reconstructed real motion, and generated motion."""
 
 from __future__ import annotations
 
@@ -11,85 +11,87 @@ from numpy.typing import NDArray
 from marey.checks.quality import Quality
 from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.measuring import Measured, embed_prompts
-from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
-from marey.evaluator.reference import Reference, ReferenceSplit
+from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
+from marey.evaluator.reference import RealClips, ReferenceSplit
 from marey.evaluator.report import Row, Value
 from marey.evaluator.report.model import GROUND_TRUTH, RECONSTRUCTION
 from marey.evaluator.scoring import (
     POOLS,
     QUALITY,
-    Side,
-    apart,
+    EmbeddedSet,
+    compositional,
     embedded,
     keys_of,
     label_ceilings,
+    multimodality,
     on_joints,
     retrieval,
-    several,
 )
 from marey.measures.comparing import OBEYED, RETRIEVED
 
-UNMEASURED = "nobody measured this generator's tokenizer on real motion (`marey train evaluator reconstruct`)"
+UNMEASURED = "this generator's tokenizer was not measured on real motion (run `marey train evaluator reconstruct`)"
 OLD_BUNDLE = "the evaluator's bundle was made before it carried what the joints of real clips say"
 
 Found = Sequence[tuple[bool | None, Quality]]
-"""Of each motion whether it obeys its prompt (None = nothing is expected), and how it moves."""
+"""Verdict (None = nothing is expected) and quality of each motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ruler:
-    """What all rows of a report are measured by.
+    """Measurement context shared by all rows of a report.
 
     Attributes:
         evaluator: embeds.
         real: clips that distributions are compared with.
         splits: whose, in the order of the prompts; two of them have columns of their own for the compositional one.
         seed: of the draws.
-        beat: heard in every repeat.
+        progress: called in every repeat.
     """
 
     evaluator: Evaluator
-    real: Reference
+    real: RealClips
     splits: tuple[str, ...]
     seed: int
-    beat: Beat = unheard
+    progress: ProgressCallback = no_progress
 
     def values(
-        self, side: Side, found: Found | None, prompts: NDArray[np.int64], *, distances: bool
+        self, embeddings: EmbeddedSet, found: Found | None, prompts: NDArray[np.int64], *, distances: bool
     ) -> dict[str, Value]:
         """All values of a row.
 
         Args:
-            side: embeddings of N motions.
-            found: what their joints say; None = nobody knows.
+            embeddings: of N motions.
+            found: measurements on their joints; None = unknown.
             prompts: (N,) the prompt of each motion, which with several splits tells the split.
-            distances: whether to measure how far the motions are from the real ones.
+            distances: measure the distances of distributions to the real motions.
         """
-        values = self._values(side, found, self.splits, distances)
+        values = self._values(embeddings, found, self.splits, distances)
         if self.splits != (TEST_SPLIT, COMPOSITIONAL):
             return values
         late = prompts >= len(self.real.split(TEST_SPLIT).clips)
         if not late.any():
             return values
         some = None if found is None else [each for each, taken in zip(found, late, strict=True) if taken]
-        alone = self._values(side.only(late), some, (COMPOSITIONAL,), distances)
-        return values | apart(alone | retrieval(side, self.evaluator, POOLS[0], self.seed, of=late))
+        alone = self._values(embeddings.only(late), some, (COMPOSITIONAL,), distances)
+        return values | compositional(alone | retrieval(embeddings, self.evaluator, POOLS[0], self.seed, of=late))
 
-    def _values(self, side: Side, found: Found | None, splits: Sequence[str], distances: bool) -> dict[str, Value]:
+    def _values(
+        self, embeddings: EmbeddedSet, found: Found | None, splits: Sequence[str], distances: bool
+    ) -> dict[str, Value]:
         real = self.real.joined(splits).motion if distances else None
-        values = embedded(side, real, self.evaluator, self.seed)
+        values = embedded(embeddings, real, self.evaluator, self.seed)
         if found is None:
             return values | dict.fromkeys((OBEYED, *QUALITY), Value.missing(OLD_BUNDLE))
-        return values | on_joints(found, side.variants)
+        return values | on_joints(found, embeddings.variants)
 
 
 def truth_row(ruler: Ruler) -> Row:
-    """Real motion with its own captions, by the same network and the same checker."""
+    """Real motion with its own captions, measured by the same network and checker."""
     split = ruler.real.joined(ruler.splits)
     rows = np.arange(len(split.clips))
     found = [(clip.obeyed, clip.quality) for clip in split.clips if clip.quality is not None]
     values = ruler.values(
-        real_side(split, split.motion, ruler),
+        real_set(split, split.motion, ruler),
         found if len(found) == len(split.clips) else None,
         rows,
         distances=False,
@@ -104,18 +106,18 @@ def truth_row(ruler: Ruler) -> Row:
 
 
 def reconstruction_row(values: Mapping[str, Value] | None, note: str) -> Row:
-    """Real motion through the generator's tokenizer: what no generator behind it can be better than."""
+    """Real motion through the generator's tokenizer: the upper bound of any generator behind it."""
     if values is None:
         values = {key: Value.missing(UNMEASURED) for key in (OBEYED, RETRIEVED, "fid")}
     return Row(RECONSTRUCTION, "Reconstruction", note, values)
 
 
-def generated_rows(measured: Measured, sides: tuple[Side, Side], ruler: Ruler) -> tuple[Row, Row]:
-    """The rows `raw` and `exported` of measured motions, whose embeddings are the two sides."""
+def generated_rows(measured: Measured, sets: tuple[EmbeddedSet, EmbeddedSet], ruler: Ruler) -> tuple[Row, Row]:
+    """The rows `raw` and `exported` of measured motions, from their two embedded sets."""
     raw, exported = (
-        ruler.values(side, found, measured.indices, distances=True)
-        for side, found in zip(
-            sides,
+        ruler.values(embeddings, found, measured.indices, distances=True)
+        for embeddings, found in zip(
+            sets,
             (
                 [(motion.raw.obeyed, motion.raw.quality) for motion in measured.motions],
                 [(motion.exported.obeyed, motion.exported.quality) for motion in measured.motions],
@@ -129,27 +131,30 @@ def generated_rows(measured: Measured, sides: tuple[Side, Side], ruler: Ruler) -
             "exported",
             "Exported",
             "as users get them: feet locked, rotations solved",
-            exported | {"multimodality": several(measured, ruler.seed)},
+            exported | {"multimodality": multimodality(measured, ruler.seed)},
         ),
     )
 
 
-def sides_of(measured: Measured, labels: NDArray[np.int64], beat: Beat = unheard) -> tuple[Side, Side]:
-    """Raw and exported motions; `labels` (N,) are those of their prompts."""
+def embedded_sets(
+    measured: Measured, labels: NDArray[np.int64], progress: ProgressCallback = no_progress
+) -> tuple[EmbeddedSet, EmbeddedSet]:
+    """Embedded sets of the raw and the exported motions; `labels` (N,) are those of their prompts."""
     raw, exported = (
-        Side(motion, measured.text, labels, measured.variants, beat) for motion in (measured.raw, measured.exported)
+        EmbeddedSet(motion, measured.text, labels, measured.variants, progress)
+        for motion in (measured.raw, measured.exported)
     )
     return raw, exported
 
 
-def real_side(split: ReferenceSplit, motion: Embeddings, ruler: Ruler) -> Side:
-    """Embeddings (N, E) made of the clips of a split, with the clips' captions."""
-    text = embed_prompts(split.prompts, ruler.evaluator, ruler.beat)
-    return Side(motion, text, split.labels, np.zeros(len(split.clips), np.int64), ruler.beat)
+def real_set(split: ReferenceSplit, motion: Embeddings, ruler: Ruler) -> EmbeddedSet:
+    """Embedded set of a split's clips (N, E) with the clips' captions."""
+    text = embed_prompts(split.prompts, ruler.evaluator, ruler.progress)
+    return EmbeddedSet(motion, text, split.labels, np.zeros(len(split.clips), np.int64), ruler.progress)
 
 
 def _ceilings(labels: NDArray[np.int64], seed: int) -> dict[int, str]:
-    """By pool, what R-precision of clips with these labels (N,) has as its most; of pools that they fill."""
+    """Upper bound of R-precision for clips with these labels (N,), by pool size; for pools that they fill."""
     return {
         pool: (
             f"A motion of the prompt's own label counts as found, so a model that knows every label, and nothing more, "

@@ -1,7 +1,7 @@
-"""From measured motions to the rows of a report: retrieval, distances of distributions, prompt checks, quality.
+"""Compute the rows of a report from measured motions: retrieval, distances of distributions, prompt checks, quality.
 
 Repeat k of 20 takes repeat k mod R of each prompt, of R that were generated, and draws pools, pairs and subsets anew
-from the evaluation's seed: where R is 1 an interval tells what the draws do, and nothing of another generation.
+from the evaluation's seed: with R = 1 an interval shows the variance of the draws, not of another generation.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from marey.checks.quality import Quality
 from marey.core.errors import InvalidInput
 from marey.evaluations import COMPOSITIONAL
 from marey.evaluator.measuring import Measured
-from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid, multimodality
+from marey.evaluator.metrics import distribution
+from marey.evaluator.metrics.distribution import GaussianStatistics, diversity, fid, kid
 from marey.evaluator.metrics.intervals import redraw, repeated
 from marey.evaluator.metrics.retrieval import (
     RPrecision,
@@ -25,7 +26,7 @@ from marey.evaluator.metrics.retrieval import (
     matching_score,
     r_precision,
 )
-from marey.evaluator.port import Beat, Embeddings, Evaluator, unheard
+from marey.evaluator.port import Embeddings, Evaluator, ProgressCallback, no_progress
 from marey.evaluator.report import Metric, Value
 from marey.measures.comparing import OBEYED
 
@@ -35,36 +36,36 @@ POOLS = (32, 100)
 TOP = (1, 2, 3)
 KID_SUBSETS, KID_SIZE = 50, 100
 PAIRS_OF_A_PROMPT = 10
-APART = (OBEYED, *(f"r_precision_{k}_of_{POOLS[0]}" for k in TOP), "clip_score", "kid")
-"""What the compositional split has columns of its own for: what 342 motions can tell."""
+COMPOSITIONAL_COLUMNS = (OBEYED, *(f"r_precision_{k}_of_{POOLS[0]}" for k in TOP), "clip_score", "kid")
+"""Metrics with columns of their own for the compositional split: those that 342 motions can support."""
 JOINTS = "joints, without a network"
 QUALITY = {"skate": 100.0, "jerk": 1.0, "bone_drift": 1000.0, "penetration": 1000.0}
 """Numbers of `Quality`, and what makes them the unit they are printed in: per cent, m/s³, mm, mm."""
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """One row's embeddings: N motions with their prompts, R repeats of each."""
+class EmbeddedSet:
+    """Embeddings of one row: N motions with their prompts, R repeats of each."""
 
     motion: Embeddings  # (N, E)
     text: Embeddings  # (N, E)
     labels: NDArray[np.int64]  # (N,): motions of one label answer each other's prompts
     variants: NDArray[np.int64]  # (N,): the repeat that each was generated in
-    beat: Beat = unheard
+    progress: ProgressCallback = no_progress
     _pools: dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]] = field(
         default_factory=dict[tuple[int, int], list[tuple[NDArray[np.int64], RPrecision]]], repr=False
     )
 
-    def only(self, rows: NDArray[np.bool_]) -> Side:
+    def only(self, rows: NDArray[np.bool_]) -> EmbeddedSet:
         """Some of the motions."""
-        return Side(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows], self.beat)
+        return EmbeddedSet(self.motion[rows], self.text[rows], self.labels[rows], self.variants[rows], self.progress)
 
     def repeats(self, seed: int) -> Iterator[tuple[NDArray[np.int64], np.random.Generator]]:
         """For each of the 20 repeats the rows that it takes, and its random numbers."""
         generated = repeats_of(self.variants)
         for number, rng in enumerate(redraw(lambda rng: rng, repeats=REPEATS, seed=seed)):
             yield np.flatnonzero(self.variants == number % generated), rng
-            self.beat()
+            self.progress()
 
     def pools(self, evaluator: Evaluator, pool: int, seed: int) -> list[tuple[NDArray[np.int64], RPrecision]]:
         """For each repeat its rows, and retrieval among them; drawn once, however often it is asked for.
@@ -84,7 +85,7 @@ class Side:
 
 
 def repeats_of(variants: NDArray[np.int64]) -> int:
-    """How many repeats were generated, of motions whose repeats are `variants` (N,)."""
+    """Number of generated repeats of motions whose repeats are `variants` (N,)."""
     return int(variants.max(initial=0)) + 1
 
 
@@ -103,7 +104,9 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
         for k in TOP
     ]
     whole = (
-        Metric(OBEYED, "Prompts obeyed", "%", "higher", 1, "Motions that do what their prompt says, in order.", JOINTS),
+        Metric(
+            OBEYED, "Prompt adherence", "%", "higher", 1, "Motions that do what their prompt says, in order.", JOINTS
+        ),
         *pools,
         Metric("clip_score", "CLIP score", "", "higher", 3, "Mean cosine of prompt and motion.", by),
         Metric("mm_dist", "MM-Dist", "", "lower", 3, "Mean Euclidean distance of prompt and motion.", by),
@@ -118,30 +121,37 @@ def metrics_of(evaluator: Evaluator, splits: Sequence[str]) -> tuple[Metric, ...
     )
     if len(splits) < 2 or COMPOSITIONAL not in splits:
         return whole
-    columns = (metric for metric in whole if metric.key in APART)
-    return (*whole, *(replace(m, key=_apart(m.key), measured_on="the compositional split") for m in columns))
+    columns = (metric for metric in whole if metric.key in COMPOSITIONAL_COLUMNS)
+    return (
+        *whole,
+        *(replace(m, key=_compositional_key(m.key), measured_on="the compositional split") for m in columns),
+    )
 
 
-def apart(values: Mapping[str, Value]) -> dict[str, Value]:
+def compositional(values: Mapping[str, Value]) -> dict[str, Value]:
     """Values of the compositional split alone, under the keys of its own columns."""
-    return {_apart(key): value for key, value in values.items() if key in APART}
+    return {_compositional_key(key): value for key, value in values.items() if key in COMPOSITIONAL_COLUMNS}
 
 
-def embedded(side: Side, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
+def embedded(embeddings: EmbeddedSet, real: Embeddings | None, evaluator: Evaluator, seed: int) -> dict[str, Value]:
     """All values that come from embeddings; `real` (M, E) None leaves distances to real motions out."""
     found: dict[str, Value] = {}
     for pool in POOLS:
-        found |= retrieval(side, evaluator, pool, seed)
+        found |= retrieval(embeddings, evaluator, pool, seed)
     pairs = {"clip_score": clip_score, "mm_dist": matching_score}
     for name, metric in pairs.items():
-        found[name] = _drawn(side, seed, lambda rows, rng, metric=metric: metric(side.text[rows], side.motion[rows]))
-    found["diversity"] = _drawn(side, seed, lambda rows, rng: diversity(side.motion[rows], rng=rng))
+        found[name] = _drawn(
+            embeddings,
+            seed,
+            lambda rows, rng, metric=metric: metric(embeddings.text[rows], embeddings.motion[rows]),
+        )
+    found["diversity"] = _drawn(embeddings, seed, lambda rows, rng: diversity(embeddings.motion[rows], rng=rng))
     if real is not None:
-        found |= _distances(side, real, seed)
+        found |= _distances(embeddings, real, seed)
     return found
 
 
-def several(measured: Measured, seed: int) -> Value:
+def multimodality(measured: Measured, seed: int) -> Value:
     """MultiModality of the exported motions: prompts whose repeats were all made, against each other."""
     repeats = repeats_of(measured.variants)
     if repeats <= PAIRS_OF_A_PROMPT:
@@ -150,7 +160,9 @@ def several(measured: Measured, seed: int) -> Value:
     whole = measured.exported[np.repeat(counts == repeats, counts)].reshape(-1, repeats, measured.exported.shape[1])
     if not len(whole):
         return Value.missing("no prompt has all of its motions")
-    drawn = redraw(lambda rng: multimodality(whole, pairs=PAIRS_OF_A_PROMPT, rng=rng), repeats=REPEATS, seed=seed)
+    drawn = redraw(
+        lambda rng: distribution.multimodality(whole, pairs=PAIRS_OF_A_PROMPT, rng=rng), repeats=REPEATS, seed=seed
+    )
     return _interval(drawn, len(whole) * repeats)
 
 
@@ -158,7 +170,7 @@ def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np
     """All values that come from joints alone; their intervals are over the repeats that were generated.
 
     Args:
-        found: of N motions whether each obeys its prompt (None = nothing is expected), and how it moves.
+        found: verdict (None = nothing is expected) and quality of N motions.
         variants: (N,) the repeat that each was generated in.
     """
     checked = np.array([obeyed is not None for obeyed, _ in found], bool)
@@ -170,15 +182,15 @@ def on_joints(found: Sequence[tuple[bool | None, Quality]], variants: NDArray[np
     return values
 
 
-def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
+def retrieved(embeddings: EmbeddedSet, evaluator: Evaluator, seed: int) -> NDArray[np.float64]:
     """(N,) share of the draws in which each motion was among the three nearest of its pool of 32; NaN = never drawn,
     as all of them are where there are fewer motions than a pool.
 
     Two runs of the same prompts, repeats and seed draw the same pools: their numbers are paired.
     """
-    hits, drawn = np.zeros(len(side.motion)), np.zeros(len(side.motion))
+    hits, drawn = np.zeros(len(embeddings.motion)), np.zeros(len(embeddings.motion))
     try:
-        pools = side.pools(evaluator, POOLS[0], seed)
+        pools = embeddings.pools(evaluator, POOLS[0], seed)
     except InvalidInput:
         pools = []
     for rows, found in pools:
@@ -188,14 +200,14 @@ def retrieved(side: Side, evaluator: Evaluator, seed: int) -> NDArray[np.float64
 
 
 def retrieval(
-    side: Side, evaluator: Evaluator, pool: int, seed: int, *, of: NDArray[np.bool_] | None = None
+    embeddings: EmbeddedSet, evaluator: Evaluator, pool: int, seed: int, *, of: NDArray[np.bool_] | None = None
 ) -> dict[str, Value]:
-    """R-precision in pools of so many; with `of` (N,) that of some of the motions in pools of all.
+    """R-precision in pools of `pool`; with `of` (N,) that of some of the motions in pools of all.
 
     A split of few labels has to be judged in pools of others: by itself any motion finds its label there.
     """
     try:
-        pools = side.pools(evaluator, pool, seed)
+        pools = embeddings.pools(evaluator, pool, seed)
     except InvalidInput as error:
         return {_key(pool, k): Value.missing(error.message) for k in TOP}
     hits = [found.hits if of is None else found.hits[of[rows[found.clips]]] for rows, found in pools]
@@ -208,31 +220,33 @@ def retrieval(
     }
 
 
-def _distances(side: Side, real: Embeddings, seed: int) -> dict[str, Value]:
+def _distances(embeddings: EmbeddedSet, real: Embeddings, seed: int) -> dict[str, Value]:
     """FID once a generated repeat, for it draws nothing; KID by subsets."""
-    statistics, sizes = GaussianStatistics.of(real, name="real"), np.bincount(side.variants, minlength=1)
+    statistics, sizes = GaussianStatistics.of(real, name="real"), np.bincount(embeddings.variants, minlength=1)
     size = min(KID_SIZE, len(real), int(sizes.min()))
     try:
-        rows = [np.flatnonzero(side.variants == number) for number in range(len(sizes))]
-        frechet = [fid(statistics, side.motion[some]).value for some in rows]
+        rows = [np.flatnonzero(embeddings.variants == number) for number in range(len(sizes))]
+        frechet = [fid(statistics, embeddings.motion[some]).value for some in rows]
     except InvalidInput as error:
         return {name: Value.missing(error.message) for name in ("fid", "kid")}
     return {
         "fid": _interval(frechet, min(len(real), int(sizes.min())), dimensions=real.shape[1]),
         "kid": _drawn(
-            side,
+            embeddings,
             seed,
-            lambda rows, rng: kid(real, side.motion[rows], subsets=KID_SUBSETS, subset_size=size, rng=rng).mean,
+            lambda rows, rng: kid(real, embeddings.motion[rows], subsets=KID_SUBSETS, subset_size=size, rng=rng).mean,
         ),
     }
 
 
-def _drawn(side: Side, seed: int, metric: Callable[[NDArray[np.int64], np.random.Generator], float]) -> Value:
+def _drawn(
+    embeddings: EmbeddedSet, seed: int, metric: Callable[[NDArray[np.int64], np.random.Generator], float]
+) -> Value:
     try:
-        found = [metric(rows, rng) for rows, rng in side.repeats(seed)]
+        found = [metric(rows, rng) for rows, rng in embeddings.repeats(seed)]
     except InvalidInput as error:
         return Value.missing(error.message)
-    return _interval(found, int(np.bincount(side.variants).min()))
+    return _interval(found, int(np.bincount(embeddings.variants).min()))
 
 
 def _over_repeats(
@@ -253,8 +267,8 @@ def _interval(found: Sequence[float], count: int, *, dimensions: int | None = No
 
 
 def label_ceilings(labels: NDArray[np.int64], pool: int, seed: int) -> dict[int, float]:
-    """By k, what a model that knows every label and nothing else has of R-precision where the pair alone counts, in
-    per cent; of labels (N,), mean over the repeats.
+    """R-precision in per cent by k of an oracle that knows every label (N,) and nothing else, where only the pair
+    counts; mean over the repeats.
 
     Raises:
         InvalidInput: fewer labels than a pool.
@@ -272,5 +286,5 @@ def _key(pool: int, k: int) -> str:
     return f"r_precision_{k}_of_{pool}"
 
 
-def _apart(key: str) -> str:
+def _compositional_key(key: str) -> str:
     return f"{key}_{COMPOSITIONAL}"

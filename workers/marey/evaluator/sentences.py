@@ -38,7 +38,7 @@ def check_encoder(spec: TextSpec, encoder: TextEncoder) -> TextEncoder:
 
 
 def spec_of(encoder: TextEncoder) -> TextSpec:
-    """How an evaluator names its encoder; there is no graph, so no labeller."""
+    """Text specification of an evaluator's encoder; without a graph it needs no labeller."""
     return TextSpec(
         encoder=encoder.name,  # pyright: ignore[reportArgumentType]  # pydantic checks it
         encoder_sha256=encoder.sha256,

@@ -94,7 +94,7 @@ class TMRStage:
         return terms["loss"], {name: value.detach() for name, value in terms.items()}
 
     def after_step(self, context: StepContext) -> None:
-        """Nothing."""
+        """Do nothing."""
 
     @torch.no_grad()
     def validate(self) -> Mapping[str, float]:

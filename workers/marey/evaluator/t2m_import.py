@@ -1,4 +1,4 @@
-"""Importing the public T2M evaluator, once, offline: checkpoint, statistics and word vectors become a bundle.
+"""Import the public T2M evaluator, once, offline: checkpoint, statistics and word vectors become a bundle.
 
     python -m marey.evaluator.t2m_import CHECKPOINTS --glove GLOVE -o BUNDLE
 
@@ -132,7 +132,7 @@ def _array(file: Path) -> NDArray[Any]:
 
 
 class _PlainValues(pickle.Unpickler):
-    """Strings, numbers, lists and dictionaries need no class; whatever asks for one is refused."""
+    """Unpickler that knows no class: strings, numbers, lists and dictionaries load, everything else is refused."""
 
     def find_class(self, module_name: str, global_name: str, /) -> Any:
         """Refuse."""

@@ -29,7 +29,7 @@ SLOPE = 0.2
 
 @dataclass(frozen=True)
 class T2MConfig(ModelConfig):
-    """What the networks are built from; the public sizes are the defaults."""
+    """Sizes of the networks; the public ones are the defaults."""
 
     name: str = "public"
     layout: str = "humanml3d-263"

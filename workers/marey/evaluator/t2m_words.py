@@ -39,7 +39,7 @@ Tagged = Sequence[tuple[str, str]]
 
 
 class Tagger(Protocol):
-    """Where words and tags of a sentence come from."""
+    """Port of taggers: words and part-of-speech tags of a sentence."""
 
     def tag(self, sentence: str) -> Tagged:
         """Words and tags, in order.

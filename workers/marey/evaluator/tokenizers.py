@@ -11,8 +11,8 @@ from marey.data.prepared import PreparedData
 from marey.evaluations import COMPOSITIONAL, TEST_SPLIT
 from marey.evaluator.port import Evaluator
 from marey.evaluator.reconstruction import Rebuilt
-from marey.evaluator.reference import Reference as RealClips
-from marey.evaluator.report import Reference, Repeats, Report
+from marey.evaluator.reference import RealClips
+from marey.evaluator.report import ArtifactReference, Repeats, Report
 from marey.evaluator.report.model import RECONSTRUCTION
 from marey.evaluator.reporting import bundle_of
 from marey.evaluator.rows import Ruler, reconstruction_row, truth_row
@@ -43,7 +43,7 @@ def tokenizer_report(
         generator=bundle_of(found.generator),
         licence=licence,
         evaluator=bundle_of(evaluator.name),
-        source=Reference(source, data.manifest.files["features.npy"].sha256),
+        source=ArtifactReference(source, data.manifest.files["features.npy"].sha256),
         prompts=clips,
         motions=clips,
         repeats=Repeats(REPEATS, 0),

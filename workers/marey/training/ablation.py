@@ -10,7 +10,7 @@ from marey.checks.prompts import evaluation_prompts
 from marey.checks.rates import mean_quality
 from marey.generation.port import Generator, S
 from marey.text.features import TextFeatures
-from marey.training.obedience import measure
+from marey.training.adherence import measure
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:

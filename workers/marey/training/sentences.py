@@ -21,7 +21,7 @@ class SentenceData:
 
     strings: Tensor  # (U, W) float16
     sentence: Tensor  # (K,) int64: string of each caption
-    first: NDArray[np.int64]  # (C,): captions of clip c begin there; those of its acts alone follow them
+    first: NDArray[np.int64]  # (C,): captions of clip c begin there; those of its actions alone follow them
     count: NDArray[np.int64]  # (C,): captions of the whole clip
 
     @classmethod

@@ -37,7 +37,7 @@ def reconstruct(
         from marey.evaluator import report, tokenizers
         from marey.evaluator.loading import load_evaluator
         from marey.evaluator.reconstruction import reconstruct
-        from marey.evaluator.reference import Reference
+        from marey.evaluator.reference import RealClips
     except ImportError as error:
         raise needs_extra("worker", error) from error
     writers = {".html": report.to_html, ".json": report.to_json, ".md": report.to_markdown}
@@ -45,7 +45,7 @@ def reconstruct(
         raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(writers)}.")
     judge = find_bundle(evaluator)
     name, licence, tokenizer = _open_tokenizer(generator)
-    prepared, real = PreparedData.open(data), Reference.of(judge)
+    prepared, real = PreparedData.open(data), RealClips.of(judge)
     loaded = load_evaluator(judge, device="cpu")
     rebuilt = reconstruct(prepared, real, loaded, name, tokenizer, progress=progress)
     if licence is not None:

@@ -1,8 +1,8 @@
-"""BVH files: read what anybody wrote, write what everybody reads.
+"""Read and write BVH files.
 
-Reading is for files nobody here wrote: six channels a joint, positions that replace the OFFSET or are added to it,
-any rotation order, tabs, CRLF, wrong frame counts, a T-pose before the first frame. What is odd but harmless is told in
-`BvhClip.notes`; what is broken raises InvalidFile with its line number.
+Reading accepts files of other programs: six channels a joint, positions that replace the OFFSET or are added to it,
+any rotation order, tabs, CRLF, wrong frame counts, a T-pose before the first frame. Oddities without consequence are
+listed in `BvhClip.notes`; what is broken raises InvalidFile with its line number.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MAX_FRAMES = 1_000_000  # over two hours at 120 fps
 
 @dataclass(frozen=True, eq=False)
 class BvhClip:
-    """What a BVH file holds, in metres, Y up.
+    """The content of a BVH file in metres, Y up.
 
     Attributes:
         skeleton: its own tree; offsets are the file's (or the constant positions that replace them), root offset zero.
@@ -41,7 +41,7 @@ class BvhClip:
         fps: frames a second; a rounded frame time is taken back to the rate it was rounded from.
         ends: (J, 3) offset of the End Site, NaN where there is none.
         rest: the first frame's joints (J, 3), if it was a rest pose and has been left out.
-        notes: what was odd about the file.
+        notes: oddities of the file, for a person.
     """
 
     skeleton: Skeleton
@@ -72,8 +72,8 @@ def read_bvh(
         path: the file.
         unit: what its lengths are in.
         up: which axis of the file points up.
-        rest_frame: leave the first frame out when it is a rest pose (`auto`: when it stands apart from the rest).
-        translation: whether position channels replace the OFFSET (Blender) or are added to it (three.js, iClone);
+        rest_frame: drop the first frame if it is a rest pose (`auto`: if it differs clearly from the motion).
+        translation: position channels replace the OFFSET (Blender) or are added to it (three.js, iClone);
             `auto` finds out.
 
     Raises:
@@ -134,8 +134,8 @@ def parse_bvh(
 
 
 def first_frame_stands_apart(clip: BvhClip) -> bool:
-    """Whether the first frame is a rest pose and no part of the motion: the joints turn far more from it to the second
-    frame than they ever do within the motion."""
+    """Return True if the first frame is a rest pose: the joints turn far more between frames 0 and 1 than anywhere
+    later."""
     if len(clip.rotations) < 4:
         return False
     steps = angle_between(clip.rotations[:-1], clip.rotations[1:]).mean(axis=1)
@@ -163,7 +163,8 @@ def _translations(joints: list[Joint], values: Array) -> tuple[Array, Array, Arr
 
 
 def _are_added(tree: Skeleton, rotations: Array, channels: Array, given: Array, up: Up) -> bool:
-    """Whether position channels are added to the OFFSETs (three.js, iClone) or replace them (Blender, Bandai-Namco).
+    """Return True if position channels are added to the OFFSETs (three.js, iClone), False if they replace them
+    (Blender, Bandai-Namco).
 
     Joints below the root decide it: where channels replace, they hold the offset. In a file with channels on the root
     alone, it is the reading whose lowest point is nearer to the floor.

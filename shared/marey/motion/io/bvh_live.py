@@ -1,4 +1,4 @@
-"""A BVH file that grows while its motion is made, and is whole at every moment, also when the program is killed.
+"""A BVH file that is valid at every moment while its motion is being generated, even if the process is killed.
 
 - It comes into being with its first frame, by a rename: BVH has no way to say "no frames".
 - A row is written before it is counted, so `Frames:` never promises rows that are not there. Between the two steps
@@ -38,7 +38,7 @@ COUNT_WIDTH = len(str(MAX_FRAMES))
 
 
 class LiveBVH:
-    """A BVH file to add frames to: centimetres, Y up, one row a frame. Not for several threads.
+    """A BVH file that grows frame by frame: centimetres, Y up, one row per frame. Not thread-safe.
 
     Args:
         path: the file; nothing is there before the first frame.
@@ -47,7 +47,7 @@ class LiveBVH:
 
     Attributes:
         frames: rows in the file.
-        filled: how many of them were made up for frames that were missing.
+        filled: how many of them were interpolated for missing frames.
     """
 
     def __init__(self, path: Path, skeleton: Skeleton, fps: float) -> None:
@@ -67,7 +67,7 @@ class LiveBVH:
 
     @classmethod
     def open(cls, path: Path | str, skeleton: Skeleton, fps: float, *, overwrite: bool = False) -> LiveBVH:
-        """A file to begin; what can be wrong with its place is found out now.
+        """Open a file for writing and check its path now rather than at the first frame.
 
         Args:
             overwrite: replace a file that is there; it stays until the first frame.
@@ -88,7 +88,7 @@ class LiveBVH:
         self.close()
 
     def add(self, rotations: ArrayLike, root: ArrayLike, *, missing: int = 0) -> None:
-        """Add a frame, and before it those that are missing, so that the time line holds.
+        """Add a frame, and before it the missing frames, so that the timeline stays correct.
 
         A missing frame is the pose between its neighbours: rotations by slerp, the root by lerp. Missing frames before
         the first one show the first one.
@@ -122,10 +122,10 @@ class LiveBVH:
         self.filled += missing
 
     def close(self) -> None:
-        """Wait until the disk has it. Without a frame there is no file.
+        """Flush the file to disk. Without a frame no file exists.
 
         Raises:
-            InvalidInput: the disk says that it has it not.
+            InvalidInput: the disk reports an error.
         """
         self._closed = True
         file, self._file = self._file, None
@@ -195,7 +195,7 @@ class LiveBVH:
 
 
 def check_place(path: Path | str, *, overwrite: bool = False) -> None:
-    """Find out whether a file can come into being here.
+    """Check that a file can be created at this path.
 
     Raises:
         Conflict: a file is there.

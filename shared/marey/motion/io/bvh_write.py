@@ -1,4 +1,4 @@
-"""Writing BVH files."""
+"""Write BVH files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from marey.motion.units import METRES, Z_TO_Y, Unit, Up
 
 
 class Posed(Protocol):
-    """What can be written: a BvhClip or a MotionClip."""
+    """Input of `write_bvh`: a BvhClip or a MotionClip."""
 
     @property
     def skeleton(self) -> Skeleton: ...
@@ -30,7 +30,7 @@ class Posed(Protocol):
 
 
 def write_bvh(path: Path | str, clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> None:
-    """Write a clip: OFFSETs are the T-pose, joint names the skeleton's, no comments; whole or not at all.
+    """Write a clip atomically: OFFSETs are the T-pose, joint names the skeleton's, no comments.
 
     The root's OFFSET is zero, because programs differ in whether position channels replace it or are added to it; for
     the same reason only the root has position channels, and bones that change length are refused.
@@ -51,7 +51,7 @@ def format_bvh(clip: Posed, *, unit: Unit = "cm", up: Up = "y") -> str:
 
 
 class Layout:
-    """One skeleton as BVH: the only place that knows how a header and a row of numbers look.
+    """A skeleton in BVH form: the only code that formats a header and a row of numbers.
 
     Joints stand depth first in the file, whatever their order in the arrays.
 

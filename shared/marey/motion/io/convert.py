@@ -63,8 +63,7 @@ def _without_root(clip: BvhClip, positions: Array) -> tuple[BvhClip, Array]:
 
 
 def clip_from_bvh(clip: BvhClip, origin: str) -> MotionClip:
-    """A clip of what a BVH file held: facing +Z in frame 0 and with contacts, where hips, shoulders and feet are known
-    by their names.
+    """Convert a BVH clip: facing +Z in frame 0, with contacts if hips, shoulders and feet are known by name.
 
     Args:
         clip: with constant bone lengths (see `steady`).

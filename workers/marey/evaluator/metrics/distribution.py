@@ -1,4 +1,4 @@
-"""Do generated motions look like real ones as a set: FID, KID, diversity, multimodality."""
+"""Distances between sets of generated and real motions: FID, KID, diversity, multimodality."""
 
 from __future__ import annotations
 

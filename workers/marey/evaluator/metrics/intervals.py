@@ -1,4 +1,4 @@
-"""How sure a number is: the field's interval over repeats. For two runs on the same prompts see `marey.measures`."""
+"""Intervals over repeats, as the field reports them. For two runs on the same prompts see `marey.measures`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which rows are candidates of each other: retrieval pools drawn by a seeded generator.
+"""Retrieval pools: candidate sets drawn by a seeded generator.
 
 The public T2M evaluator takes the batches of a shuffled loader that drops the last one as its pools, and SnapMoGen's
 released code does the same with batches of 100.
@@ -46,5 +46,5 @@ def draw_distinct_pools(labels: Numbers, pool: int, rng: np.random.Generator) ->
     dealt = shuffled[np.argsort(turn[shuffled], kind="stable")]  # label by label, its rows in random order
     _, begins, runs = np.unique(turn[dealt], return_index=True, return_counts=True)
     kept = dealt[np.arange(len(dealt)) - np.repeat(begins, runs) < pools]
-    # Dealt one row to each pool in turn, the at most `pools` neighbours of one label all fall into different pools.
+    # Rows go to the pools in turn, so the at most `pools` neighbours of one label fall into different pools.
     return kept[: pools * pool].reshape(pool, pools).T

@@ -1,7 +1,7 @@
-"""Does the motion belong to its text: R-precision, all-pairs retrieval, distance and cosine of matched pairs.
+"""Retrieval between text and motion: R-precision, all-pairs ranks, distance and cosine of matched pairs.
 
-Rows of `text` and `motion` are pairs. The public T2M evaluator returns both sorted by motion length, so whoever sorts
-one must sort the other, and labels, alike: nothing here can tell a mispaired row from a bad motion.
+Rows of `text` and `motion` are pairs. The public T2M evaluator returns both sorted by motion length; a caller that
+sorts one must sort the other, and labels, alike: a mispaired row looks like a bad motion.
 
 Sources: Guo et al. 2022 (T2M; pools of 32, Euclidean), SnapMoGen 2025 appendix B.2 (pools of 100; its released code
 draws them as shuffled batches too, and ranks by cosine), Petrovich et al. 2023 (TMR; all pairs, same-label hits).
@@ -31,7 +31,7 @@ _ROWS = 512  # of the all-pairs matrix at a time: 16 MB for 4,000 clips
 
 @dataclass(frozen=True, eq=False)
 class RPrecision:
-    """How often the match stands among the first of its pool.
+    """R-precision: how often the match is among the first k of its pool.
 
     Attributes:
         top: the k of each column of `hits`.
@@ -72,7 +72,7 @@ class AllRanks:
 
 @dataclass(frozen=True, eq=False)
 class _Standing:
-    """Where each query's best match stands: candidates `nearer`, those `tied` with it, and the `matches` in the tie."""
+    """Rank of each query's best match: candidates `nearer`, those `tied` with it, and the `matches` in the tie."""
 
     nearer: Integers
     tied: Integers
@@ -121,7 +121,7 @@ def r_precision(
 def label_ceiling(
     labels: Numbers, *, pool: int, top: Sequence[int] = (1, 2, 3), rng: np.random.Generator
 ) -> RPrecision:
-    """What a model that knows every label, and nothing else, scores in ordinary pools where only the pair is a match.
+    """R-precision of an oracle that knows every label and nothing else, in pools where only the pair is a match.
 
     Clips of one label are alike to it, so among c of them in a pool it finds the right one in k tries with
     probability min(k / c, 1). With the same `rng` the pools are those of `r_precision`.

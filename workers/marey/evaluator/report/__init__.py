@@ -5,10 +5,10 @@ from marey.evaluator.report.markdown import to_markdown
 from marey.evaluator.report.model import Baseline, Change, Report
 from marey.evaluator.report.page import to_html
 from marey.evaluator.report.parts import (
+    ArtifactReference,
     Exhibit,
     HeatCell,
     Metric,
-    Reference,
     Repeats,
     Row,
     Speed,
@@ -19,13 +19,13 @@ from marey.evaluator.report.words import headline, sentence_of
 from marey.measures.scores import MotionScore
 
 __all__ = [
+    "ArtifactReference",
     "Baseline",
     "Change",
     "Exhibit",
     "HeatCell",
     "Metric",
     "MotionScore",
-    "Reference",
     "Repeats",
     "Report",
     "Row",

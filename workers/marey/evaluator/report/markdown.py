@@ -1,4 +1,4 @@
-"""The report as Markdown that GitHub renders: for a pull request, a page of results, a mail."""
+"""The report as GitHub Markdown: for pull requests, pages of results, mail."""
 
 from __future__ import annotations
 

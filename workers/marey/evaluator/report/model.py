@@ -1,4 +1,4 @@
-"""What one evaluation found, ready to be told: numbers with intervals, what changed, where it fails, how to repeat it.
+"""Data of an evaluation report: numbers with intervals, changes, weak spots, and how to repeat it.
 
 Statements that contradict each other are refused, so that no page ever shows them.
 """
@@ -13,10 +13,10 @@ from typing import Any, Literal
 
 from marey.core.errors import InvalidInput
 from marey.evaluator.report.parts import (
+    ArtifactReference,
     Exhibit,
     HeatCell,
     Metric,
-    Reference,
     Repeats,
     Row,
     Speed,
@@ -43,7 +43,7 @@ OWN_NUMBERS = (
 
 @dataclass(frozen=True)
 class Baseline:
-    """An earlier evaluation that this one is compared with: same evaluator, same data.
+    """An earlier evaluation to compare with: same evaluator, same data.
 
     Attributes:
         against: which of the two.
@@ -63,7 +63,7 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Change:
-    """What became of one metric of the judged row, by paired bootstrap.
+    """Change of one metric of the judged row, by paired bootstrap.
 
     Attributes:
         metric: its key.
@@ -111,7 +111,7 @@ class Report:
         judged: key of the row that changes and trend speak of: what users get.
         baselines: what it is compared with, one of each kind at most.
         changes: of the judged row.
-        regressed: whether an alarm was raised; None = there was nothing to compare with.
+        regressed: an alarm was raised; None = there was nothing to compare with.
         alarms: a sentence for each reason.
         trend: runs with the same evaluator and data, the oldest first, this one last.
         heat: prompt checks by action and style.
@@ -122,17 +122,17 @@ class Report:
         command: a line for a shell that repeats the evaluation.
         settings: of the generator and the evaluation; JSON.
         software: versions by name.
-        notes: whatever else a reader has to know.
+        notes: further remarks for the reader.
         scores: of each motion, for the comparison that a later run makes; in the JSON alone.
     """
 
     title: str
     evaluation: str
     created: datetime
-    generator: Reference
+    generator: ArtifactReference
     licence: str
-    evaluator: Reference | None
-    source: Reference
+    evaluator: ArtifactReference | None
+    source: ArtifactReference
     comparability: str = OWN_NUMBERS
     prompts: int
     motions: int

@@ -19,7 +19,7 @@ from marey.viz.player import motion_document
 
 
 def to_html(report: Report) -> bytes:
-    """The page. Equal reports give equal bytes.
+    """Render the page. Equal reports give equal bytes.
 
     It holds three.js only when an exhibit has its clip: 0.6 MB then, and 0.05 MB for each clip of 10 s.
     """

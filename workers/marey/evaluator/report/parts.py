@@ -71,7 +71,7 @@ class Metric:
         unit: printed after the number; empty for a bare one.
         better: which way is better; empty where neither is (diversity: as the ground truth).
         digits: after the point.
-        explanation: one sentence for somebody who does not know the metric.
+        explanation: one sentence for readers who do not know the metric.
         measured_by: the network (name and hash) or the way it was measured. Columns of different ones share no table.
         measured_on: the data, where it is not the report's source: the compositional split has columns of its own.
     """
@@ -87,7 +87,7 @@ class Metric:
 
     @property
     def name(self) -> str:
-        """What a sentence calls it: with its data, where they are not the report's."""
+        """Name of the metric in a sentence, with its data if those differ from the report's."""
         return f"{self.label} on {self.measured_on}" if self.measured_on else self.label
 
 
@@ -153,7 +153,7 @@ class Exhibit:
 
 @dataclass(frozen=True)
 class Speed:
-    """How fast motions came; `note` says on what (workers, device, batch)."""
+    """Generation speed; `note` says on which hardware (workers, device, batch)."""
 
     motions_per_second: float
     median_seconds_per_motion: float
@@ -164,7 +164,7 @@ class Speed:
 
 
 @dataclass(frozen=True)
-class Reference:
+class ArtifactReference:
     """A bundle, a split, a file: by name and by the sha256 of its content."""
 
     name: str
@@ -173,7 +173,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Repeats:
-    """What the intervals are over.
+    """The repeats that intervals are computed over.
 
     Attributes:
         count: repeats.

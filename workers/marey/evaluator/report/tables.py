@@ -1,8 +1,8 @@
 """The numbers as tables of words, for the page and for Markdown alike.
 
 Columns of different evaluators never share a table, and a column on other data than the rest says so. What one
-evaluator measured is several tables where one would be wider than a window. Under the judged row stands what became of
-it since the last run and since the pinned baseline.
+evaluator measured is several tables where one would be wider than a window. The changes since the last run
+and since the pinned baseline stand under the judged row.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def heat_of(report: Report) -> Heat:
 
 
 def share(cell: HeatCell) -> float:
-    """Of the trials that passed, 0 to 1."""
+    """Share of trials that passed, 0 to 1."""
     return cell.passed / cell.trials
 
 

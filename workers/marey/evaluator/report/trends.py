@@ -13,7 +13,7 @@ from marey.evaluator.report.words import MINUS, day, moment, number, with_unit
 WIDTH, HEIGHT = 340, 170
 LEFT, RIGHT, TOP, BOTTOM = 52, 328, 16, 136  # of the plot in the picture
 HIT = 9  # radius that a pointer finds
-TINY = 1e-12  # no metric is told to so many digits
+TINY = 1e-12  # no metric is printed with so many digits
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def ticks_of(values: Sequence[float]) -> list[float]:
 
 
 def describe(metric: Metric, runs: Sequence[TrendPoint]) -> str:
-    """What the picture shows, in words."""
+    """Describe the picture in words."""
     known = [(run.values[metric.key], run) for run in runs if metric.key in run.values]
 
     def said(value: float) -> str:

@@ -1,4 +1,4 @@
-"""How numbers, changes and the outcome are put into words; page and Markdown say the same."""
+"""Wording of numbers, changes and the outcome, shared by page and Markdown."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_NAMED = 4  # metrics that the one sentence names
 
 @dataclass(frozen=True)
 class Headline:
-    """What a reader learns first: the outcome, why, and what else is to be said of it."""
+    """The headline of a report: outcome, reason and further remarks."""
 
     word: str
     sentence: str
@@ -72,7 +72,7 @@ def _listed(names: list[str]) -> str:
 
 
 def sentence_of(change: Change, metric: Metric) -> str:
-    """`Prompts obeyed fell from 94.4 % to 88.1 % against the last run (95 % interval of the difference: …).`"""
+    """`Prompt adherence fell from 94.4 % to 88.1 % against the last run (95 % interval of the difference: …).`"""
     before, after = (with_unit(number(v, metric), metric) for v in (change.before, change.after))
     verb = "rose" if change.after > change.before else "fell"
     moved = f"{verb} from {before} to {after}" if change.after != change.before else f"stayed at {after}"
@@ -82,7 +82,7 @@ def sentence_of(change: Change, metric: Metric) -> str:
 
 
 def number(value: float, metric: Metric) -> str:
-    """With the metric's digits and a real minus; never `−0`."""
+    """A number with the metric's digits and a real minus; never `−0`."""
     text = f"{value:.{metric.digits}f}"
     return text.lstrip("-") if not text.strip("-0.") else text.replace("-", MINUS)
 
@@ -104,7 +104,7 @@ def interval_of(change: Change, metric: Metric) -> str:
 
 
 def arrow(change: Change) -> str:
-    """Which way the number went; whether that is good is said by the word beside it."""
+    """Direction of the change as an arrow; the word beside it says if it is an improvement."""
     return "↑" if change.after > change.before else "↓" if change.after < change.before else "="
 
 
@@ -122,7 +122,7 @@ def counts_of(value: Value) -> str:
 
 
 def too_few_note(value: Value) -> str:
-    """What the mark means."""
+    """Explanation of the mark for too few motions."""
     wanted = SAMPLES_PER_DIMENSION * (value.dimensions or 0)
     return (
         f"N = {value.n} motions are fewer than {SAMPLES_PER_DIMENSION}·D = {wanted} for embeddings of D = "
@@ -131,7 +131,7 @@ def too_few_note(value: Value) -> str:
 
 
 def intervals_of(repeats: Repeats) -> str:
-    """What ± is over; an interval that no regeneration stands behind is labelled."""
+    """Explanation of ±; intervals without regeneration are labelled."""
     count, anew = repeats.count, repeats.regenerated
     if count == 1:
         return "One repeat: numbers stand without interval."

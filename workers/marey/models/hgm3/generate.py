@@ -21,7 +21,7 @@ from marey.models.hgm3.conditions import graph_batch
 from marey.models.hgm3.config import HGM3Config, InferenceConfig
 from marey.models.hgm3.decoding import LENGTH_STREAM, DecodeOptions, Items, decode_base, decode_residual
 from marey.motion.features import FeatureLayout, layout
-from marey.nn.lanes import Lanes
+from marey.nn.batch_threads import BatchThreads
 from marey.nn.sampling import uniform
 
 BUCKET = 8
@@ -92,10 +92,10 @@ class Generator:
         networks: Networks,
         device: torch.device,
         dtype: torch.dtype,
-        lanes: Lanes,
+        batch_threads: BatchThreads,
     ) -> None:
         self.bundle = bundle
-        self.lanes = lanes
+        self.batch_threads = batch_threads
         self.config = config
         self.networks = networks
         self.device = device
@@ -125,12 +125,12 @@ class Generator:
         for part in networks.parts().values():
             part.to(chosen)
         # float32, too: on a CPU its matrices are packed. The encoder stays as in training: its tokens must not change.
-        lanes = Lanes(torch.get_num_threads() if chosen.type == "cpu" else 1)
-        networks.masked.lower(dtype, lanes)
-        networks.residual.lower(dtype, lanes)
+        batch_threads = BatchThreads(torch.get_num_threads() if chosen.type == "cpu" else 1)
+        networks.masked.prepare_inference(dtype, batch_threads)
+        networks.residual.prepare_inference(dtype, batch_threads)
         if dtype != torch.float32:
-            networks.tokenizer.decoder.lower(dtype)
-        return cls(verified, config, networks, chosen, dtype, lanes)
+            networks.tokenizer.decoder.prepare_inference(dtype)
+        return cls(verified, config, networks, chosen, dtype, batch_threads)
 
     @property
     def frames_per_token(self) -> int:
@@ -159,8 +159,8 @@ class Generator:
         def make(rows: list[int]) -> None:
             self._group(_Watcher(steps, rows), requests, frames, inference, options, results)
 
-        with self.lanes.open():
-            self.lanes.map(make, groups)
+        with self.batch_threads.open():
+            self.batch_threads.map(make, groups)
         return results
 
     def settings(self, values: Mapping[str, Any]) -> Settings:
@@ -201,11 +201,11 @@ class Generator:
         return min(max(frames, self.config.min_frames), self.config.max_frames)
 
     def _groups(self, frames: Sequence[int]) -> list[list[int]]:
-        """Rows of one bucket each, at most MAX_ROWS and no more than a lane's share; the longest motions first."""
+        """Rows of one bucket each, at most MAX_ROWS and no more than a thread's share; the longest motions first."""
         buckets: dict[int, list[int]] = defaultdict(list)
         for row, count in enumerate(frames):
             buckets[self._bucket(count)].append(row)
-        most = min(MAX_ROWS, -(-len(frames) // self.lanes.count))
+        most = min(MAX_ROWS, -(-len(frames) // self.batch_threads.count))
         longest = sorted(buckets.items(), reverse=True)
         return [rows[i : i + most] for _, rows in longest for i in range(0, len(rows), most)]
 
@@ -256,7 +256,7 @@ class Generator:
 
 
 class _Steps:
-    """Counts the steps of all groups, which lanes make side by side, and reports them."""
+    """Counts the steps of all groups, which batch threads make side by side, and reports them."""
 
     def __init__(self, control: Control, total: int) -> None:
         self._control = control

@@ -23,10 +23,11 @@ from torch import Tensor, nn
 
 from marey.models.hgm3.conditions import Condition, TextEncoder, TextNormalizer
 from marey.models.hgm3.config import HGM3Config, TransformerConfig
-from marey.nn.lanes import ONE_LANE, Lanes
+from marey.nn.batch_threads import CALLING_THREAD, BatchThreads
 from marey.nn.packed import packed_gelu
 from marey.nn.ragged import pad_length
 from marey.nn.sampling import guide
+from marey.nn.stored_names import keep_stored_names
 from marey.nn.transformer import Transformer, initialize, sinusoidal_positions
 
 
@@ -120,7 +121,7 @@ class TokenHead(nn.Module):
         self.bias = nn.Parameter(torch.zeros(codes))
         self.codes = None if tied else nn.Linear(width, codes, bias=False)
 
-    def lower(self, dtype: torch.dtype) -> None:
+    def prepare_inference(self, dtype: torch.dtype) -> None:
         """Pack the first matrix for inference on a CPU; logits stay float32."""
         self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
 
@@ -146,10 +147,10 @@ class MaskedTransformer(nn.Module):
         self.head = TokenHead(config.masked.width, codes, tied=config.compact)
         initialize(self)
 
-    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
-        """Make ready for inference; matrices in `dtype`, sequences shared among `lanes`."""
-        self.sequence.transformer.lower(dtype, lanes)
-        self.head.lower(dtype)
+    def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
+        """Make ready for inference; matrices in `dtype`, sequences shared among `batch_threads`."""
+        self.sequence.transformer.prepare_inference(dtype, batch_threads)
+        self.head.prepare_inference(dtype)
 
     def forward(
         self,
@@ -210,8 +211,9 @@ class ResidualTransformer(nn.Module):
         if config.compact:  # ours: the codes themselves, projected in and out
             self.register_buffer("codebooks", torch.zeros(t.levels, t.codes, t.code_width), persistent=False)
             self.register_buffer("code_std", torch.ones(t.levels), persistent=False)
-            self.enter = nn.Linear(t.code_width, width)
-            self.leave = nn.Linear(width, t.code_width)
+            self.in_proj = nn.Linear(t.code_width, width)
+            self.out_proj = nn.Linear(width, t.code_width)
+            keep_stored_names(self)
             self.scale = nn.Parameter(torch.ones(t.levels - 1))
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         else:
@@ -223,12 +225,12 @@ class ResidualTransformer(nn.Module):
             self.bias = nn.Parameter(torch.zeros(t.levels - 1, t.codes))
         initialize(self)
         if config.compact:  # as loud as the positions, like embeddings
-            nn.init.normal_(self.enter.weight, std=0.5 * t.code_width**-0.5)
-            nn.init.zeros_(self.leave.weight)  # first guess: how often each code occurs
+            nn.init.normal_(self.in_proj.weight, std=0.5 * t.code_width**-0.5)
+            nn.init.zeros_(self.out_proj.weight)  # first guess: how often each code occurs
 
-    def lower(self, dtype: torch.dtype, lanes: Lanes = ONE_LANE) -> None:
-        """Make ready for inference; matrices in `dtype`, sequences shared among `lanes`."""
-        self.sequence.transformer.lower(dtype, lanes)
+    def prepare_inference(self, dtype: torch.dtype, batch_threads: BatchThreads = CALLING_THREAD) -> None:
+        """Make ready for inference; matrices in `dtype`, sequences shared among `batch_threads`."""
+        self.sequence.transformer.prepare_inference(dtype, batch_threads)
         if not self.compact:
             self.dense, self.gelu = packed_gelu(self.dense, self.gelu, dtype)
 
@@ -268,7 +270,7 @@ class ResidualTransformer(nn.Module):
             level: (B,), the level to predict.
             sentence: (B, w) from `sentence`.
         """
-        x = self.enter(total) if self.compact else total
+        x = self.in_proj(total) if self.compact else total
         condition = torch.stack([self.level(level - 1).to(sentence.dtype), sentence], 1)  # (B, 2, w)
         visible = torch.ones(condition.shape[:2], dtype=torch.bool, device=valid.device)
         hidden, index = self.sequence(x, valid, condition, visible, trim=trim)
@@ -286,7 +288,7 @@ class ResidualTransformer(nn.Module):
                 torch.bmm(hidden, self.output[index].to(hidden.dtype).transpose(1, 2)).float()
                 + (self.bias[index][:, None])
             )
-        leaving = guided(self.leave(hidden), guidance).float() * self.scale[index][:, None, None]  # (B, n, d)
+        leaving = guided(self.out_proj(hidden), guidance).float() * self.scale[index][:, None, None]  # (B, n, d)
         if bool((index == index[0]).all()):
             return F.linear(leaving, self.codebooks[1 + index[0]]) + self.bias[index[0]]
         codes = self.codebooks[1:][index]  # (B, K, d)

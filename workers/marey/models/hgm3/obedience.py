@@ -1,4 +1,4 @@
-"""Does a bundle of HGM³ do what the prompts say? See `marey.training.obedience`."""
+"""Does a bundle of HGM³ do what the prompts say? See `marey.training.adherence`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from marey.core.errors import MareyError
 from marey.models.hgm3.generate import Generator
-from marey.training.obedience import parser_of, publish, report_of
+from marey.training.adherence import parser_of, publish, report_of
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -28,8 +28,8 @@ from marey.generation.export import finish
 from marey.generation.port import Request
 from marey.models.hgm3.generate import Generator
 from marey.text.pipeline import TextPipeline
+from marey.training.adherence import pipeline_of
 from marey.training.drawn import Drawn
-from marey.training.obedience import pipeline_of
 
 ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
 """Shares of the captions by how many acts they ask for."""

@@ -17,6 +17,7 @@ from marey.models.hgm3.config import HGM3Config, TokenizerConfig
 from marey.nn.convolution import ResidualBlock, frame_mask, masked
 from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.nn.quantizer import Quantized, ResidualQuantizer
+from marey.nn.stored_names import keep_stored_names
 
 
 class Residuals(nn.Module):
@@ -39,18 +40,19 @@ class Encoder(nn.Module):
 
     def __init__(self, features: int, config: TokenizerConfig) -> None:
         super().__init__()
-        self.enter = nn.Conv1d(features, config.width, 3, padding=1)
+        self.in_proj = nn.Conv1d(features, config.width, 3, padding=1)
         self.down = nn.ModuleList(nn.Conv1d(config.width, config.width, 4, 2, 1) for _ in range(config.stages))
         self.residuals = nn.ModuleList(Residuals(config) for _ in range(config.stages))
-        self.leave = nn.Conv1d(config.width, config.code_width, 3, padding=1)
+        self.out_proj = nn.Conv1d(config.width, config.code_width, 3, padding=1)
+        keep_stored_names(self)
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """`mask` (B, 1, T) or None for full windows."""
-        x = masked(F.relu(self.enter(x)), mask)
+        x = masked(F.relu(self.in_proj(x)), mask)
         for down, residuals in zip(self.down, self.residuals, strict=True):
             mask = None if mask is None else mask[..., ::2]
             x = residuals(masked(down(x), mask), mask)  # (B, C, T / 2)
-        return masked(self.leave(x), mask)
+        return masked(self.out_proj(x), mask)
 
 
 class Decoder(nn.Module):
@@ -58,14 +60,15 @@ class Decoder(nn.Module):
 
     def __init__(self, features: int, config: TokenizerConfig) -> None:
         super().__init__()
-        self.enter = nn.Conv1d(config.code_width, config.width, 3, padding=1)
+        self.in_proj = nn.Conv1d(config.code_width, config.width, 3, padding=1)
         self.residuals = nn.ModuleList(Residuals(config) for _ in range(config.stages))
         self.up = nn.ModuleList(nn.Conv1d(config.width, config.width, 3, padding=1) for _ in range(config.stages))
         self.smooth = nn.Conv1d(config.width, config.width, 3, padding=1)
-        self.leave = nn.Conv1d(config.width, features, 3, padding=1)
+        self.out_proj = nn.Conv1d(config.width, features, 3, padding=1)
+        keep_stored_names(self)
         self.dtype = torch.float32
 
-    def lower(self, dtype: torch.dtype) -> None:
+    def prepare_inference(self, dtype: torch.dtype) -> None:
         """Cast the stages to `dtype` for inference; the last two convolutions stay, so that no frame is rounded."""
         self.residuals.to(dtype)
         self.up.to(dtype)
@@ -73,7 +76,7 @@ class Decoder(nn.Module):
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """`mask` (B, 1, n) or None."""
-        x = masked(F.relu(self.enter(x)), mask)
+        x = masked(F.relu(self.in_proj(x)), mask)
         if self.dtype != torch.float32:
             x, mask = x.to(self.dtype), None if mask is None else mask.to(self.dtype)
         for residuals, up in zip(self.residuals, self.up, strict=True):
@@ -83,7 +86,7 @@ class Decoder(nn.Module):
         if self.dtype != torch.float32:
             x, mask = x.float(), None if mask is None else mask.float()
         x = masked(F.relu(self.smooth(x)), mask)
-        return masked(self.leave(x), mask)
+        return masked(self.out_proj(x), mask)
 
 
 class Tokenizer(MotionTokenizer):

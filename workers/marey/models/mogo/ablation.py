@@ -34,8 +34,8 @@ from marey.models.mogo.model import RQHCTransformer
 from marey.models.mogo.train import train_stage, transformer_stage
 from marey.nn.scaled_quantizer import Scale
 from marey.training.ablation import judge, table
+from marey.training.adherence import pipeline_of
 from marey.training.budget import Budget
-from marey.training.obedience import pipeline_of
 from marey.training.staging import TrainOptions, finish, use_threads
 
 

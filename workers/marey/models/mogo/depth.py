@@ -7,6 +7,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from marey.models.mogo.config import DepthConfig
+from marey.nn.stored_names import keep_stored_names
 from marey.nn.transformer import Block
 
 
@@ -23,7 +24,8 @@ class DepthHead(nn.Module):
             for _ in range(config.layers)
         )
         self.norm = nn.LayerNorm(config.width)
-        self.leave = nn.Linear(config.width, width)
+        self.out_proj = nn.Linear(config.width, width)
+        keep_stored_names(self)
 
     @property
     def layers(self) -> list[Block]:
@@ -38,7 +40,7 @@ class DepthHead(nn.Module):
         mask = torch.ones(size, size, dtype=torch.bool, device=x.device).tril()[None, None]
         for block in self.layers:
             x = block(x, mask)
-        return states + self.leave(self.norm(x)).float()
+        return states + self.out_proj(self.norm(x)).float()
 
 
 class DepthFrame:
@@ -72,7 +74,7 @@ class DepthStep(nn.Module):
     def __init__(self, head: DepthHead) -> None:
         """Share the layers of `head`, packed or not."""
         super().__init__()
-        self.code, self.norm, self.leave = head.code, head.norm, head.leave
+        self.code, self.norm, self.out_proj = head.code, head.norm, head.out_proj
         self.blocks = nn.ModuleList(_StepBlock(block) for block in head.layers)
 
     def forward(self, state: Tensor, x: Tensor, below: Tensor | None, memory: Tensor, level: int) -> Tensor:
@@ -89,7 +91,7 @@ class DepthStep(nn.Module):
             x = x + self.code(below[:, None])
         for number, block in enumerate(self.blocks):
             x = block(x, memory[number], level)
-        return state + self.leave(self.norm(x))
+        return state + self.out_proj(self.norm(x))
 
 
 class _StepBlock(nn.Module):

@@ -26,7 +26,7 @@ from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
 from marey.models.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
 from marey.text.features import TextFeatures
-from marey.training.obedience import pipeline_of
+from marey.training.adherence import pipeline_of
 
 OUTPUT = Path("services", "marey", "api", "live", "examples.json")
 """In the checkout."""

@@ -199,7 +199,7 @@ class RQHCTransformer(nn.Module):
         self.register_buffer("no_end", no_end, persistent=False)
         initialize(self)
         if self.depth is not None:
-            nn.init.zeros_(self.depth.leave.weight)  # starts as independent levels
+            nn.init.zeros_(self.depth.out_proj.weight)  # starts as independent levels
         if self.prompt.tell is not None:
             nn.init.zeros_(self.prompt.tell.weight)
         if self.clock is not None:

@@ -3,7 +3,7 @@
     python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 -o report
     python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 --steers 100 --walks 8 -o report
 
-Whole motions are judged as any model's (`marey.training.obedience`). `--steers` are live sessions: 4 s of one
+Whole motions are judged as any model's (`marey.training.adherence`). `--steers` are live sessions: 4 s of one
 evaluation prompt, then another that asks for another act. It is obeyed within 2 s when a stretch that begins in these
 2 s and ends 6 s after the steer does what was asked. `--walks` are sessions of one walking prompt whose frames 1,900 to
 2,000 must still walk. Joints come from the live frames, by forward kinematics, as a client's do.
@@ -28,7 +28,7 @@ from marey.models.mogo.live import LiveSessionPool
 from marey.motion.kinematics import Array, forward_kinematics
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
-from marey.training.obedience import parser_of, pipeline_of, publish, report_of
+from marey.training.adherence import parser_of, pipeline_of, publish, report_of
 
 SESSIONS = 16
 BEFORE, AFTER, WITHIN = 4.0, 6.0, 2.0  # seconds

@@ -11,7 +11,7 @@ import torch.nn.functional as F
 from marey.models.mogo.depth import DepthStep
 from marey.models.mogo.model import RQHCTransformer, TrunkStep
 from marey.nn.compiled import Module, compiled
-from marey.nn.packed import is_small, lower_linears, pack_linears
+from marey.nn.packed import cast_linears, is_small, pack_linears
 
 MOST_GROUPED = 8
 """Sessions of one product: 48 rows. With more of them the product, not reading the weights, is what takes time."""
@@ -47,7 +47,7 @@ class PackedModel:
         if on_cpu:
             pack_linears(self.network, dtype, group=group)
         else:
-            lower_linears(self.network, dtype)
+            cast_linears(self.network, dtype)
         # elsewhere calls are recorded and replayed, and a compiler that looks on would record itself
         made = compiled if on_cpu else _as_it_is
         self.steps = [made(TrunkStep(block)) for block in self.blocks]

@@ -1,8 +1,8 @@
 """What the RQHC-Transformer is trained on: acts from beginning to end, crops, and acts whose prompt changes (ours).
 
 A sample has one act, or two with a seam: a prompt of several acts is drawn as one steer after another
-(`marey.text.acts`), and END says that an act is done. Crops teach what a stream sees behind its window: the prompt far
-away, motion in full swing. Seams teach steering: between the acts of joined clips, and at any moment
+(`marey.text.actions`), and END says that an act is done. Crops teach what a stream sees behind its window: the prompt
+far away, motion in full swing. Seams teach steering: between the acts of joined clips, and at any moment
 (`marey.models.mogo.steers`).
 """
 

@@ -20,6 +20,7 @@ from marey.nn.convolution import ResidualBlock, frame_mask, masked
 from marey.nn.motion_tokenizer import MotionTokenizer
 from marey.nn.quantizer import Quantized
 from marey.nn.scaled_quantizer import ScaledQuantizer
+from marey.nn.stored_names import keep_stored_names
 
 
 @dataclass(frozen=True)
@@ -82,18 +83,19 @@ class Encoder(nn.Module):
 
     def __init__(self, features: int, config: TokenizerConfig) -> None:
         super().__init__()
-        self.enter = nn.Conv1d(features, config.width, 3, padding=1)
+        self.in_proj = nn.Conv1d(features, config.width, 3, padding=1)
         self.stage = nn.Conv1d(config.width, config.width, 3, padding=1)
         self.blocks = nn.ModuleList(ResidualBlock(config.width, d, config.dropout) for d in _dilations(config))
-        self.leave = nn.Conv1d(config.width, config.code_width, 3, padding=1)
+        self.out_proj = nn.Conv1d(config.width, config.code_width, 3, padding=1)
+        keep_stored_names(self)
 
     def forward(self, x: Tensor, mask: Tensor | None) -> Tensor:
         """`mask` (B, 1, T) or None for full windows."""
-        x = masked(F.relu(self.enter(x)), mask)
+        x = masked(F.relu(self.in_proj(x)), mask)
         x = masked(self.stage(x), mask)
         for block in self.blocks:
             x = block(x, mask)
-        return masked(self.leave(x), mask)
+        return masked(self.out_proj(x), mask)
 
 
 class Decoder(nn.Module):
@@ -101,11 +103,12 @@ class Decoder(nn.Module):
 
     def __init__(self, features: int, config: TokenizerConfig) -> None:
         super().__init__()
-        self.enter = CausalConv(config.code_width, config.width, 3)
+        self.in_proj = CausalConv(config.code_width, config.width, 3)
         self.blocks = nn.ModuleList(CausalBlock(config.width, d, config.dropout) for d in _dilations(config))
         self.stage = CausalConv(config.width, config.width, 3)
         self.smooth = CausalConv(config.width, config.width, 3)
-        self.leave = CausalConv(config.width, features, 3)
+        self.out_proj = CausalConv(config.width, features, 3)
+        keep_stored_names(self)
 
     def start(self, batch: int) -> DecoderState:
         """Before the first frame: zeros, as if motionless latents of zero had come before."""
@@ -114,14 +117,14 @@ class Decoder(nn.Module):
 
     def forward(self, x: Tensor, state: DecoderState) -> tuple[Tensor, DecoderState]:
         """The next T frames (B, D, T) of latents (B, d, T), and the state behind them."""
-        pasts = list(state.pasts)  # in the order of `start`: enter, blocks, stage, smooth, leave
-        x, pasts[0] = self.enter.advance(x, pasts[0])
+        pasts = list(state.pasts)  # in the order of `start`: in_proj, blocks, stage, smooth, out_proj
+        x, pasts[0] = self.in_proj.advance(x, pasts[0])
         x = F.relu(x)
         for i, block in enumerate(self.blocks, 1):
             x, pasts[i] = block(x, pasts[i])
         x, pasts[-3] = self.stage.advance(x, pasts[-3])
         x, pasts[-2] = self.smooth.advance(x, pasts[-2])
-        x, pasts[-1] = self.leave.advance(F.relu(x), pasts[-1])
+        x, pasts[-1] = self.out_proj.advance(F.relu(x), pasts[-1])
         return x, DecoderState(tuple(pasts))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from marey.checks.prompts import PromptSet, evaluation_prompts
 from marey.data.captions import caption, seeded
-from marey.data.told import told, told_caption, told_sequence
+from marey.data.human_captions import human_caption, human_captions, human_sequence
 from tests.support.bodies import bower, raiser, runner, walker, waver
 from tests.unit.data.test_captions import facts, plain
 
@@ -42,34 +42,34 @@ def fields_of(text: str) -> set[str]:
 
 
 def test_every_act_that_prompts_ask_for_is_told_in_many_ways():
-    assert set(told().acts) == set(KNOWN)
-    assert all(len(rows) >= 60 for rows in told().acts.values())
+    assert set(human_captions().acts) == set(KNOWN)
+    assert all(len(rows) >= 60 for rows in human_captions().acts.values())
 
 
 @pytest.mark.parametrize("act", KNOWN)
 def test_captions_of_an_act_name_only_what_is_measured_on_it(act):
-    for row in told().acts[act]:
+    for row in human_captions().acts[act]:
         assert fields_of(row) <= KNOWN[act], row
         if "side" in KNOWN[act] and not act.endswith("_both"):
             assert fields_of(row) & {"side", "hands", "arms", "one"}, row
 
 
 def test_frames_have_each_act_once():
-    for rows, acts in ((told().two, "ab"), (told().stop, "ab"), (told().three, "abc")):
+    for rows, acts in ((human_captions().two, "ab"), (human_captions().stop, "ab"), (human_captions().three, "abc")):
         for row in rows:
             named = [name[0] for name in re.findall(r"{([abc](?:_\w+)?)}", row)]
             assert sorted(named) == list(acts), row
 
 
 def test_one_side_after_the_other_names_both_sides():
-    for row in (row for rows in told().same.values() for row in rows):
+    for row in (row for rows in human_captions().same.values() for row in rows):
         assert fields_of(row) == {"a_side", "b_side"}, row
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_every_told_caption_is_complete_english(name):
     found = EXAMPLES[name]()
-    texts = {told_caption(found, seeded(k)) for k in range(300)}
+    texts = {human_caption(found, seeded(k)) for k in range(300)}
     assert len(texts) > 100
     for text in texts:
         assert text is not None
@@ -79,7 +79,7 @@ def test_every_told_caption_is_complete_english(name):
 @pytest.mark.parametrize(("name", "side", "wrong"), [("turn", "left", "right"), ("raise", "right", "left")])
 def test_a_told_side_is_the_side_of_the_motion(name, side, wrong):
     for k in range(300):
-        text = (told_caption(EXAMPLES[name](), seeded(k)) or "").lower()
+        text = (human_caption(EXAMPLES[name](), seeded(k)) or "").lower()
         assert side in text, text
         if name == "turn":
             assert not re.search(rf"\b{wrong}\b(?!.angle)", text), text
@@ -87,7 +87,7 @@ def test_a_told_side_is_the_side_of_the_motion(name, side, wrong):
 
 def test_a_told_sequence_says_both_acts_and_is_complete():
     parts = [EXAMPLES["walk"](), EXAMPLES["wave"]()]
-    texts = {text for k in range(300) if (text := told_sequence(parts, seeded(k))) is not None}
+    texts = {text for k in range(300) if (text := human_sequence(parts, seeded(k))) is not None}
     assert len(texts) > 150
     for text in texts:
         assert re.search("wav|left|greet|hand|arm|hello|bye|farewell", text.lower()), text
@@ -95,7 +95,7 @@ def test_a_told_sequence_says_both_acts_and_is_complete():
 
 
 def test_some_captions_of_a_clip_are_told_and_some_made_by_the_grammar():
-    rows = [re.sub(r"{\w+}", "", row) for row in told().acts["bow"]]
+    rows = [re.sub(r"{\w+}", "", row) for row in human_captions().acts["bow"]]
     whole = {plain(row) for row in rows if row}
     drawn = [plain(caption([EXAMPLES["bow"]()], seeded(k))) for k in range(200)]
     share = sum(any(text.startswith(row[:30]) for row in whole) for text in drawn) / len(drawn)
@@ -104,7 +104,7 @@ def test_some_captions_of_a_clip_are_told_and_some_made_by_the_grammar():
 
 @pytest.mark.parametrize("which", get_args(PromptSet))
 def test_no_prompt_of_a_set_is_told(which):
-    tables = (told().acts, told().same, told().pairs)
+    tables = (human_captions().acts, human_captions().same, human_captions().pairs)
     patterns = [re.compile(pattern(row)) for table in tables for rows in table.values() for row in rows]
     for prompt in evaluation_prompts(which):
         assert not any(p.fullmatch(plain(prompt.text)) for p in patterns), prompt.text

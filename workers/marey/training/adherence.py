@@ -6,7 +6,7 @@
 What is chosen by looking at numbers (steps, guidance, temperature) is chosen with `--captions DATA`, the captions of a
 prepared folder's validation clips, or `--prompts development`, never on the evaluation prompts. `--prompts blind` asks
 for a second set of those, by an author who knew neither the training captions nor the first set, and `fresh` for a
-third one, mostly of two acts.
+third one, mostly of two actions.
 
 The checker reads joints only and knows nothing of the model; its own rate on real clips belongs beside every number
 here. Motions are judged as users get them: feet cleaned, rotations solved.

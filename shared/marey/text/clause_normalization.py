@@ -1,9 +1,10 @@
-"""How an act is told: in the words and forms that captions have (ours, after MOGO's TCA, which asks a language model).
+"""Normalise the clauses of actions to the words and forms of training captions (ours, after MOGO's TCA, which asks a
+language model).
 
 A prompt's clause may be a command ("raise its left arm, bring it down"), a note ("right arm up and down") or a noun ("a
-short walk"). A model whose captions say "a person raises the left arm" obeys that, and of such clauses half: sentence
-encoders that read alike for people lie far apart for it. So who does it, the third person and the present tense are
-put in, and an arm that is put down is lowered; nothing that is done is added or left out.
+short walk"). A model trained on captions such as "a person raises the left arm" follows those prompts, but only
+half of such clauses: sentence encodings of paraphrases lie far from each other. So the subject, the third person and
+the present tense are inserted, and "put the arm down" becomes "lower the arm"; no action is added or dropped.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import replace
 from marey.text.clauses import DOING, LIMBS, LISTS, SIDES, SUBJECTS, Clause
 from marey.text.words import inflected, is_past, lemma
 
-NOBODY = "a person"
+DEFAULT_SUBJECT = "a person"
 
 _BY = re.compile(r"\b(?:start|begin|end|continue|finish)(?:s|es|ing|ning)? by\b ?")
 _LOWERED = re.compile(
@@ -28,20 +29,20 @@ _ASIDE, _LETTING, _OF_WHAT, _PEOPLE, _UNFINITE = (
 _PERSONS = SUBJECTS - {"his", "her", "their", "this", "that"}
 
 
-def told_in_order(acts: tuple[str, ...]) -> str:
-    """One sentence that says them one after the other."""
+def join_in_order(acts: tuple[str, ...]) -> str:
+    """Join actions into one sentence, in order of time."""
     return ", and then ".join([acts[0], *(act[:1].lower() + act[1:] for act in acts[1:])]) + "."
 
 
-def told(clause: Clause) -> str:
-    """A clause as a sentence, with somebody who does it."""
+def normalize_clause(clause: Clause) -> str:
+    """A clause as a sentence in the third person with a subject."""
     clause = _present(_without_aside(clause))
     said = _BY.sub("", " ".join(clause.words)).strip(" ,;:.")
-    return _LOWERED.sub(_lowered, _with_somebody(clause, said))
+    return _LOWERED.sub(_lowered, _with_subject(clause, said))
 
 
 def noun_of(clause: Clause) -> str:
-    """The noun that says what is done: "bow" of "a slow bow"; empty where it is a verb, or there is none."""
+    """The noun that names the action: "bow" in "a slow bow"; empty if it is a verb or missing."""
     for k in range(min(4, len(clause))):
         if clause.bare(k) in _OF_WHAT:
             return ""
@@ -52,36 +53,36 @@ def noun_of(clause: Clause) -> str:
     return ""
 
 
-def _with_somebody(clause: Clause, said: str) -> str:
+def _with_subject(clause: Clause, said: str) -> str:
     first, second = clause.bare(0), clause.bare(1)
     small = said[:1].lower() + said[1:]
     if first in SIDES and second in LIMBS:
         return _of_a_limb(clause, small)
     noun = noun_of(clause)
     if noun:
-        return f"{NOBODY} {DOING[noun]} {small}"
+        return f"{DEFAULT_SUBJECT} {DOING[noun]} {small}"
     if first in _PEOPLE:
         return f"{'an' if first[0] in 'aeiou' else 'a'} {small}"
-    if first in SUBJECTS or _somebody_later(clause):
+    if first in SUBJECTS or _subject_later(clause):
         return said
     doing = first.endswith("ing") or (second.endswith("ing") and (first.endswith("ly") or first in {"just", "still"}))
-    return f"{NOBODY} {'is ' if doing else ''}{small}"
+    return f"{DEFAULT_SUBJECT} {'is ' if doing else ''}{small}"
 
 
 def _of_a_limb(clause: Clause, said: str) -> str:
-    """ "right arm waves", "left hand up and down", "both hands go up": who has the arm."""
+    """Add a subject to clauses about a limb: "right arm waves", "left hand up and down", "both hands go up"."""
     side, limb, rest = clause.bare(0), clause.bare(1), " ".join(clause.words[2:]).strip(" ,;:.")
     both = side in {"both", "two"}
     own = f"{side} {limb}" if both else f"the {side} {limb}"
     if clause.bare(2).startswith("wav"):
-        return " ".join([NOBODY, "waves", own, *rest.split()[1:]])
+        return " ".join([DEFAULT_SUBJECT, "waves", own, *rest.split()[1:]])
     if clause.verbs & set(range(2, len(clause))):
-        return said if both else f"{NOBODY}'s {said}"
-    return f"{NOBODY} puts {own} {rest}".strip()
+        return said if both else f"{DEFAULT_SUBJECT}'s {said}"
+    return f"{DEFAULT_SUBJECT} puts {own} {rest}".strip()
 
 
-def _somebody_later(clause: Clause) -> bool:
-    """Whether who does it is named behind a comma: "after some more steps, he jogs off"."""
+def _subject_later(clause: Clause) -> bool:
+    """Return True if the subject follows behind a comma: "after some more steps, he jogs off"."""
     return any(
         clause.stopped(k, ",") and clause.bare(k + 1) in _PERSONS and _done_within(clause, k + 2)
         for k in range(len(clause) - 2)
@@ -89,12 +90,12 @@ def _somebody_later(clause: Clause) -> bool:
 
 
 def _done_within(clause: Clause, start: int) -> bool:
-    """Whether a verb stands there or two words on; "the other arm hanging" does nothing."""
+    """Return True if a verb stands there or up to two words on; not for "the other arm hanging"."""
     return any(clause.is_verb(k) and not clause.bare(k).endswith("ing") for k in range(start, start + 3))
 
 
 def _without_aside(clause: Clause) -> Clause:
-    """Without the words before its comma that say only when: "when the show is over, she bows"."""
+    """Drop the words before the comma that give only a time: "when the show is over, she bows"."""
     if clause.bare(0) not in _ASIDE:
         return clause
     for k in range(len(clause) - 2):
@@ -104,7 +105,7 @@ def _without_aside(clause: Clause) -> Clause:
 
 
 def _present(clause: Clause) -> Clause:
-    """Commands and what was done as what is done: "raise its arm, drop it", "raises the arm, drops it"."""
+    """Convert imperatives and past forms to the present: "raise its arm, drop it", "raises the arm, drops it"."""
     start = 0
     while clause.bare(start).endswith("ly"):
         start += 1
@@ -112,7 +113,7 @@ def _present(clause: Clause) -> Clause:
     if first in SUBJECTS | SIDES or first.endswith("ing") or not (clause.is_verb(start) or first in DOING):
         return clause
     if lemma(first) != first and not is_past(first):
-        return clause  # "walks": told already
+        return clause  # "walks": normalised already
     bidden = not is_past(first)
     words, letting = list(clause.words), False
     for verb in sorted({start, *clause.verbs, *(_listed(clause) if bidden else ())}):
@@ -126,7 +127,7 @@ def _present(clause: Clause) -> Clause:
 
 
 def _listed(clause: Clause) -> set[int]:
-    """Words behind a comma in front of "it": "raise the arm, bring it down", whatever the labeller made of them."""
+    """Words behind a comma in front of "it" are verbs: "raise the arm, bring it down", whatever the labeller found."""
     return {
         k + 1
         for k in range(len(clause) - 2)

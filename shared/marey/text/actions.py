@@ -1,8 +1,9 @@
-"""The acts of a prompt in the order of time: "after bowing, she walks off" to "a person is bowing" and "she walks off".
+"""Split a prompt into its actions in order of time: "after bowing, she walks off" gives "a person is bowing" and "she
+walks off".
 
-A model that draws one act at a time (MOGO's steers) is told them one after another. English only, as all captions are:
-what joins acts is a closed set of words, so these are rules over the words and the graph's verbs. What the rules do not
-see stays one act, said by the whole prompt.
+A model that generates one action at a time (MOGO's steers) receives them one after another. English only, like all
+captions: actions are joined by a closed set of words, so these are rules over the words and the graph's verbs. A prompt
+that the rules do not split stays one action.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from marey.text.clause_normalization import normalize_clause, noun_of
 from marey.text.clauses import LIMBS, LISTS, SIDES, SUBJECTS, Clause
 from marey.text.graph import SemanticGraph
-from marey.text.telling import noun_of, told
 
-MOST = 6
-"""Acts of a prompt; what comes behind them stays in the last."""
+MAX_ACTIONS = 6
+"""Actions of a prompt; what comes behind them stays in the last."""
 
 
 def _whose(phrase: str) -> tuple[str, ...]:
@@ -40,33 +41,33 @@ _TRAVELS, _TURNS, _KEEPING, _BOWING, _LASTING = (
 )
 
 
-def acts_of(graph: SemanticGraph) -> tuple[str, ...]:
-    """Each act as a sentence of its own, at least one; the prompt itself where there is only one."""
+def split_actions(graph: SemanticGraph) -> tuple[str, ...]:
+    """Split a prompt into actions, each as a sentence of its own; the prompt itself if there is only one."""
     text = _with_all_verbs(Clause(graph.words, frozenset(w for node in graph.level("action") for w in node.words)))
     clauses = [_trimmed(clause) for part in _by_connective(text) for clause in _by_verb(part)]
     merged = _merged([clause for clause in clauses if len(clause)])
     kept = [clause for clause in merged if not _pauses(clause)] or merged
     if len(kept) < 2:
         return (graph.text,)
-    sentences = [told(clause) for clause in kept]
-    return (*sentences[: MOST - 1], *filter(None, [" then ".join(sentences[MOST - 1 :])]))
+    sentences = [normalize_clause(clause) for clause in kept]
+    return (*sentences[: MAX_ACTIONS - 1], *filter(None, [" then ".join(sentences[MAX_ACTIONS - 1 :])]))
 
 
 def _with_all_verbs(text: Clause) -> Clause:
-    """With what a labeller takes for a noun: "walk ahead, slow to a stop, and bow", "halts, right hand wave"."""
+    """Add verbs that a labeller takes for nouns: "walk ahead, slow to a stop, and bow", "halts, right hand wave"."""
     bidden = bool(text.verbs) and not _form(text.bare(min(text.verbs)))
-    found = {k for k in range(len(text)) if (bidden and _bidden(text, k)) or _noted(text, k)}
+    found = {k for k in range(len(text)) if (bidden and _imperative_after(text, k)) or _noun_after(text, k)}
     return replace(text, verbs=text.verbs | found)
 
 
-def _bidden(text: Clause, at: int) -> bool:
-    """ "and bow", "and slowly bow"."""
+def _imperative_after(text: Clause, at: int) -> bool:
+    """Find an imperative after "and": "and bow", "and slowly bow"."""
     before = at - 2 if text.bare(at - 1).endswith("ly") else at - 1
     return text.bare(at) in _NOUNS and text.bare(before) == "and"
 
 
-def _noted(text: Clause, at: int) -> bool:
-    """ "right hand wave" behind a way on foot."""
+def _noun_after(text: Clause, at: int) -> bool:
+    """Find a noun phrase after locomotion: "right hand wave"."""
     walked = any(text.bare(v).startswith(_TRAVELS) for v in text.verbs if v < at - 2)
     begins = text.stopped(at - 3, ",;") or text.bare(at - 3) == "and"
     named = text.bare(at).startswith("wav") and text.bare(at - 1) in LIMBS and text.bare(at - 2) in SIDES
@@ -74,7 +75,7 @@ def _noted(text: Clause, at: int) -> bool:
 
 
 def _by_connective(text: Clause) -> Iterator[Clause]:
-    """Clauses that connectives part, in the order of time."""
+    """Split at connectives, in order of time."""
     opening = _opening(text)
     edge = _edge(text) if opening else None
     if edge is not None:
@@ -91,13 +92,13 @@ def _by_connective(text: Clause) -> Iterator[Clause]:
 
 
 def _opening(text: Clause) -> list[str]:
-    """The words that say that a clause of its own comes first; "when the music starts" is none."""
+    """The words that mark a fronted subordinate clause; "when the music starts" is not one."""
     found: list[str] = next((words for words in _FRONTED if text.bares[: len(words)] == words), list[str]())
     return [] if found == ["when"] and text.bare(1) not in {"done", "finished"} else found
 
 
 def _edge(text: Clause) -> int | None:
-    """Where the clause that is said first ends: behind its comma, or before "she"; None where it says no act."""
+    """End of the fronted clause: behind its comma, or before "she"; None if it describes no action."""
     comma = next((k + 1 for k in range(1, len(text) - 1) if text.stopped(k, ",")), None)
     who = next((k for k in range(2, len(text) - 1) if text.bare(k) in {"he", "she", "they"}), None)
     edge = comma if comma is not None else who
@@ -109,7 +110,7 @@ def _edge(text: Clause) -> int | None:
 
 
 def _joins(text: Clause, at: int, join: tuple[str, ...]) -> bool:
-    """Whether two clauses are joined there by these words."""
+    """Return True if two clauses are joined there by these words."""
     end = at + len(join)
     if end >= len(text) or any(text.bare(at + k) != word for k, word in enumerate(join)):
         return False
@@ -124,7 +125,7 @@ def _joins(text: Clause, at: int, join: tuple[str, ...]) -> bool:
 
 
 def _by_verb(text: Clause) -> Iterator[Clause]:
-    """Clauses of a list of verbs: "runs, stops and bows"."""
+    """Split a list of verbs: "runs, stops and bows"."""
     start = 0
     for at in range(1, len(text)):
         if at > start and _lists(text, at):
@@ -134,13 +135,13 @@ def _by_verb(text: Clause) -> Iterator[Clause]:
 
 
 def _lists(text: Clause, at: int) -> bool:
-    """Whether a further verb of a list begins at a word, behind "and" or a comma."""
+    """Return True if a further verb of a list begins at a word, behind "and" or a comma."""
     follows = text.bare(at) == "and" or text.stopped(at - 1, ",;")
     if not follows or not text.verbs & set(range(at)) or text.stopped(at - 1, "."):
         return False
     verb = at + (text.bare(at) == "and")
     if text.bare(verb) in SIDES:
-        return _noted(text, verb + 2)
+        return _noun_after(text, verb + 2)
     while text.bare(verb).endswith("ly"):
         verb += 1
     if not text.is_verb(verb) or _form(text.bare(verb)) != _form(text.bare(min(text.verbs))):
@@ -149,12 +150,12 @@ def _lists(text: Clause, at: int) -> bool:
 
 
 def _form(verb: str) -> str:
-    """The ending that verbs of one list share: `s`, `ing`, or none."""
+    """The ending shared by the verbs of a list: `s`, `ing`, or none."""
     return "ing" if verb.endswith("ing") else "s" if verb.endswith("s") else ""
 
 
 def _trimmed(clause: Clause) -> Clause:
-    """Without the words at its edges that say when it comes."""
+    """Remove time words at the edges of a clause."""
     changed = True
     while changed and len(clause):
         changed = False
@@ -171,7 +172,7 @@ def _trimmed(clause: Clause) -> Clause:
 
 
 def _asked(clause: Clause) -> int:
-    """Words before what is asked for: of "have the character bow" three; 0 where nobody is asked."""
+    """Number of words before the requested action: three in "have the character bow"; 0 without a request."""
     if clause.bare(0) == "please":
         return 1
     if clause.bare(0) not in _ASKING or clause.bare(1) not in _ASKED:
@@ -181,7 +182,8 @@ def _asked(clause: Clause) -> int:
 
 
 def _merged(clauses: list[Clause]) -> list[Clause]:
-    """What is no act of its own goes to the clause before it; another side of the same act is said in full."""
+    """Merge clauses that are no action of their own into the clause before; complete a second side of the same
+    action."""
     found: list[Clause] = []
     for clause in clauses:
         if not found:
@@ -204,7 +206,7 @@ def _merged(clauses: list[Clause]) -> list[Clause]:
 
 
 def _refers(_: Clause, clause: Clause) -> bool:
-    """ "lowers it again", "comes up": part of what was said before."""
+    """Return True if a clause refers to the one before: "lowers it again", "comes up"."""
     verbs = {clause.bare(v) for v in clause.verbs}
     small = set(clause.bares) - verbs
     return bool(verbs) and (
@@ -214,14 +216,15 @@ def _refers(_: Clause, clause: Clause) -> bool:
 
 
 def _lasts(_: Clause, clause: Clause) -> bool:
-    """ "holds two seconds", "keeps it there for a moment": how long what was said before takes."""
+    """Return True if a clause gives the duration of the one before: "holds two seconds", "keeps it there for a
+    moment"."""
     first = min(clause.verbs, default=-1)
     short = first >= 0 and len(clause) - first <= 6 and not (LIMBS | {"left", "right"}) & set(clause.bares)
     return short and clause.bare(first).startswith(_LASTING) and not any(w.endswith("ing") for w in clause.bares)
 
 
 def _undoes(before: Clause, clause: Clause) -> bool:
-    """ "lowers the arm", "and lowers", "straightens": the end of the act before, which was no way on foot."""
+    """Return True if a clause ends the action before, unless that was locomotion: "lowers the arm", "straightens"."""
     if any(before.bare(v).startswith(_TRAVELS) for v in _done(before)) or {"walk", "run", "jog"} & set(before.bares):
         return False
     first = min(clause.verbs, default=-1)
@@ -231,7 +234,8 @@ def _undoes(before: Clause, clause: Clause) -> bool:
 
 
 def _restores(before: Clause, clause: Clause) -> bool:
-    """ "comes back up" of who bowed, "lets both arms fall to the sides" of who raised them."""
+    """Return True if a clause restores the posture: "comes back up" after a bow, "lets both arms fall" after a
+    raise."""
     first = min(clause.verbs, default=0)
     who = 0 if LIMBS & set(clause.bares[:first]) else first
     said = {word for word in clause.bares[who:] if not word.endswith("ly")}
@@ -244,7 +248,7 @@ def _restores(before: Clause, clause: Clause) -> bool:
 
 
 def _swings(before: Clause, clause: Clause) -> bool:
-    """ "lifts both arms" and "waves to them": one wave."""
+    """Return True for "lifts both arms" followed by "waves to them": one wave."""
     lifted = any(before.bare(v).startswith(_LIFTING) for v in before.verbs)
     if not lifted or not clause.verbs or len(clause) > 4 or SIDES & set(clause.bares):
         return False
@@ -252,7 +256,7 @@ def _swings(before: Clause, clause: Clause) -> bool:
 
 
 def _turns(before: Clause, clause: Clause) -> bool:
-    """ "walks" and "turns left", or "turns left" and "walks on": who turns walks."""
+    """Return True for a walk and a turn in either order: "walks" and "turns left" are one action."""
     bares = clause.bares
     travels = any(before.bare(v).startswith(_TRAVELS + _TURNS) for v in _done(before))
     if not travels or not clause.verbs or LIMBS & {*bares, *before.bares}:
@@ -269,7 +273,7 @@ def _turns(before: Clause, clause: Clause) -> bool:
 
 
 def _goes_on(before: Clause, clause: Clause) -> bool:
-    """ "breaks into a run" and "keeps running"; "turns left" and "walks off": the same way."""
+    """Return True if locomotion continues: "breaks into a run" and "keeps running"; "turns left" and "walks off"."""
     first = min(clause.verbs, default=-1)
     if first < 0 or {"left", "right"} & set(clause.bares):
         return False
@@ -283,12 +287,12 @@ def _goes_on(before: Clause, clause: Clause) -> bool:
 
 
 def _done(clause: Clause) -> frozenset[int]:
-    """Where it says what is done: its verbs, or the first word where that is a verb in all but name ("walking on")."""
+    """Positions of the verbs of a clause, or of its first word if that is a verb in all but name ("walking on")."""
     return clause.verbs or frozenset({0} if clause.bare(0).endswith("ing") else ())
 
 
 def _other_side(clause: Clause, side: Clause) -> Clause | None:
-    """ "raises the left hand" and "the right one" to "raises the right hand"."""
+    """Complete a second side: "raises the left hand" and "the right one" gives "raises the right hand"."""
     before, after = (SIDES & set(part.bares) for part in (clause, side))
     if len(before) != 1 or len(after) != 1 or before == after:
         return None
@@ -306,7 +310,8 @@ def _joined(first: Clause, second: Clause) -> Clause:
 
 
 def _pauses(clause: Clause) -> bool:
-    """ "stops", "stands still", "comes to a halt at the door", "speeds up": what comes next says it too."""
+    """Return True for a pause: "stops", "stands still", "comes to a halt at the door", "speeds up"; the next clause
+    implies it."""
     if not clause.verbs:
         return False
     said = clause.bares[min(clause.verbs) :]

@@ -1,4 +1,4 @@
-"""An act as captions say it; verbs are marked by stars."""
+"""An action as captions say it; verbs are marked by stars."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from marey.text.clause_normalization import normalize_clause
 from marey.text.clauses import DOING, LIMBS, SIDES, Clause
-from marey.text.telling import told
 
 
 def clause(marked: str) -> Clause:
@@ -51,7 +51,7 @@ def clause(marked: str) -> Clause:
     ],
 )
 def test_a_clause_is_told_as_captions_say_it(said: str, sentence: str) -> None:
-    assert told(clause(said)) == sentence
+    assert normalize_clause(clause(said)) == sentence
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_a_clause_is_told_as_captions_say_it(said: str, sentence: str) -> None:
     ],
 )
 def test_what_is_told_already_stays(said: str) -> None:
-    assert told(clause(said)) == said.replace("*", "")
+    assert normalize_clause(clause(said)) == said.replace("*", "")
 
 
 WORDS = [
@@ -90,6 +90,6 @@ WORDS = [
 
 @given(st.lists(st.sampled_from(WORDS), min_size=1, max_size=12))
 def test_any_words_are_told_and_neither_side_nor_limb_is_lost(words: list[str]) -> None:
-    sentence = told(clause(" ".join(words)))
+    sentence = normalize_clause(clause(" ".join(words)))
     assert sentence.strip()
     assert set(sentence.lower().replace(",", "").split()) >= {w for w in words if w in SIDES | LIMBS}

@@ -1,4 +1,4 @@
-"""The acts of a prompt, in the order of time; verbs are marked by stars."""
+"""The actions of a prompt, in the order of time; verbs are marked by stars."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from marey.text.acts import MOST, acts_of
+from marey.text.actions import MAX_ACTIONS, split_actions
 from marey.text.graph import SemanticGraph, build_graph
 from marey.text.roles import Frame
 
@@ -66,7 +66,7 @@ def graph(marked: str) -> SemanticGraph:
     ],
 )  # fmt: skip
 def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -> None:
-    assert list(acts_of(graph(prompt))) == acts
+    assert list(split_actions(graph(prompt))) == acts
 
 
 @pytest.mark.parametrize(
@@ -108,19 +108,19 @@ def test_what_follows_in_time_is_told_act_by_act(prompt: str, acts: list[str]) -
     ],
 )
 def test_what_is_one_act_is_said_by_the_whole_prompt(prompt: str) -> None:
-    assert acts_of(graph(prompt)) == (prompt.replace("*", ""),)
+    assert split_actions(graph(prompt)) == (prompt.replace("*", ""),)
 
 
 def test_too_many_acts_are_said_together_in_the_last() -> None:
-    prompt = " then ".join(["he *bows*"] * (MOST + 2))
-    acts = acts_of(graph(prompt))
-    assert len(acts) == MOST
+    prompt = " then ".join(["he *bows*"] * (MAX_ACTIONS + 2))
+    acts = split_actions(graph(prompt))
+    assert len(acts) == MAX_ACTIONS
     assert acts[-1] == "he bows then he bows then he bows"
 
 
 def test_a_prompt_of_joins_alone_is_one_act() -> None:
     for prompt in ("and then", "then then then", "after, before", ". , ;", "first"):
-        assert acts_of(graph(prompt)) == (prompt,)
+        assert split_actions(graph(prompt)) == (prompt,)
 
 
 WORDS = [
@@ -145,6 +145,6 @@ VERBS = ["*walks*", "*walking*", "*bow*,", "*stops*", "*turns*", "*raises*.", "*
 
 @given(st.lists(st.sampled_from(WORDS + VERBS), min_size=1, max_size=24))
 def test_any_order_of_words_has_acts_and_every_act_says_something(words: list[str]) -> None:
-    found = acts_of(graph(" ".join(words)))
-    assert 1 <= len(found) <= MOST
+    found = split_actions(graph(" ".join(words)))
+    assert 1 <= len(found) <= MAX_ACTIONS
     assert all(act.strip() for act in found)

@@ -1,4 +1,5 @@
-"""Whole captions in other people's words: `told.toml`, whose three authors knew neither the grammar nor any prompt.
+"""Whole captions in other people's words: `human_captions.toml`, whose three authors knew neither the grammar nor any
+prompt.
 
 A grammar joins a subject, a verb phrase and an adverb. People also say "Before waving, she walks up to the fence" or
 "left arm up, then the right": a model that never read such sentences obeyed 78 % of a stranger's prompts, and 95 % of
@@ -28,14 +29,14 @@ _FORMS = {None: "third", "ing": "gerund", "base": "base"}
 
 
 @dataclass(frozen=True)
-class Told:
-    """`told.toml`.
+class HumanCaptions:
+    """`human_captions.toml`.
 
     Attributes:
-        acts: by act, or act and `_one` or `_both` hands: captions of it.
-        same: by act, for one side after the other.
+        actions: by action, or action and `_one` or `_both` hands: captions of it.
+        same: by action, for one side after the other.
         pairs: by `first-second`.
-        two, stop, three: frames for any acts; `stop` for an act in place after travel.
+        two, stop, three: frames for any actions; `stop` for an action in place after travel.
     """
 
     acts: dict[str, tuple[str, ...]]
@@ -47,17 +48,17 @@ class Told:
 
 
 @lru_cache(maxsize=1)
-def told() -> Told:
+def human_captions() -> HumanCaptions:
     """The captions of the package."""
-    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("told.toml").read_text("utf-8"))
+    table: dict[str, Any] = tomllib.loads(Path(__file__).with_name("human_captions.toml").read_text("utf-8"))
     acts, same, pairs = ({name: tuple(rows) for name, rows in table[key].items()} for key in ("acts", "same", "pairs"))
     frames = {name: tuple(rows) for name, rows in table["frames"].items()}
-    return Told(acts, same, pairs, **frames)
+    return HumanCaptions(acts, same, pairs, **frames)
 
 
-def told_caption(facts: Facts, rng: random.Random) -> str | None:
-    """A caption of one act, its style in a sentence or an adverb of its own; None where nobody wrote one."""
-    rows = told().acts.get(_key(facts), ())
+def human_caption(facts: Facts, rng: random.Random) -> str | None:
+    """A caption of one action, its style in a sentence or an adverb of its own; None where nobody wrote one."""
+    rows = human_captions().acts.get(_key(facts), ())
     text = _some(rows, fields(facts, rng, "the"), rng) if facts.repeats == 1 else None
     if text is None or rng.random() > STYLED_SHARE:
         return text
@@ -67,8 +68,8 @@ def told_caption(facts: Facts, rng: random.Random) -> str | None:
     return _styled(text, rng.choice(style.after))
 
 
-def told_sequence(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """A caption of two or three acts in their order in time, which need not be that of the words."""
+def human_sequence(parts: Sequence[Facts], rng: random.Random) -> str | None:
+    """A caption of two or three actions in their order in time, which need not be that of the words."""
     own = _own(parts, rng) if len(parts) == 2 and rng.random() < OWN_SHARE else None
     text = own or _framed(parts, rng)
     style = grammar().styles[parts[0].style]
@@ -83,18 +84,18 @@ def _key(facts: Facts) -> str:
 
 
 def _own(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """The words that these two acts have together."""
+    """The words that these two actions have together."""
     first, second = parts
     values = {f"{name}_side": facts.side for name, facts in zip("ab", parts, strict=True) if facts.side}
     if first.act == second.act:
         one_each = {first.side, second.side} == {"left", "right"}
-        return _some(told().same.get(first.act, ()), values, rng) if one_each else None
+        return _some(human_captions().same.get(first.act, ()), values, rng) if one_each else None
     for facts in parts:  # of a turn and a hand each names its own
         if facts.act == "turn":
             values["side"] = facts.side
         elif facts.side:
             values |= {name: _limbs(facts.side, name) for name in ("hands", "arms")}
-    return _some(told().pairs.get(f"{first.act}-{second.act}", ()), values, rng)
+    return _some(human_captions().pairs.get(f"{first.act}-{second.act}", ()), values, rng)
 
 
 def _limbs(side: str, name: str) -> str:
@@ -102,9 +103,11 @@ def _limbs(side: str, name: str) -> str:
 
 
 def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
-    """A frame with each act in its place, in the form that the frame asks for."""
+    """A frame with each action in its place, in the form that the frame asks for."""
     stops = parts[0].act in LOCOMOTION and parts[1].act not in LOCOMOTION
-    frames = told().three if len(parts) == 3 else told().two + (told().stop if stops else ())
+    frames = (
+        human_captions().three if len(parts) == 3 else human_captions().two + (human_captions().stop if stops else ())
+    )
     frame = rng.choice(frames)
     who = rng.choice(grammar().subjects)
     values = {"who": who, "Who": who[:1].upper() + who[1:], "again": mentioned_again(possessive(who))}
@@ -118,7 +121,7 @@ def _framed(parts: Sequence[Facts], rng: random.Random) -> str | None:
 
 
 def _said(facts: Facts, form: str, rng: random.Random) -> str | None:
-    """An act as a verb phrase, or as a noun with its article."""
+    """An action as a verb phrase, or as a noun with its article."""
     if form != "noun":
         return conjugate(with_adverb(phrase_of(facts, rng, "the"), ""), _FORMS[form or None])
     if facts.repeats > 1:
