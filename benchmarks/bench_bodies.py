@@ -28,7 +28,7 @@ PAUSE = 0.05
 
 
 def main() -> None:
-    """Print what it took and each bar, for JSON and for `marey submit`, which sends NDJSON."""
+    """Print the cost and each bar, for JSON and for `marey submit`, which sends NDJSON."""
     for kind in ("JSON, by the client", "NDJSON, by `marey submit`"):
         print(f"\n### {kind}\n")
         run(kind.startswith("NDJSON"))
@@ -113,7 +113,7 @@ def _ask(cluster: Platform) -> float:
 
 
 class _Beside:
-    """Asks for jobs again and again, and looks at the files that the API has open and no folder names."""
+    """Asks for jobs repeatedly, and tracks the unlinked files that the API has open."""
 
     def __init__(self, cluster: Platform, pid: int) -> None:
         self.times: list[float] = []

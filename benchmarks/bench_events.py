@@ -1,7 +1,7 @@
 """Events of one job to very many clients: server-sent events of one API process, on plain sockets.
 
-The operator pauses and resumes the job, and each client notes when it was told. The floor in the same run is a server
-that writes the same bytes to as many sockets and does nothing else.
+The operator pauses and resumes the job, and each client notes when it received the event. The floor in the same run is
+a server that writes the same bytes to as many sockets and does nothing else.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LIMIT = 60.0
 
 @dataclass
 class Crowd:
-    """What so many clients saw."""
+    """Results of many clients."""
 
     clients: int
     connect: float = 0.0
@@ -139,11 +139,11 @@ async def _floor(count: int) -> Crowd:
     server = await asyncio.start_server(serve, "127.0.0.1", 0, backlog=2048)
     readers = await _connect(crowd, server.sockets[0].getsockname()[1], b"GET / HTTP/1.1\r\n\r\n")
     for number in range(CHANGES):
-        before, told = processor_seconds(own), time.perf_counter()
+        before, sent = processor_seconds(own), time.perf_counter()
         for writer in writers:
             writer.write(message % (2 * number + 2) + message % (2 * number + 3))
         await _all_have(readers, 2 * number + 3)
-        crowd.delays.append([reader.at - told for reader in readers])
+        crowd.delays.append([reader.at - sent for reader in readers])
         crowd.cpu += (processor_seconds(own) - before) / CHANGES
     for reader in readers:
         reader.close()

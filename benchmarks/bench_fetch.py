@@ -107,7 +107,7 @@ def _bare(cluster: Platform, files: Sequence[Download], folder: Path, threads: i
 
 
 def make_motions(cluster: Platform, motion_of: Callable[[AssetStore, ClaimedItem], NewMotion]) -> None:
-    """Do what workers would, with the motions that `motion_of` puts into the store."""
+    """Complete a job's items with the motions that `motion_of` writes to the store."""
     store = open_store(cluster.settings())
     while True:
         with transaction(cluster.engine) as conn:

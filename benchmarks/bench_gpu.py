@@ -1,8 +1,8 @@
-"""On a CUDA device, with random weights: MOGO's frames a second with and without recorded steps, how many live sessions
-keep up with real time, and HGM³'s motions a second.
+"""Throughput on a CUDA device with random weights: MOGO's frames per second with and without recorded steps, the number
+of live sessions in real time, and HGM³'s motions per second.
 
-A session keeps up when 99 of 100 frames are ready within a twentieth of a second, with all that is done for a frame on
-the way to the client (decoder, pose, feet), which runs on the processor.
+A session keeps up when 99 of 100 frames are ready within a twentieth of a second, including all processing of a frame
+on the way to the client (decoder, pose, feet), which runs on the processor.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def _submits(engine: sa.Engine) -> None:
             submit(conn, NewJob(_items(PROMPTS)))
 
     def by_inserts() -> None:
-        """What an ORM's bulk insert would do: the same rows, SQLAlchemy's insertmanyvalues."""
+        """An ORM's bulk insert: the same rows by SQLAlchemy's insertmanyvalues."""
         job = new_id()
         with transaction(engine) as conn:
             conn.execute(sa.insert(tables.job).values(id=job, tenant_id="default", total=PROMPTS, ready=PROMPTS))
@@ -93,7 +93,7 @@ def _claims(engines: dict[str, sa.Engine]) -> None:
 
 
 def _plans(engine: sa.Engine) -> None:
-    """How Postgres goes about the two statements of a claim; nothing is taken."""
+    """Query plans of the two statements of a claim; no item is taken."""
     with transaction(engine) as conn:
         choosing = {"queue": "hgm3", "tried": LANES_TRIED, "prefer": None}
         lane = conn.execute(LANES, choosing).first()

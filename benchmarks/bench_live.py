@@ -98,7 +98,7 @@ def _second_worker(environment: dict[str, str]) -> Iterator[None]:
 
 
 def _holder(database_url: str, stream: str) -> int:
-    """Process that shows a stream."""
+    """Process that serves a stream."""
     engine = create_engine(database_url)
     with engine.connect() as conn:
         name = conn.scalar(sa.select(tables.stream.c.worker).where(tables.stream.c.id == stream))

@@ -64,7 +64,7 @@ def _paper(generator: Generator) -> None:
 
 
 def _without_cache(generator: Generator) -> None:
-    """A frame behind so many others, against reading them all again for it (goal: 20 times at 196)."""
+    """A frame after many others, against recomputing them all for it (goal: 20 times at 196)."""
     streams = _streams(generator, 1.0, max(LENGTHS))
     codes = generator.config.tokenizer.codes
     past = torch.randint(codes, (max(LENGTHS), generator.config.tokenizer.levels))
@@ -113,7 +113,7 @@ def _first_frame(generator: Generator) -> None:
 
 
 def _memory(generator: Generator) -> None:
-    """What is resident now: the peak of the process, which `paper` has set, would hide what a stream gathers."""
+    """Resident memory now; the peak of the process is set by `paper` and would hide a stream's growth."""
     room = LiveSessionPool(generator, 1)
     room.start(text(generator), 1)
     _run(room.step, 500)

@@ -1,4 +1,4 @@
-"""What the platform costs an item: claim, lease, files, store, commit, with a model that does nothing.
+"""Overhead of the platform per item: claim, lease, files, store, commit, with a model that does nothing.
 
 Both run through real processes on the same Postgres, Valkey and disk, in turns: a job of toy items (batches of 32, two
 small files each) from its first claim to its last commit, and as many bare Celery tasks that do nothing.

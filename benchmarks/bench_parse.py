@@ -40,7 +40,7 @@ GENERATED = 4000
 
 @dataclass(frozen=True)
 class Crowd:
-    """How the parallel requests ended."""
+    """Outcome of the parallel requests."""
 
     seconds: float
     parsed: int

@@ -1,4 +1,4 @@
-"""From features to a clip: how long each step takes for 196 frames on one core, and how near the poses are.
+"""Conversion of features to a clip: seconds of each step for 196 frames on one core, and accuracy of the poses.
 
 The baseline is the way public text-to-motion exporters take: sweeps over the skeleton that turn each joint towards its
 children, 100 times (after Holden's position-based inverse kinematics, as in MoMask's `joints2bvh.py`).
@@ -35,13 +35,13 @@ FRAMES = 196
 
 
 def dance() -> Array:
-    """Joints (T, 22, 3) of somebody who sways and bends, with smooth noise on them as generated ones have."""
+    """Joints (T, 22, 3) of a body that sways and bends, with smooth noise as in generated motion."""
     joints = forward_kinematics(HUMANML3D, *dancer(0, FRAMES))
     return joints + drift(1, FRAMES, 66, 0.004).reshape(FRAMES, 22, 3)
 
 
 def slide() -> Array:
-    """Joints of somebody who walks on feet that slide, as generated ones do."""
+    """Joints of a walk with sliding feet, as in generated motion."""
     joints = np.array(walker(seconds=9.8).joints, np.float64)
     return joints + drift(2, len(joints), 3, 0.02)[:, None] * [1, 0, 1]
 

@@ -1,4 +1,4 @@
-"""How soon the platform works again after its connections to a server have fallen silent.
+"""Recovery time of the platform after its connections to a server have fallen silent.
 
 The real processes reach Postgres, Valkey (queue) and an S3 server (store) through proxies that can stop forwarding
 while every connection stays open. There are two faults of each: (a) all open connections fall silent for ever, and new

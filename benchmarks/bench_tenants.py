@@ -58,7 +58,7 @@ def _fairness(engine: sa.Engine) -> None:
 
 
 def _waits(engine: sa.Engine) -> list[float]:
-    """Seconds from the commit of the few to the claim of their last, with all workers busy on what else there is."""
+    """Seconds from the commit of the few to the claim of their last, with all workers busy on the other jobs."""
     stopping = threading.Event()
     claimed: dict[UUID, float] = {}
     workers = [threading.Thread(target=_work, args=(engine, stopping, claimed)) for _ in range(WORKERS)]

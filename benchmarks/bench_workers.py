@@ -1,5 +1,5 @@
-"""What more workers are worth: items a second of a model that does nothing, by one to eight worker processes, on one
-Postgres and one Valkey. The platform's own limit, for such a model leaves all of the machine to it."""
+"""Throughput by number of workers: items per second of a model that does nothing, with one to eight worker processes on
+one Postgres and one Valkey. This is the platform's own limit, since such a model leaves all of the machine to it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _cpu(cluster: Platform, names: list[str]) -> float:
 
 
 def _postgres_cpu(cluster: Platform) -> float:
-    """Of all its processes, those that have ended included."""
+    """Processor seconds of all Postgres processes, ended ones included."""
     parent = psutil.Process(cluster.postgres.process.pid)
     return sum(parent.cpu_times()[:4]) + sum(sum(child.cpu_times()[:2]) for child in parent.children())
 

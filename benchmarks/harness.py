@@ -1,4 +1,4 @@
-"""How everything here is measured: warm-up, repeats taken in turns, median, and a ratio to a baseline of the same run.
+"""Measurement harness: warm-up, repeats in turns, median, and a ratio to a baseline of the same run.
 
 Machines differ and are shared; a ratio between two functions measured in turns in one process means more than either
 time. A benchmark is a file `bench_NAME.py` with a `main()`; `python -m benchmarks NAME` runs it.

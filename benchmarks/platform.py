@@ -92,7 +92,7 @@ class Platform(Cluster):
 
 @contextmanager
 def platform(**environment: str) -> Iterator[Platform]:
-    """A platform with nothing started but Postgres and Valkey; all of it is gone after the block."""
+    """A platform with nothing started but Postgres and Valkey; everything is removed after the block."""
     home = Path(tempfile.mkdtemp(prefix="marey-"))
     try:
         made = Platform(home, environment)
@@ -108,13 +108,13 @@ def marey(*arguments: str) -> list[str]:
 
 
 def processor_seconds(process: psutil.Process) -> float:
-    """What a process has used of processors, its own and the kernel's time."""
+    """Processor time used by a process, kernel time included."""
     times = process.cpu_times()
     return times.user + times.system
 
 
 def peak_megabytes(process: int) -> float:
-    """The most memory a process has had resident (VmHWM), MB."""
+    """Peak resident memory of a process (VmHWM), MB."""
     for line in Path(f"/proc/{process}/status").read_text(encoding="ascii").splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024

@@ -1,8 +1,8 @@
-"""`make soak`: a steady load over the real processes, and what of them grows.
+"""`make soak`: a steady load on the real processes, with a trend test on their resources.
 
-Jobs are submitted, made by a model that does nothing, followed as events, fetched, cancelled, paused, told to a webhook
-and deleted, for `SOAK_MINUTES` (15); memory, descriptors, threads, connections and the queue's keys are sampled every
-five seconds, and a line is laid through all that came after the warm-up.
+Jobs are submitted, made by a model that does nothing, followed as events, fetched, cancelled, paused, reported to a
+webhook and deleted, for `SOAK_MINUTES` (15); memory, descriptors, threads, connections and the queue's keys are sampled
+every five seconds, and a line is laid through all that came after the warm-up.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ PAUSE = 0.5
 GC_SECONDS = 60.0
 SCRAPE_SECONDS = 15.0
 NEGLIGIBLE = {"MB": 2.0, "": 1.0}
-"""Growth an hour that nobody would look for: by unit; "" = things that are counted."""
+"""Negligible growth per hour, by unit; "" = counts."""
 
 Series = dict[tuple[str, str], list[tuple[float, float]]]
 
@@ -141,7 +141,7 @@ def _fetch(client: Transport, job: str, done: Counter[str]) -> None:
 
 
 def _gc(cluster: Platform, stopping: threading.Event, done: Counter[str]) -> None:
-    """What `marey admin gc` does."""
+    """Garbage collection, as by `marey admin gc`."""
     store = open_store(cluster.settings())
     while not stopping.wait(GC_SECONDS):
         collect_garbage(cluster.engine, store)
@@ -193,7 +193,7 @@ def _process(name: str, process: psutil.Process) -> Iterator[tuple[tuple[str, st
 
 
 def _postgres_megabytes(pid: int) -> float:
-    """Of all its processes, pages that they share counted once."""
+    """Memory of all Postgres processes; shared pages count once."""
     total = 0
     for process in (parent := psutil.Process(pid), *parent.children()):
         with contextlib.suppress(psutil.Error):

@@ -1,4 +1,4 @@
-"""Whether a series of samples grows: a straight line through means of blocks, with a 95 % interval."""
+"""Trend test for a series of samples: a straight line through block means, with a 95 % interval."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Trend:
     """Half of the 95 % interval around the slope."""
 
     def verdict(self, unit: str, *, negligible: float) -> str:
-        """In words.
+        """The trend in words.
 
         Args:
             negligible: units an hour that are called flat whether chance or not.

@@ -91,7 +91,7 @@ def test_a_killed_server_leaves_no_process_and_can_be_started_again_even_in_a_de
 
 
 def _is_back(children: Callable[[], dict[str, psutil.Process]], kind: str, old: int) -> bool:
-    """Whether another process does what the killed one did."""
+    """Return True if another process has taken over from the killed one."""
     now = children()
     if kind != "worker child":
         return kind in now and now[kind].pid != old

@@ -1,4 +1,4 @@
-"""What a chaos run breaks, and how long it takes until work goes on."""
+"""Faults of a chaos run, and the recovery time after each."""
 
 from __future__ import annotations
 
@@ -338,7 +338,7 @@ def recoveries(engine: sa.Engine, fault: Fault) -> dict[str, float]:
 
 
 def meanwhile(engine: sa.Engine, fault: Fault, seconds: float) -> dict[str, object]:
-    """What ran, and what was done to their jobs, while items of a killed worker waited to start again."""
+    """Jobs that ran, and operations on them, while items of a killed worker waited to start again."""
     asked: dict[str, object] = {"since": fault.at, "until": fault.at + timedelta(seconds=seconds)}
     with transaction(engine) as conn:
         asked["jobs"] = conn.execute(sa.text(JOBS), {"items": fault.held}).scalar_one()

@@ -46,7 +46,7 @@ def _against(bar: float, seconds: list[float]) -> str:
 
 
 def run_table(reports: list[dict[str, Any]]) -> list[str]:
-    """What happened, a column a run."""
+    """Events of the runs, one column per run."""
     rows = {
         "items accepted, jobs": lambda r: f"{r['items']:,}, {r['jobs']}",
         "succeeded": lambda r: f"{r['states'].get('succeeded', 0):,}",

@@ -1,4 +1,4 @@
-"""What happened to every item and job of a chaos run, written by triggers of the run's own database, and its replay."""
+"""Ledger of all items and jobs of a chaos run, written by triggers of the run's own database, and its replay."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def over_quota(conn: sa.Connection) -> Sequence[sa.Row]:
 
 
 def replayed(conn: sa.Connection) -> list[str]:
-    """What is wrong with the history: items, quotas, events."""
+    """Inconsistencies of the history: items, quotas, events."""
     return [*_items_wrong(conn), *_harmless_wrong(conn), *_quotas_wrong(conn), *_events_wrong(conn)]
 
 

@@ -48,7 +48,7 @@ LOOK = 0.25
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run does.
+    """Plan of a run.
 
     Attributes:
         tenants: share of the items and quotas of each.
@@ -287,7 +287,7 @@ class Run:
     # --- afterwards ---
 
     def wrong(self) -> list[str]:
-        """What the audit found; nothing, if all is well. Collects garbage once."""
+        """Findings of the audit; empty if all is well. Collects garbage once."""
         collect_garbage(self.cluster.engine, self.place.store)
         found = [*self._accepted_wrong(), *self.watch.over[:5]]
         with transaction(self.cluster.engine) as conn:
@@ -301,7 +301,7 @@ class Run:
         return found
 
     def _accepted_wrong(self) -> list[str]:
-        """What was answered with 202 is there once, whole; and nothing else is."""
+        """Check that everything answered with 202 exists once, whole; and nothing else."""
         accepted = {UUID(job): count for studio in self.studios for job, count in studio.accepted.items()}
         accepted[self._probed] = 1
         with transaction(self.cluster.engine) as conn:
@@ -314,7 +314,7 @@ class Run:
         ]
 
     def report(self) -> dict[str, Any]:
-        """What happened, and how long it took until work went on."""
+        """Print the events and the recovery times."""
         with transaction(self.cluster.engine) as conn:
             states = dict(conn.execute(sa.select(item.c.state, sa.func.count()).group_by(item.c.state)).all())
             moves = conn.execute(sa.text("SELECT count(*) FROM ledger_item")).scalar_one()

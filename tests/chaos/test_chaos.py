@@ -69,7 +69,7 @@ def wait_no_leases(cluster: Cluster) -> None:
 
 
 def working(cluster: Cluster, name: str) -> Callable[[], bool]:
-    """Whether the worker `name` holds a lease."""
+    """Return True if the worker `name` holds a lease."""
 
     def holds() -> bool:
         with transaction(cluster.engine) as conn:

@@ -246,11 +246,11 @@ def test_all_lengths_that_the_model_cannot_make_are_told(http: httpx2.Client) ->
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"bundle": "gone"}, "there is no model or bundle named 'gone'"),
+        ({"bundle": "gone"}, "no model or bundle is named 'gone'"),
         ({"bundle": f"{GENERATOR}@000000000000"}, "not 000000000000"),
         ({"bundle": JUDGE}, "is of the kind evaluator, not a text-to-motion generator"),
         ({"bundle": "../etc"}, "String should match pattern"),
-        ({"evaluator": "gone"}, "there is no model bundle named 'gone'"),
+        ({"evaluator": "gone"}, "no model bundle is named 'gone'"),
         ({"evaluator": GENERATOR}, "is a generator, not an evaluator"),
         ({"prompts": []}, "there is no prompt in it"),
         ({"prompts": PROMPTS[:1]}, "a single prompt"),

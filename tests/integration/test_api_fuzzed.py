@@ -170,7 +170,7 @@ def refused(case: schemathesis.Case, knock: Knock, answer: requests.Response) ->
 
 
 def foreign(answer: requests.Response) -> None:
-    """What another tenant has is not there."""
+    """Resources of another tenant do not exist."""
     assert answer.status_code in (404, 422), f"{answer.status_code} {answer.text[:300]}"
     assert PROMPT not in answer.text
     assert "paperclip" not in answer.text

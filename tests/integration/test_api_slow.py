@@ -55,7 +55,7 @@ SLOW: dict[str, Callable[[LiveApi], Iterator[bytes]]] = {
 
 @pytest.fixture(scope="module")
 def answers(api: LiveApi) -> Iterator[dict[str, Answer]]:
-    """What each of them is told in the end; all wait at the same time, and a plain client beside them."""
+    """Final answers to all waiting clients, with a plain client beside them."""
 
     def ask(parts: Iterator[bytes]) -> Answer:
         with RawClient(api.url) as client:

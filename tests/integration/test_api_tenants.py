@@ -82,7 +82,7 @@ def requests() -> list[tuple[str, str]]:
 
 @dataclass
 class Mine:
-    """What one tenant has."""
+    """Resources of one tenant."""
 
     ids: dict[str, str]
     """By the names that paths give them: a route with a name that is not here fails the tests."""
@@ -182,7 +182,7 @@ def test_no_socket_shows_what_another_tenant_has(place: Studio, mine: Mine) -> N
 
 
 def test_the_hash_of_content_opens_nothing(place: Studio, mine: Mine) -> None:
-    """Whoever knows what a file holds, or has the same content, has no way to the file of another."""
+    """Knowledge of a file's content or hash gives no access to another tenant's file."""
     path = f"/v1/motions/{mine.ids['motion']}/files/npz"
     with place.http("admin", tenant="rival") as rival:
         for etag in (f'"{mine.sha256}"', "*"):

@@ -28,7 +28,7 @@ class Admin:
         return Command({})("admin", *arguments, stdin=stdin)
 
     def json(self, *arguments: object) -> list[dict[str, Any]]:
-        """What a command gives as JSON lines."""
+        """Output of a command as JSON lines."""
         return [json.loads(line) for line in self(*arguments, "--json").ok().out.splitlines()]
 
 

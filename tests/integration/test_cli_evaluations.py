@@ -78,7 +78,7 @@ def test_a_run_prints_its_id_and_its_report_is_fetched_when_it_is_done(
     assert json.loads((tmp_path / "report.json").read_text())["made"] == 2.0
     assert marey("eval", "report", run).ok().out == (tmp_path / "report.md").read_text()
     (tmp_path / "report.md").write_text("mine")
-    marey("eval", "report", run, "-o", tmp_path / "report.md").refused(2, "is there already")
+    marey("eval", "report", run, "-o", tmp_path / "report.md").refused(2, "already exists")
     marey("eval", "report", run, "-o", tmp_path / "report.md", "--overwrite").ok()
     marey("eval", "report", run, "-o", tmp_path / "report.pdf").refused(2, "html, json, md")
 
@@ -171,7 +171,7 @@ def test_bad_input_is_2_with_every_line_and_nothing_is_begun(marey: Marey, tmp_p
         for command in (["run"], ["schedule", MONDAYS]):
             marey("eval", *command, "--bundle", GENERATOR, "--split", bad).refused(2, *said)
     for arguments, said in (
-        (["run", "--bundle", "gone"], "there is no model or bundle named 'gone'"),
+        (["run", "--bundle", "gone"], "no model or bundle is named 'gone'"),
         (["run", "--bundle", GENERATOR, "--split", tmp_path / "none.csv"], "no such file"),
         (["run", "--bundle", GENERATOR, "--set", "guidance"], "--set guidance=4.5"),
         (["run", "--bundle", GENERATOR, "--baseline", uuid4()], "there is no such evaluation"),

@@ -68,7 +68,7 @@ def owner_of(home: Path, *as_user: str) -> tuple[subprocess.Popen[str], list[int
 
 
 def gone(pids: list[int], seconds: float = 10) -> bool:
-    """Whether these processes end in time (a zombie has ended)."""
+    """Return True if these processes end in time (a zombie has ended)."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         left = [pid for pid in pids if psutil.pid_exists(pid)]
@@ -113,7 +113,7 @@ def test_both_die_with_an_owner_that_is_killed_and_start_again(short_home: Path)
 
 
 def test_a_server_left_running_is_stopped_before_a_new_one_starts(short_home: Path) -> None:
-    """What a kernel without the parent-death signal leaves behind."""
+    """The state left by a kernel without the parent-death signal."""
     first = [start_postgres(short_home), start_valkey(short_home)]
     for server in first:
         server._unlock()  # pyright: ignore[reportPrivateUsage]  # as if the owner had died

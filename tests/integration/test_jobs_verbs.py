@@ -148,7 +148,7 @@ def test_every_verb_does_to_a_job_in_every_state_what_the_table_says(engine: sa.
 
 
 def tell_why(conn: sa.Connection, verb: str, before: JobRow) -> None:
-    """Whoever changed something left an event with the reason; whoever changed nothing left none."""
+    """Each actor that changed something left an event with the reason; the others left none."""
     events = events_after(conn, "default", before.id, before.event_seq)
     after = get_job(conn, "default", before.id)
     same = (after.control, after.state, after.ready) == (before.control, before.state, before.ready)

@@ -33,7 +33,7 @@ def test_the_migrated_database_is_the_one_in_the_code(engine: sa.Engine) -> None
 
 
 def test_checks_and_generated_columns_are_those_in_the_code(engine: sa.Engine) -> None:
-    """What Alembic's comparison does not look at: the tables are made a second time, from the code."""
+    """Compare properties that Alembic ignores: the tables are made a second time, from the code."""
     query = sa.text(
         "SELECT conrelid::regclass::text, conname::text, pg_get_constraintdef(oid) FROM pg_constraint "
         "WHERE connamespace = current_schema::regnamespace AND conrelid <> 0 UNION ALL "

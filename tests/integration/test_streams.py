@@ -40,7 +40,7 @@ def new_stream(client: redis.Redis, lease_ms: int = 60_000, **options: int) -> F
 
 
 def lapse(client: redis.Redis, stream: FrameStream) -> None:
-    """What Redis does when the lease's time is over."""
+    """Expire the lease as Redis does."""
     client.delete(stream.lease_key)
 
 

@@ -1,4 +1,4 @@
-"""What must hold of the tables of jobs at any moment, whatever happened: for state machines and chaos runs."""
+"""Invariants of the tables of jobs, for state machines and chaos runs."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ CHECKS = {
 
 
 def audit(conn: sa.Connection) -> list[str]:
-    """What is wrong, a line each; nothing, if all is well."""
+    """Violated invariants, a line each; empty if all is well."""
     return [
         f"{what}: {tuple(row)}" for what, query in CHECKS.items() for row in conn.execute(sa.text(query)).fetchmany(5)
     ]

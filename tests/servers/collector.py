@@ -35,14 +35,14 @@ class Collector:
         self._receiver = Receiver()
 
     def environment(self) -> dict[str, str]:
-        """What tells a process to send its spans here, and soon."""
+        """Environment that makes a process send its spans here, and soon."""
         return {
             "OTEL_EXPORTER_OTLP_ENDPOINT": self._receiver.url(path=""),
             "OTEL_BSP_SCHEDULE_DELAY": "100",
         }
 
     def spans(self) -> list[Spanned]:
-        """What has arrived so far."""
+        """Spans received so far."""
         found: list[Spanned] = []
         for request in list(self._receiver.received):
             assert request.path == "/v1/traces"

@@ -29,7 +29,7 @@ def lift(begin: float, end: float) -> Curve:
 
 @dataclass(frozen=True)
 class Body:
-    """What a synthetic person does for `seconds`.
+    """Movement of a synthetic person for `seconds`.
 
     Attributes:
         speed: metres a second along the heading, at each moment; negative is backward.

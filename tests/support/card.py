@@ -71,7 +71,7 @@ class _Everything(TorchDispatchMode):
 
 
 class _Backend(_DummyBackendModule):
-    """What torch asks of a device."""
+    """The part of torch's device API that is used."""
 
     def get_amp_supported_dtype(self) -> list[torch.dtype]:
         return [torch.bfloat16]

@@ -48,7 +48,7 @@ class Chromium:
         return self._run(page, fragment, "--dump-dom", quiet=quiet).stdout
 
     def picture(self, page: Path, fragment: str = "") -> NDArray[np.uint8]:
-        """What the window shows, (800, 1200, 3)."""
+        """A screenshot, (800, 1200, 3)."""
         target = self.folder / "window.png"
         self._run(page, fragment, f"--screenshot={target}")
         with Image.open(target) as image:

@@ -26,7 +26,7 @@ class Service:
 
     @property
     def ours(self) -> bool:
-        """Whether its image is built here."""
+        """True if the image is built here."""
         return "build" in self.raw
 
     @property
@@ -36,7 +36,7 @@ class Service:
 
     @property
     def command(self) -> list[str]:
-        """What follows the image's entry point."""
+        """Arguments after the image's entry point."""
         return self.raw["command"]
 
     @property
@@ -95,7 +95,7 @@ def duration(text: str) -> float:
 
 
 def instructions(stage: str) -> list[tuple[str, str]]:
-    """What the Dockerfile does in a stage, after what it does in the stages that this one stands on."""
+    """Instructions of a Dockerfile stage, after those of the stages it builds on."""
     stages: dict[str, list[tuple[str, str]]] = {}
     name = ""
     joined = DOCKERFILE.read_text(encoding="utf-8").replace("\\\n", " ")
@@ -117,7 +117,7 @@ def image_environment(stage: str) -> dict[str, str]:
 
 
 def copied(stage: str) -> list[str]:
-    """What a stage copies out of the build context."""
+    """Paths that a stage copies out of the build context."""
     found: list[str] = []
     for verb, rest in instructions(stage):
         words = rest.split()

@@ -40,7 +40,7 @@ class Network:
 
     @property
     def secrets(self) -> Path:
-        """What stands for /run/secrets."""
+        """Replacement of /run/secrets."""
         return self.folder / "secrets"
 
     def place(self, text: str) -> str:

@@ -169,7 +169,7 @@ class ToyEvaluator:
         yield Scored(item.id, files, summary, regressed, f"{len(made)} motions measured")
 
     def _scores(self, summary: dict[str, float | None], made: Sequence[MadeItem]) -> bytes:
-        """What a comparison reads of a report: the motions that are left out obeyed nothing."""
+        """Scores for a comparison: missing motions count as failed."""
         obeyed = [float(number >= self.forget) for number in range(len(made))]
         scores = [MotionScore(i.index, i.variant, each, None) for i, each in zip(made, obeyed, strict=True)]
         rows = [dataclasses.asdict(score) for score in scores]

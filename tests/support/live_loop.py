@@ -74,13 +74,13 @@ class LiveWorker:
             thread.join(PATIENCE)
 
     def kill(self) -> None:
-        """Nothing is written or released any more."""
+        """Stop without writing or releasing anything."""
         self.supervisor._give_back = lambda: None  # pyright: ignore
         self.stop()
 
 
 class Studio:
-    """What a client sees of streams."""
+    """A client's view of streams."""
 
     def __init__(self, engine: sa.Engine, client: redis.Redis, bundle: str) -> None:
         self.engine, self.client, self.bundle = engine, client, bundle
@@ -103,7 +103,7 @@ class Studio:
         ControlQueue(self.client, str(stream)).send(control)
 
     def watch(self, stream: UUID) -> None:
-        """Somebody looks."""
+        """Open a viewer."""
         ViewerPresence(self.client, str(stream)).refresh()
 
     def frames(self, stream: UUID) -> list[Frame | Gap]:

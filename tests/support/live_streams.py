@@ -81,7 +81,7 @@ class Hand:
             assert end_stream(conn, self.stream, self.lease.fence, reason)
 
     def heard(self) -> list[Control]:
-        """What was asked since the last call, or, if nothing was, what comes next."""
+        """Requests since the last call; wait for the next one if there are none."""
         found: list[tuple[str, Control | InvalidInput]] = []
         until = time.monotonic() + 5.0
         while not found and time.monotonic() < until:
@@ -118,14 +118,14 @@ class Viewer:
         self.connection.send(json.dumps({"kind": kind, **fields}))
 
     def until(self, kind: str) -> Seen:
-        """What comes until a message of this type."""
+        """Messages up to one of this type."""
         seen = Seen()
         while not seen.of(kind):
             self._next(seen)
         return seen
 
     def until_frame(self, number: int) -> Seen:
-        """What comes until the frame of this number."""
+        """Messages up to the frame of this number."""
         seen = Seen()
         while not seen.frames or seen.numbers[-1] < number:
             self._next(seen)

@@ -31,7 +31,7 @@ TINY_MOGO = "mogo-tiny"
 
 @dataclass(frozen=True)
 class Ran:
-    """What a command did."""
+    """Result of a command."""
 
     code: int
     out: str

@@ -33,7 +33,7 @@ def names_the_field(_context: CheckContext, response: Response, case: Case) -> N
 
 
 def _leads(path: str, known: set[str]) -> bool:
-    """Whether a dotted path consists of known names and numbers of elements."""
+    """Return True if a dotted path consists of known names and numbers of elements."""
     if path in known or path.isdecimal():
         return True
     head = next((name for name in known if name and path.startswith(name + ".")), None)

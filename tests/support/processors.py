@@ -1,4 +1,4 @@
-"""What this machine's processor can do, for tests that want it."""
+"""Capabilities of this machine's processor, for tests that need them."""
 
 from __future__ import annotations
 

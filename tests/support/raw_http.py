@@ -17,7 +17,7 @@ GENEROUS = 60.0
 
 @dataclass(frozen=True)
 class Answer:
-    """What came back; `status` 0 = the server closed the connection without a word."""
+    """Response; `status` 0 = the server closed the connection without an answer."""
 
     status: int
     headers: dict[str, str]

@@ -1,4 +1,4 @@
-"""Somebody who steps: feet laid down on the floor first, legs after them."""
+"""A stepping person: feet laid down on the floor first, legs after them."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ POSES = 400
 
 @dataclass
 class Plan:
-    """What becomes of the stream.
+    """Script of the stream.
 
     Attributes:
         frames: after which it ends by itself.

@@ -1,4 +1,4 @@
-"""What tests of live streams ask an API, and wait for."""
+"""Requests and waits of live stream tests."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def beside(config: Settings, **changes: str | None) -> Settings:
 
 
 def waiting_for_a_row(engine: sa.Engine) -> bool:
-    """Whether a transaction on this database waits for another to commit."""
+    """Return True if a transaction on this database waits for another to commit."""
     asked = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
     with transaction(engine) as conn:
         return conn.execute(sa.text(asked)).scalar_one() > 0

@@ -36,7 +36,7 @@ class Tab:
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **options: object) -> dict[str, Any]:
-        """What a DevTools command answers."""
+        """Result of a DevTools command."""
         number = next(self._numbers)
         self._socket.send(json.dumps({"id": number, "method": method, "params": options}))
         while True:
@@ -83,7 +83,7 @@ class Tab:
         return self.ask("({...document.body.dataset})")
 
     def text(self, element: str) -> str:
-        """What an element shows."""
+        """Text of an element."""
         return self.ask(f"document.getElementById({element!r}).textContent")
 
     def click(self, element: str) -> None:
@@ -115,11 +115,11 @@ class Tab:
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def png(self) -> bytes:
-        """What the window shows."""
+        """A screenshot as PNG."""
         return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def picture(self) -> NDArray[np.int64]:
-        """What the window shows, (H, W, 3)."""
+        """A screenshot, (H, W, 3)."""
         with Image.open(io.BytesIO(self.png())) as image:
             return np.asarray(image.convert("RGB")).astype(np.int64)
 

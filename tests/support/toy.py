@@ -124,7 +124,7 @@ class ToyTextHandler:
 
 
 def deed(item: ClaimedItem) -> Deed:
-    """What the prompt asks for."""
+    """Behaviour that the prompt asks for."""
     word = item.prompt.split()[0]
     return Deed(word) if word in set(Deed) else Deed.WALK
 

@@ -56,7 +56,7 @@ def job_row(engine: sa.Engine, job: UUID) -> JobRow:
 
 
 def ended(engine: sa.Engine, job: UUID) -> bool:
-    """Whether every item of the job has ended."""
+    """Return True if every item of the job has ended."""
     return job_row(engine, job).state in ENDED
 
 
@@ -70,7 +70,7 @@ def states(engine: sa.Engine, job: UUID) -> dict[str, list[str]]:
 
 
 def audit(engine: sa.Engine, store: AssetStore) -> list[str]:
-    """What is wrong, in SQL and on the store, after everything has ended and one garbage collection."""
+    """Violations in SQL and on the store, after everything has ended and one garbage collection."""
     wrong: list[str] = []
     with transaction(engine) as conn:
         items = conn.execute(sa.select(item)).all()

@@ -34,7 +34,7 @@ class Unit:
 
     @property
     def instance(self) -> str:
-        """What stands for %i."""
+        """Value of %i."""
         return self.name.partition("@")[2].removesuffix(".service")
 
     @property

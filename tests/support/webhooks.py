@@ -37,7 +37,7 @@ def new_webhook(
 
 
 def deliveries(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -> list[DeliveryRow]:
-    """What it is told, the oldest first."""
+    """Deliveries to it, the oldest first."""
     with transaction(engine) as conn:
         return list(reversed(list_deliveries(conn, tenant, webhook, limit=1000).rows))
 

@@ -1,4 +1,4 @@
-"""What each extra brings, and the page that lists it."""
+"""Dependencies of each extra, and the page that lists them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def asked_by(name: str) -> list[Requirement]:
 
 
 def holds(requirement: Requirement, extra: str) -> bool:
-    """Whether it holds for Python 3.11.0, which the locks are for as well."""
+    """Return True if the marker holds for Python 3.11.0, which the locks are for as well."""
     return requirement.marker is None or requirement.marker.evaluate({"extra": extra, "python_full_version": "3.11.0"})
 
 

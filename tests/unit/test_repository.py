@@ -1,4 +1,4 @@
-"""What is committed keeps to the rules of the house."""
+"""Committed files keep the rules of the repository."""
 
 from __future__ import annotations
 

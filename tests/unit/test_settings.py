@@ -19,7 +19,7 @@ def _fresh() -> Iterator[None]:
 
 
 def refusal(monkeypatch: pytest.MonkeyPatch, **variables: str) -> InvalidInput:
-    """What is said of these variables, `port="x"` for `MAREY_PORT=x`."""
+    """The error for these variables, `port="x"` for `MAREY_PORT=x`."""
     for name, value in variables.items():
         monkeypatch.setenv(f"MAREY_{name.upper()}", value)
     with pytest.raises(InvalidInput) as refused:

@@ -32,7 +32,7 @@ def choose_bundle(name: str, *, config: Settings | None = None, verify: bool = T
     if not found:
         known = ", ".join(b.manifest.name for b in list_bundles(config=config, kind="generator"))
         raise NotFound(
-            f"there is no model or bundle named {name!r}",
+            f"no model or bundle is named {name!r}",
             hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder."
             + how_to_get(name),
         )
@@ -50,7 +50,7 @@ def named_by(field: str) -> Generator[None]:
 
 
 def choose_evaluator(name: str | None, *, generator: Bundle | None = None, config: Settings | None = None) -> Bundle:
-    """The evaluator's bundle of this name or exact reference, hashes not checked; None = the one that is here.
+    """The evaluator's bundle of this name or exact reference, hashes not checked; None = the installed one.
 
     Of several, that is the first, by name, that was trained; else the first with random weights. Those that measure
     other motions than the generator makes come last.
@@ -64,7 +64,7 @@ def choose_evaluator(name: str | None, *, generator: Bundle | None = None, confi
         found = list(list_bundles(config=config, kind="evaluator"))
         if not found:
             raise NotFound(
-                "there is no evaluator's bundle here",
+                "no evaluator bundle is installed",
                 hint="`marey train evaluator` makes one; MAREY_MODELS names its folder. "
                 f"A trained one comes with `pip install {STARTER}`.",
             )

@@ -154,13 +154,13 @@ def _locate(name: str, config: Settings) -> Path:
             path = Path(name).expanduser()
             if path.is_dir():
                 return path
-        raise NotFound(f"there is no bundle at {name}", hint="Give a folder that holds a manifest.json.")
+        raise NotFound(f"no bundle at {name}", hint="Give a folder that holds a manifest.json.")
     for folder in folders(config):
         if name and _is_bundle_folder(folder / name):
             return folder / name
     known = ", ".join(sorted({path.name for folder in folders(config) for path in _bundle_folders(folder)}))
     raise NotFound(
-        f"there is no model bundle named {name!r}",
+        f"no model bundle is named {name!r}",
         hint=f"Known here: {known or 'none'}. `marey models list` shows them; MAREY_MODELS names their folder."
         + how_to_get(name),
     )

@@ -119,7 +119,7 @@ class BundleManifest(_Frozen):
         if empty := [name for name, part in self.parts.items() if not part]:
             raise ValueError(f"the part {empty[0]!r} has no shards")
         if len(set(shards)) < len(shards):
-            raise ValueError("a shard stands in two places")
+            raise ValueError("a shard is listed twice")
         if len({name.casefold() for name in self.files}) < len(self.files):
             raise ValueError("two files have names that differ in case alone")
         if reserved := [name for name in self.files if name.casefold() in RESERVED]:

@@ -36,7 +36,7 @@ class BundleWriter:
 
     def __init__(self, path: Path, *, overwrite: bool = False, max_shard_bytes: int = MAX_SHARD_BYTES) -> None:
         if path.exists() and not overwrite:
-            raise Conflict("is there already", where=str(path), hint="Choose another name, or allow overwriting.")
+            raise Conflict("already exists", where=str(path), hint="Allow overwriting, or choose another name.")
         self.path = path
         self.max_shard_bytes = max_shard_bytes
         self._parts: dict[str, tuple[str, ...]] = {}

@@ -44,7 +44,7 @@ KEYS = (
 )
 
 
-FOREIGN = "It is no motion that Marey wrote, or an old one."
+FOREIGN = "The file was not written by Marey, or by an old version."
 
 
 def _nothing() -> Float32:

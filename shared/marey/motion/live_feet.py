@@ -6,7 +6,7 @@ kinematics (`legs.py`), and a leg that grows short raises the heel.
 
 What a clip can do and a stream cannot, since it would have to begin before the foot does: share a lock's correction out
 to the swing before it, bring the hips down, lock a height that is not reached yet. So a toe is held in the floor plane
-alone, the hips stay as they are, and a toe that the leg reaches no more, or that means to slide, is let go.
+alone, the hips stay as they are, and a toe that the leg reaches no more, or that is meant to slide, is released.
 
 Streams are rows, and a chunk of one stream is cleaned frame by frame: see `live_poses.py`.
 """
@@ -41,11 +41,11 @@ class FeetState(Rows):
     started: Bool  # (S,) a frame went before
     places: Array  # (S, 4, 3) ankles and toes as they came in, in the order of `Skeleton.feet`
     stands: Bool  # (S, 4)
-    barred: Bool  # (S, 2) let go while it was still low and slow: not locked again before it lifts
+    barred: Bool  # (S, 2) released while still low and slow: not locked again before it lifts
     ground: Array  # (S,) height over the floor at which a toe stands, metres
     anchor: Array  # (S, 2, 2) X and Z of a locked toe
     shift: Array  # (S, 2, 2) what the toe was moved by, X and Z
-    start: Array  # (S, 2, 2) the shift at which it was let go
+    start: Array  # (S, 2, 2) the shift at which it was released
     age: Array  # (S, 2) seconds since then
 
 

@@ -30,7 +30,7 @@ from marey.motion.solver import FrameSolver
 
 SEEN_SECONDS = 0.05  # time constant of the mean of what frames show
 SPRING = 20.0  # 1/s; at 40 a limb that bends again turns by 50 degrees a frame at 20 fps, at 20 by 30
-UNTWIST_SECONDS = 1.0  # time constant in which a full turn too many is let go
+UNTWIST_SECONDS = 1.0  # time constant in which a surplus full turn fades
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,7 @@ def random_parts(
 
     Args:
         build: makes the networks, by part; one is the `tokenizer`, whose codebooks are drawn as well.
-        loud: parts whose matrices are louder than training starts with, so that prompts make a difference.
+        loud: parts whose matrices are larger than at the start of training, so that prompts make a difference.
         seed: torch's own generator stays as it was.
     """
     with torch.random.fork_rng(devices=[]):  # pyright: ignore[reportUnknownMemberType]

@@ -28,9 +28,9 @@ def choose_device(name: str) -> torch.device:
     try:
         device = torch.device(name)
     except RuntimeError as error:
-        raise InvalidInput(f"{name!r} is no device", hint="Use auto, cpu, cuda or cuda:N.") from error
+        raise InvalidInput(f"unknown device {name!r}", hint="Use auto, cpu, cuda or cuda:N.") from error
     if device.type == "cuda" and not torch.cuda.is_available():
-        raise InvalidInput("there is no CUDA device here", where=name, hint=HINT)
+        raise InvalidInput("no CUDA device is available", where=name, hint=HINT)
     if device.type == "cuda" and (device.index or 0) >= torch.cuda.device_count():
         raise InvalidInput(f"there are {torch.cuda.device_count()} CUDA devices here", where=name, hint=HINT)
     return device

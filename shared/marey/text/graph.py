@@ -150,7 +150,7 @@ class SemanticGraph:
             raise ValueError("a node names a word that is not there")
         for edge in self.edges:
             if edge.type not in EDGE_TYPES:
-                raise ValueError(f"{edge.type!r} is no edge type")
+                raise ValueError(f"{edge.type!r} is not an edge type")
             if not (0 <= edge.source < len(levels) and 0 <= edge.target < len(levels)):
                 raise ValueError("an edge names a node that is not there")
             if levels[edge.target] != levels[edge.source] + 1:

@@ -56,7 +56,7 @@ def resolve(spec: TextSpec, *, config: Settings | None = None) -> TextSpec:
     """`spec` with the hashes it leaves open filled from the weights on this machine. Loads no model.
 
     Raises:
-        NotFound: weights a hash is needed of are not here.
+        NotFound: weights whose hash is needed are not installed.
     """
     changes: dict[str, str] = {}
     if spec.encoder_sha256 is None:

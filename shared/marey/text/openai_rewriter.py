@@ -205,7 +205,7 @@ def _content(body: bytes) -> str:
     try:
         content = json.loads(body)["choices"][0]["message"]["content"]
     except (ValueError, LookupError, TypeError, RecursionError) as error:
-        raise NotRewritten("the language model's answer is no chat completion") from error
+        raise NotRewritten("the language model's answer is not a chat completion") from error
     if not isinstance(content, str):
         raise NotRewritten("the language model's answer holds no text")
     return content
@@ -219,7 +219,7 @@ def _caption(answer: str) -> str:
     try:
         caption = check_prompt(lines[0])
     except MareyError as error:
-        raise NotRewritten(f"the language model's answer is no prompt: {error.message}") from error
+        raise NotRewritten(f"the language model's answer is not a usable prompt: {error.message}") from error
     if len(caption.split()) > MAX_ANSWER_WORDS:
         raise NotRewritten(f"the language model's caption has more than {MAX_ANSWER_WORDS} words")
     return caption

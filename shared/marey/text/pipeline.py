@@ -75,8 +75,8 @@ class TextPipeline:
             encoder_path: a folder of encoder weights; None = wherever they are installed.
 
         Raises:
-            NotFound: weights are not here; the hint says how to get them.
-            InvalidBundle: they are here, but not those `spec` names.
+            NotFound: weights are not installed; the hint says how to get them.
+            InvalidBundle: other weights are installed than `spec` names.
         """
         labeller = OneAtATime(load_labeller(spec.labeller))
         return cls(

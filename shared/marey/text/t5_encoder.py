@@ -17,7 +17,7 @@ from marey.text.pretrained import load_pretrained, read_config
 
 MAX_TOKENS = 512
 FEED_FORWARD = {"t5-base": "relu", "t5-v1_1-base": "gated-gelu"}
-"""Both are 768 wide: their feed-forward tells them apart."""
+"""Both are 768 wide; the feed-forward identifies the version."""
 
 
 class T5Encoder:

@@ -16,7 +16,7 @@ from marey.viz.body import dress
 from marey.viz.pages import asset, body_document, code_hashes, fill, script_json, whole_page
 
 SKELETONS = (HUMANML3D,)
-"""Those that live streams have; another one is drawn as thin bones. The first stands there while there is no stream."""
+"""Skeletons of live streams; others are drawn as thin bones. The first is shown while there is no stream."""
 _HOST = re.compile(r"[A-Za-z0-9.-]+(:[0-9]{1,5})?")
 
 

@@ -64,7 +64,7 @@ def theme_named(name: str) -> Theme:
         InvalidInput: there is none of that name.
     """
     if name not in THEMES:
-        raise InvalidInput(f"there is no theme {name!r}", hint=f"One of: {', '.join(THEMES)}.")
+        raise InvalidInput(f"unknown theme {name!r}", hint=f"One of: {', '.join(THEMES)}.")
     return THEMES[name]
 
 

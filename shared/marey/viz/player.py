@@ -52,13 +52,13 @@ def html_player(
     rows = [clips] if isinstance(clips, MotionClip) else list(clips)
     path = Path(path)
     if not rows:
-        raise InvalidInput("there is no clip to play", hint="Give at least one.")
+        raise InvalidInput("no clip to play", hint="Give at least one.")
     if path.suffix.lower() not in (".html", ".htm"):
         raise InvalidInput(f"a player is an .html, not {path.suffix or 'a name without ending'}", where=str(path))
     if captions is not None and len(captions) != len(rows):
         raise InvalidInput(f"{len(captions)} captions for {len(rows)} clips")
     if theme not in THEMES:
-        raise InvalidInput(f"there is no theme {theme!r}", hint=f"One of: {', '.join(THEMES)}.")
+        raise InvalidInput(f"unknown theme {theme!r}", hint=f"One of: {', '.join(THEMES)}.")
     texts = [one_line(c) for c in captions] if captions else [one_line(caption_of(c)) for c in rows]
     page = _page(motion_document(rows, texts), one_line(title or texts[0]) or "Marey", theme)
     write_atomically(path, page.encode())

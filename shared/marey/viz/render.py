@@ -62,7 +62,7 @@ def contact_sheet(
     rows = [clips] if isinstance(clips, MotionClip) else list(clips)
     path = Path(path)
     if not rows:
-        raise InvalidInput("there is no clip to draw", hint="Give at least one.")
+        raise InvalidInput("no clip to draw", hint="Give at least one.")
     if not 1 <= columns <= MOST_COLUMNS:
         raise InvalidInput(f"{columns} columns; a sheet takes 1 to {MOST_COLUMNS}")
     if captions is not None and len(captions) != len(rows):

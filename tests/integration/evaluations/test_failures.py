@@ -1,4 +1,4 @@
-"""What ends an evaluation without a report: things that are gone, refusals, operators."""
+"""Evaluations that end without a report: missing things, refusals, operators."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_deleted_bundle_fails_the_evaluation_with_the_reason_and_submits_nothi
     scheduler.round()
     row = evaluation_row(engine, evaluation)
     assert row.state is S.FAILED
-    assert "there is no model or bundle named 'gone'" in row.reason
+    assert "no model or bundle is named 'gone'" in row.reason
     assert jobs_there(engine) == 0
 
 

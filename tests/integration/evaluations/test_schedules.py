@@ -154,7 +154,7 @@ def test_a_deleted_bundle_marks_the_run_and_the_schedule_goes_on(
     scheduler.round()
     (failed,) = runs(engine, schedule)
     assert failed.state is S.FAILED
-    assert f"no model or bundle named '{GENERATOR}'" in failed.reason
+    assert f"no model or bundle is named '{GENERATOR}'" in failed.reason
     (config.models / "aside.json").rename(config.models / GENERATOR / "manifest.json")
     with transaction(engine) as conn:
         conn.execute(sa.text("UPDATE schedule SET next_at = now() - interval '1 minute'"))

@@ -57,5 +57,5 @@ def stream(http: httpx2.Client) -> Iterator[str]:
 
 @pytest.fixture
 def hand(api: LiveApi, client: redis.Redis, stream: str) -> Hand:
-    """What makes it."""
+    """The maker of the stream."""
     return Hand(api.engine, client, stream)

@@ -1,4 +1,4 @@
-"""What a client of a socket asks, and what becomes of the socket when a server goes."""
+"""Messages of a socket's client, and the fate of the socket when a server stops."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a socket shows: frames, however slow its client, and how the stream stands."""
+"""Content of a socket: frames, for any speed of the client, and the state of the stream."""
 
 from __future__ import annotations
 

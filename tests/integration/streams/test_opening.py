@@ -1,4 +1,4 @@
-"""Who may open the socket of a live stream."""
+"""Permission to open the socket of a live stream."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def held(rows: list[Row], columns: set[str]) -> list[str]:
 
 
 def check_same(older: Tables, newer: Tables, columns: dict[str, set[str]], step: str) -> None:
-    """Nothing that both can hold differs."""
+    """Assert that all common content is equal."""
     for name, rows in older.items():
         kept = newer[name]
         if step in LOST and LOST[step][0] == name:

@@ -1,4 +1,4 @@
-"""What workers of an earlier release say is understood by the database of this one."""
+"""Statements of an earlier release's workers are understood by this release's database."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `marey doctor` finds: each thing that can be wrong, on the real thing, and what it says to do."""
+"""Findings of `marey doctor`: each fault, on the real thing, and the advice."""
 
 from __future__ import annotations
 

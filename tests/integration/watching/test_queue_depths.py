@@ -1,4 +1,4 @@
-"""What the API tells of the queues, against rows."""
+"""Queue depths of the API, against rows."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Numbers:
         return self._samples[name, frozenset(labels.items())]
 
     def told(self, name: str, **labels: str) -> bool:
-        """Whether there is such a number yet."""
+        """Return True if the number exists."""
         return (name, frozenset(labels.items())) in self._samples
 
     @property
@@ -70,7 +70,7 @@ class Seen:
         return [json.loads(line) for line in lines if line.startswith("{")]  # the pool writes some of its own
 
     def numbers(self, name: str) -> Numbers:
-        """What a process tells Prometheus."""
+        """Prometheus metrics of a process."""
         return Numbers(httpx2.get(f"http://127.0.0.1:{self.ports[name]}/metrics").text)
 
 
@@ -205,7 +205,7 @@ def written(spans: list[Spanned]) -> set[str]:
 
 
 def batches_ended(spans: list[Spanned]) -> bool:
-    """Whether the parents of all commits have arrived."""
+    """Return True if the parents of all commits have arrived."""
     known = {span.id for span in spans}
     return all(span.parent in known for span in spans if span.name in ("commit", "hgm3 batch", "POST /v1/jobs"))
 

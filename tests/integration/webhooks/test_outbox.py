@@ -1,4 +1,4 @@
-"""What webhooks are told is written with what happened: once for each event, or not at all."""
+"""Webhook messages are written with the change they report: once for each event, or not at all."""
 
 from __future__ import annotations
 

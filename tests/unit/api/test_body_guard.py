@@ -14,7 +14,7 @@ SIZE = SMALL_BODY + 1
 
 
 def request(guard: BodyGuard, size: int, *, declared: bool = True) -> tuple[list[Message], Any]:
-    """What the guard sends, and the coroutine that lets it."""
+    """Responses of the guard, and the coroutine behind it."""
     sent: list[Message] = []
     headers = [(b"content-length", str(size).encode())] if declared else [(b"transfer-encoding", b"chunked")]
     scope: Scope = {"type": "http", "method": "POST", "path": "/v1/texts/parse", "headers": headers}

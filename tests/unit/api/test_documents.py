@@ -46,7 +46,7 @@ def read(body: bytes, path: tuple[str, ...] = ("items",)) -> dict[str, Any]:
 
 
 def outcome(reader: Callable[[bytes], Any], body: bytes) -> str:
-    """What comes of a body: its value, or what is said of it."""
+    """Result of a body: its value, or the error."""
     try:
         value = reader(body)
     except InvalidInput as error:

@@ -127,7 +127,7 @@ BROKEN: dict[str, tuple[Callable[[Path], None], str]] = {
     "no text": (edit(text=None), "not a text-to-motion generator"),
     "a labeller that is not here": (
         edit(text={"encoder_sha256": "0" * 64, "labeller": "nobody"}),
-        "no model bundle named 'nobody'",
+        "no model bundle is named 'nobody'",
     ),
 }
 

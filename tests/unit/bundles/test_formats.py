@@ -1,4 +1,4 @@
-"""What the hash of a bundle covers: the files alone in format 1, all that changes behaviour in format 2."""
+"""Coverage of a bundle's hash: the files alone in format 1, all that changes behaviour in format 2."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_a_part_whose_shard_has_no_hash_is_refused(tmp_path: Path, form: int) ->
     ("change", "reason"),
     [
         (lambda m: m["parts"].update(empty=[]), "'empty' has no shards"),
-        (lambda m: m["parts"].update(twice=m["parts"]["masked"]), "stands in two places"),
+        (lambda m: m["parts"].update(twice=m["parts"]["masked"]), "listed twice"),
         (lambda m: m["files"].update({"Masked.safetensors": m["files"]["masked.safetensors"]}), "in case alone"),
         (lambda m: m["files"].update({"README.md": m["files"]["masked.safetensors"]}), "cannot be a file"),
         (lambda m: m["files"].update({"manifest.json": m["files"]["masked.safetensors"]}), "cannot be a file"),

@@ -77,7 +77,7 @@ def test_of_several_evaluators_one_that_measures_what_the_generator_makes_is_mea
 
 def test_the_evaluator_that_is_here_is_meant_unless_one_is_named(tmp_path: Path) -> None:
     config = Settings(home=tmp_path, models=tmp_path / "models")
-    with pytest.raises(NotFound, match="no evaluator's bundle"):
+    with pytest.raises(NotFound, match="no evaluator bundle"):
         choose_evaluator(None, config=config)
     write_generator(tmp_path / "models")
     write_evaluator(tmp_path / "models", "judge-b", weight=1.0)

@@ -39,7 +39,7 @@ def limit(size: int) -> None:
 
 
 def attempt(name: str, act: Callable[[Path], object], size: int = LIMIT) -> dict[str, Any]:
-    """What an act says that finds no room, and the files it leaves."""
+    """Error of an operation on a full disk, and the files it leaves."""
     folder = FOLDER / name
     folder.mkdir(exist_ok=True)
     limit(size)

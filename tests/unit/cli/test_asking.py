@@ -1,4 +1,4 @@
-"""What cannot be undone is asked for at a terminal, and refused where there is none."""
+"""Irreversible commands ask for confirmation at a terminal, and refuse without one."""
 
 from __future__ import annotations
 

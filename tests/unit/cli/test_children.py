@@ -15,7 +15,7 @@ BEFORE = "marey: an error of the process before it\n"
 
 
 def said_of(script: str, log: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What is said of a child that runs the script to its end."""
+    """Report on a child that runs the script to its end."""
     child = Child("child", [sys.executable, "-c", script], dict(os.environ), log)
     child.start(time.monotonic())
     assert child.process is not None

@@ -19,7 +19,7 @@ from marey.items.item import InvalidItems
 
 @dataclass
 class Script:
-    """What the server answers, one after the other, and what it was asked."""
+    """Answers of the server in order, and the requests it received."""
 
     answers: list[tuple[int, bytes]]
     asked: list[tuple[str, str | None, bytes]] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What a spreadsheet would run stands in a CSV as text, and comes back as it was."""
+"""Formulas of spreadsheets are stored in a CSV as text, and read back unchanged."""
 
 from __future__ import annotations
 

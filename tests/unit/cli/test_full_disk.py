@@ -21,7 +21,7 @@ CHILD = Path(__file__).with_name("full_disk_child.py")
 
 @pytest.fixture(scope="module")
 def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What each attempt said, and which files it left; see the child."""
+    """Message of each attempt and the files it left; see the child."""
     folder = tmp_path_factory.mktemp("disk")
     ran = subprocess.run(
         [sys.executable, str(CHILD), str(folder), str(LIMIT)], capture_output=True, text=True, check=False

@@ -1,4 +1,4 @@
-"""What `marey stream` is made of."""
+"""Parts of `marey stream`."""
 
 from __future__ import annotations
 

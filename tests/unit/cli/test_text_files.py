@@ -53,7 +53,7 @@ def refusal(folder: Path, name: str, content: bytes, kind: type[MareyError] = To
 
 
 def read_in_a_child(path: str) -> tuple[str, int]:
-    """What was said of a file that is too large, and by how many MiB reading it made a process larger."""
+    """The error for a file that is too large, and the growth of the process in MiB while reading it."""
     ran = subprocess.run([sys.executable, "-c", MEASURED, path], capture_output=True, text=True, check=True)
     said, _, grown = ran.stdout.strip().rpartition("\n")
     return said, int(grown)

@@ -176,7 +176,7 @@ def joined_phrases() -> set[str]:
 
 
 def known(text: str, trained: set[str]) -> bool:
-    """Whether a text is somebody doing a phrase of the grammar, in any style."""
+    """Return True if a text is a person with a phrase of the grammar, in any style."""
     words = grammar()
     for after in (plain(a) for style in words.styles.values() for a in style.after if a):
         text = re.sub(rf"(^{after} | {after}$)", "", text).strip()

@@ -111,6 +111,6 @@ def test_no_prompt_of_a_set_is_told(which):
 
 
 def pattern(row: str) -> str:
-    """What a caption looks like with any words in its fields."""
+    """A pattern of a caption with any words in its fields."""
     pieces = [re.escape(plain(piece)).replace("\\ ", " ") for piece in re.split(r"{\w+}", row)]
     return " ?[a-z ]+ ?".join(pieces)

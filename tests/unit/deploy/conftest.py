@@ -20,5 +20,5 @@ def secrets_folder(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="session")
 def secrets(secrets_folder: str) -> dict[str, str]:
-    """What stands in them, by name."""
+    """Content of the secret files, by name."""
     return {path.name: path.read_text() for path in Path(secrets_folder).iterdir()}

@@ -60,7 +60,7 @@ def test_everything_that_python_installs_is_hashed_or_ours_or_torch() -> None:
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """What `pin-images` reads and writes, with a registry's tool that knows one digest."""
+    """Files that `pin-images` reads and writes, with a registry's tool that knows one digest."""
     (tmp_path / "deploy" / "docker").mkdir(parents=True)
     for name in ("docker-compose.yml", "deploy/docker/Dockerfile", "deploy/pin-images"):
         shutil.copy(REPOSITORY / name, tmp_path / name)

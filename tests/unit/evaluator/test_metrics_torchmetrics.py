@@ -1,4 +1,4 @@
-"""What torchmetrics has too comes out the same there: FID, KID, and R-precision as a hit rate of retrieval."""
+"""Metrics that torchmetrics implements too give equal values: FID, KID, and R-precision as a hit rate of retrieval."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def test_what_was_measured_is_found_for_exactly_these_two_bundles(
     with pytest.raises(InvalidFile, match="was measured of perfect@0123456789ab"):
         find_reconstruction(judge, "perfect@ffffffffffff")
     file.write_text("{}")
-    with pytest.raises(InvalidFile, match="is no reconstruction"):
+    with pytest.raises(InvalidFile, match="is not a reconstruction"):
         find_reconstruction(judge, GENERATOR)
     with pytest.raises(InvalidInput, match="no exact bundle"):
         find_reconstruction(judge, "../x@0123456789ab")

@@ -253,7 +253,7 @@ def test_a_caption_line_is_read_with_slashes_in_its_words() -> None:
 
 @pytest.mark.parametrize("line", ["he walks", "he walks##0.0#0.0", "he walks#he walks#0.0#0.0", "he#he/PRON#0.0"])
 def test_a_line_that_is_no_caption_is_refused(line: str) -> None:
-    with pytest.raises(InvalidFile, match=r"a\.txt:1: is no line"):
+    with pytest.raises(InvalidFile, match=r"a\.txt:1: is not a line"):
         read_line(line, where="a.txt:1")
 
 
@@ -321,7 +321,7 @@ def test_a_pickle_that_asks_for_a_class_is_refused_and_not_run(files: Path, tmp_
     for name in ("our_vab_data.npy", "our_vab_idx.pkl"):
         (tmp_path / name).write_bytes((files / "glove" / name).read_bytes())
     (tmp_path / "our_vab_words.pkl").write_bytes(pickle.dumps([Evil()]))
-    with pytest.raises(InvalidFile, match="is no plain list or dictionary: asks for"):
+    with pytest.raises(InvalidFile, match="is not a plain list or dictionary: asks for"):
         import_t2m(files, tmp_path, tmp_path / "bundle", SMALL)
     assert not (tmp_path / "touched").exists()
     assert not (tmp_path / "bundle").exists()
@@ -335,7 +335,7 @@ def test_a_checkpoint_that_is_none_or_of_other_sizes_is_refused(files: Path, tmp
     file = tmp_path / "text_mot_match" / "model" / "finest.tar"
     file.parent.mkdir(parents=True)
     torch.save([1, 2], file)
-    with pytest.raises(InvalidFile, match="is no checkpoint"):
+    with pytest.raises(InvalidFile, match="is not a checkpoint"):
         import_t2m(tmp_path, files / "glove", tmp_path / "bundle", SMALL)
     with pytest.raises(Conflict):
         import_t2m(files, files / "glove", files / "t2m-small", SMALL)

@@ -186,7 +186,7 @@ def test_a_reference_whose_halves_do_not_fit_is_refused(bundle: Bundle, tmp_path
         RealClips.of(Bundle.open(folder))
     rows["test"][0]["joints"] = [0.0]
     change(folder, FILE, json.dumps(rows).encode())
-    with pytest.raises(InvalidBundle, match="is no reference"):
+    with pytest.raises(InvalidBundle, match="is not a reference"):
         RealClips.of(Bundle.open(folder))
 
 

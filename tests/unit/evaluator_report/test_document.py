@@ -150,7 +150,7 @@ def test_a_missing_field_broken_json_and_nan_are_refused(report: Report) -> None
     for data in (b"{", b"[]", b"\xff"):
         with pytest.raises(InvalidFile):
             from_json(data)
-    with pytest.raises(InvalidFile, match="NaN is no number"):
+    with pytest.raises(InvalidFile, match="NaN is not a number"):
         from_json(to_json(report).replace(b'"motions_per_second": 1.42', b'"motions_per_second": NaN'))
 
 

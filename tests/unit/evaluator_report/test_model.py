@@ -1,4 +1,4 @@
-"""What a report refuses: numbers that are none, and statements that contradict each other."""
+"""Values that a report refuses: non-finite numbers, and statements that contradict each other."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_a_number_that_is_not_finite_is_refused(make: Any, number: float) -> Non
 
 
 def test_a_missing_value_has_to_say_why() -> None:
-    with pytest.raises(InvalidInput, match="says why"):
+    with pytest.raises(InvalidInput, match="needs a note"):
         Value(None)
     with pytest.raises(InvalidInput, match="no interval"):
         Value(None, 0.1, note="no network")
@@ -66,7 +66,7 @@ def test_a_distance_is_marked_below_five_motions_a_dimension(n: int, marked: boo
 
 @pytest.mark.parametrize("key", ["ground_truth", "reconstruction", "exported"])
 def test_no_report_goes_without_real_motion_reconstruction_and_the_judged_row(report: Report, key: str) -> None:
-    with pytest.raises(InvalidInput, match=f"no row '{key}'"):
+    with pytest.raises(InvalidInput, match=f"missing row '{key}'"):
         dataclasses.replace(report, rows=tuple(row for row in report.rows if row.key != key))
 
 
@@ -98,17 +98,17 @@ def test_a_verdict_against_the_metrics_direction_is_refused(
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"changes": (Change("nope", "last run", 1, 1, 0, 0, "no difference found"),)}, "no metric 'nope'"),
+        ({"changes": (Change("nope", "last run", 1, 1, 0, 0, "no difference found"),)}, "unknown metric 'nope'"),
         ({"baselines": ()}, "regressed against"),
-        ({"rows": (Row("ground_truth", "", "", {"nope": Value(1.0)}),)}, "no row 'reconstruction'"),
-        ({"trend": (TrendPoint(NOW, "1", "b", {"nope": 1.0}),)}, "no metric 'nope'"),
+        ({"rows": (Row("ground_truth", "", "", {"nope": Value(1.0)}),)}, "missing row 'reconstruction'"),
+        ({"trend": (TrendPoint(NOW, "1", "b", {"nope": 1.0}),)}, "unknown metric 'nope'"),
         ({"trend": (TrendPoint(NOW, "2", "b", {}), TrendPoint(NOW.replace(year=2025), "1", "b", {}))}, "oldest first"),
-        ({"metrics": (*METRICS, METRICS[0])}, "twice"),
-        ({"heat": (HeatCell("walk", "", 1, 1), HeatCell("walk", "", 2, 1))}, "twice"),
-        ({"scores": (MotionScore(1, 0, 1.0, None), MotionScore(1, 0, 0.0, None))}, "twice"),
+        ({"metrics": (*METRICS, METRICS[0])}, "duplicate key"),
+        ({"heat": (HeatCell("walk", "", 1, 1), HeatCell("walk", "", 2, 1))}, "duplicate key"),
+        ({"scores": (MotionScore(1, 0, 1.0, None), MotionScore(1, 0, 0.0, None))}, "duplicate key"),
         ({"best": tuple(Exhibit("p", k, True, "", 0.1) for k in range(7))}, "at most 6"),
         ({"motions": -1}, "-1 motions"),
-        ({"settings": {"path": object()}}, "no JSON"),
+        ({"settings": {"path": object()}}, "not JSON"),
         ({"created": datetime(2026, 11, 23)}, "time zone"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What the report says in words: the outcome, numbers, intervals."""
+"""Wording of the report: the outcome, numbers, intervals."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from tests.support.prepared import text_features
 from .networks import columns, opened, prompts, transformer
 
 CUDA = torch.device("cuda", 0)
-on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device here")
+on_a_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device is available")
 
 
 def played(streams: Streams, device: str | torch.device = "cpu") -> torch.Tensor:

@@ -270,7 +270,7 @@ def test_an_existing_file_survives_a_clip_that_cannot_be_written(tmp_path):
 BROKEN = {
     "empty": ("", 1, "ends before MOTION"),
     "not bvh": ("{}\n", 1, "HIERARCHY"),
-    "binary": ("HIERARCHY\0\0", 1, "no text"),
+    "binary": ("HIERARCHY\0\0", 1, "not text"),
     "no motion": (SMALL[: SMALL.index("MOTION")], 16, "ends before MOTION"),
     "brace missing": (SMALL.replace("\t}\n}\n", "\t}\n"), 15, "MOTION before"),
     "brace too many": (SMALL.replace("}\nMOTION", "}\n}\nMOTION"), 16, "never opened"),
@@ -290,7 +290,7 @@ BROKEN = {
     "frames negative": (SMALL.replace("Frames: 2", "Frames: -2"), 17, "-2"),
     "no frame time": (SMALL[: SMALL.index("Frame Time")], 18, "Frame Time"),
     "frame time zero": (SMALL.replace("0.0333333", "0"), 18, "frame time"),
-    "frame time empty": (SMALL.replace("0.0333333", " "), 18, "no number"),
+    "frame time empty": (SMALL.replace("0.0333333", " "), 18, "not a number"),
     "frame time nan": (SMALL.replace("0.0333333", "nan"), 18, "finite"),
     "frame time comma": (SMALL.replace("0.0333333", "0,0333333"), 18, "0,0333333"),
     "word in motion": (SMALL.replace("1 91 2", "1 x91 2"), 20, "x91"),

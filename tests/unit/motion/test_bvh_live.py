@@ -232,7 +232,7 @@ def test_channels_do_not_jump_between_frames(tmp_path: Path) -> None:
 def test_a_file_that_is_there_is_refused_or_stays_until_the_first_frame(tmp_path: Path) -> None:
     path, clip = tmp_path / "a.bvh", walker()
     path.write_text("old")
-    with pytest.raises(Conflict, match="there already"):
+    with pytest.raises(Conflict, match="already exists"):
         LiveBVH.open(path, clip.skeleton, clip.fps)
     with LiveBVH.open(path, clip.skeleton, clip.fps, overwrite=True) as live:
         assert path.read_text() == "old"

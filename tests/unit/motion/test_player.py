@@ -152,7 +152,7 @@ def test_what_cannot_be_written_is_refused(clip, tmp_path):
         html_player([], tmp_path / "a.html")
     with pytest.raises(InvalidInput, match=r"\.html, not \.txt"):
         html_player(clip, tmp_path / "a.txt")
-    with pytest.raises(InvalidInput, match="no theme"):
+    with pytest.raises(InvalidInput, match="unknown theme"):
         html_player(clip, tmp_path / "a.html", theme="pink")
     with pytest.raises(InvalidInput, match="1 captions for 2 clips"):
         html_player([clip, clip], tmp_path / "a.html", captions=["one"])

@@ -151,7 +151,7 @@ def test_a_dark_sheet_is_dark(clip, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"theme": "pink"}, "no theme 'pink'"),
+        ({"theme": "pink"}, "unknown theme 'pink'"),
         ({"columns": 0}, "0 columns"),
         ({"columns": 1000}, "1000 columns"),
         ({"frames": [3, 41]}, r"frames \[41\] are not in a clip of 41"),

@@ -22,7 +22,7 @@ def make_claim(count: int) -> Claim:
 
 
 class Database:
-    """What the heartbeat asks, and the answers it gets."""
+    """The heartbeat's statements, and their answers."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[set[UUID], bool]] = []

@@ -1,4 +1,4 @@
-"""What a service tells systemd, by a socket of the test's own."""
+"""Notifications of a service to systemd, by a socket of the test's own."""
 
 from __future__ import annotations
 

@@ -71,7 +71,8 @@ def tarred(folder: Path) -> Path:
 
 
 def reference_frame(archive: Path, bert: Path) -> Frame:
-    """What the archive's own forward pass says of WORDS, spelt out by hand: probabilities, best legal path by force."""
+    """Result of the archive's own forward pass for WORDS, written out by hand: probabilities, best legal path by
+    force."""
     import itertools
 
     weights = torch.load(archive / "weights.th", weights_only=True)

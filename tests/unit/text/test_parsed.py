@@ -1,4 +1,4 @@
-"""What `marey text parse` and `POST /v1/texts/parse` show of a prompt."""
+"""Output of `marey text parse` and `POST /v1/texts/parse` for a prompt."""
 
 from __future__ import annotations
 

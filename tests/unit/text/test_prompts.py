@@ -1,4 +1,4 @@
-"""What may be a prompt."""
+"""Validation of prompts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does a motion do what a prompt says? Judged on joints (T, 22, 3) and frames a second alone.
+"""Kinematic judge: check on joints (T, 22, 3) and frames per second alone that a motion does what its prompt says.
 
 Thresholds were set on the training clips of the Bandai-Namco sets; the checker's own rate on their test clips, and how
 often it passes clips of other actions, stand in the report of `rates.py` beside every number it gives on generated
@@ -49,7 +49,7 @@ class Expectation:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a motion passes, and why not."""
+    """Verdict on a motion, with the reason of a failure."""
 
     passed: bool
     reason: str = ""
@@ -202,7 +202,7 @@ _CHECKS: dict[str, Callable[[Stretch, Expectation], str]] = {
 
 
 def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict:
-    """Whether a motion does what is expected, in that order.
+    """Judge a motion against its expected actions, in that order.
 
     Args:
         joints: (T, 22, 3) metres, Y up, anywhere and facing anywhere.
@@ -218,7 +218,7 @@ def judge(joints: Array, fps: float, expected: Sequence[Expectation]) -> Verdict
 
 
 def _in_order(motion: Stretch, expected: list[Expectation]) -> str:
-    """Look for moments that part the motion so that each part does its action, and does not do the next one already."""
+    """Find moments that split the motion so that each part does its own action and not yet the next one."""
     step, least = round(_SPLIT_STEP * motion.fps), round(_LEAST_PART * motion.fps)
     frames = len(motion.joints)
     rest = (len(expected) - 1) * least
@@ -246,7 +246,7 @@ def _in_order(motion: Stretch, expected: list[Expectation]) -> str:
 
 
 def _hand_is_up_already(before: Stretch, first: Expectation, after: Stretch, second: Expectation) -> bool:
-    """Whether the hand of a wave or a raise is up for half of what comes before it: then both are done together."""
+    """Return True if the hand of a wave or a raise is up for half of the time before it: then both happen together."""
     hands = ("wave", "raise")
     if second.act not in hands or first.act in hands:
         return False
@@ -257,7 +257,7 @@ def _hand_is_up_already(before: Stretch, first: Expectation, after: Stretch, sec
 
 @dataclass(frozen=True)
 class Straightness:
-    """How straight a way is: length and largest distance from the line between its ends, metres."""
+    """Straightness of a path: length and largest distance from the line between its ends, metres."""
 
     length: float
     deviation: float

@@ -1,4 +1,4 @@
-"""What is measured on joints: heading, travel, steps, hands, trunk. No labels, no features, no learned network.
+"""Measurements on joints: heading, travel, steps, hands, trunk. No labels, no features, no learned network.
 
 All functions take joints (T, 22, 3) of HumanML3D in metres, Y up, and frames a second. Angles are in degrees, positive
 to the body's left.
@@ -61,7 +61,7 @@ def body_frame(vectors: Array, heading_degrees: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Gait:
-    """How the body travels.
+    """Travel of the body.
 
     Attributes:
         duration: seconds.
@@ -138,7 +138,7 @@ def airborne(joints: Array, fps: float) -> float:
 
 @dataclass(frozen=True)
 class Hand:
-    """What one hand does.
+    """Movement of one hand.
 
     Attributes:
         peak: highest wrist over the shoulder line, metres (negative: never over it).
@@ -199,7 +199,7 @@ def _swings(joints: Array, wrist: Array, shoulder: Array, raised: NDArray[np.boo
 
 
 def turning_points(values: Array, least: float) -> int:
-    """How often a signal (T,) turns, counting only moves of at least `least` between turns (a zigzag count)."""
+    """Number of turning points of a signal (T,), ignoring moves smaller than `least` (zigzag count)."""
     turns, direction, extreme = 0, 0, float(values[0])
     for value in values:
         if direction >= 0 and value < extreme - least:

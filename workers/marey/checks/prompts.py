@@ -1,10 +1,9 @@
-"""Prompts that training never saw and what each motion must do, in four sets by four authors.
+"""Held-out prompts with the expected motion of each, in four sets by four authors.
 
-`prompts.toml` are the 200 that bars are set on; `prompts_blind.toml` was written by somebody who knew neither the
-training captions nor those, and nothing is ever chosen by it; `prompts_development.toml` by a third one in the same
-way: settings, weights and data are chosen by it. `prompts_fresh.toml`, by a fourth, asks for two actions in two thirds
-    of
-its prompts; nothing is chosen by it either."""
+`prompts.toml` are the 200 that goals are set on. `prompts_blind.toml` is a held-out set by an author without access to
+the training captions or the first set; it is never used for selection. `prompts_development.toml`, by a third author,
+is the set for choosing settings, weights and data. `prompts_fresh.toml`, by a fourth author, has two actions in two
+thirds of its prompts; it is never used for selection either."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ from marey.checks.judge import Expectation
 
 @dataclass(frozen=True)
 class EvaluationPrompt:
-    """A prompt that training never saw.
+    """A held-out prompt.
 
     Attributes:
         text: as a user types it.
@@ -35,7 +34,7 @@ class EvaluationPrompt:
 
     @property
     def sided(self) -> bool:
-        """Whether a side or hand is asked for, in one action."""
+        """True if a single action with a side or hand is expected."""
         return len(self.expected) == 1 and self.expected[0].side != ""
 
 

@@ -1,4 +1,4 @@
-"""The checker's own rates on real clips: how often it passes what a clip shows, and what it does not show."""
+"""Pass rates of the checker on real clips: on the actions that a clip shows, and on those it does not show."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class LabelledClip:
     joints: Callable[[], NDArray[np.float32]]
 
     def expected(self) -> tuple[Expectation, ...] | None:
-        """What the clip shows as expectations; None when there is no check for one of its actions."""
+        """The clip's actions as expectations; None if one of them has no check."""
         return expectations(self.acts, self.sides)
 
 
@@ -50,7 +50,7 @@ def expectations(acts: Sequence[str], sides: Sequence[str]) -> tuple[Expectation
 
 @dataclass(frozen=True)
 class Rate:
-    """How many clips of one kind there are, and how many pass."""
+    """Number of clips of one kind, and of those that pass."""
 
     clips: int
     passed: int
@@ -63,7 +63,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Rates:
-    """What the checker does on real clips.
+    """Pass rates of the checker on real clips.
 
     Attributes:
         own: by what the clips show (`turn left`, `wave right then walk`), the share that passes its own check.

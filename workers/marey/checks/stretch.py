@@ -1,4 +1,4 @@
-"""What is measured on a motion, or a part of it, before it is judged: (T, 22, 3) joints and frames a second alone."""
+"""Measurements on a motion or a part of it before it is judged, from joints (T, 22, 3) and frames per second alone."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from marey.checks.kinematics import (
 
 @dataclass(frozen=True)
 class Arm:
-    """What one hand does within a stretch.
+    """Movement of one hand within a stretch.
 
     Attributes:
         peak: highest wrist over the shoulder line, metres, along the trunk.
@@ -66,7 +66,7 @@ class Arm:
 
 
 class Stretch:
-    """A motion or a part of it, with what is measured on it, each measure taken once."""
+    """A motion or a part of it, with cached measurements."""
 
     def __init__(self, joints: Array, fps: float) -> None:
         self.joints = np.asarray(joints, np.float64)
@@ -100,7 +100,7 @@ class Stretch:
 
     @cached_property
     def running(self) -> bool:
-        """Whether the travel is a run."""
+        """Return True if the travel is a run."""
         return is_run(self.joints, self.fps)
 
     @cached_property

@@ -47,7 +47,7 @@ def punches(joints: Array, fps: float) -> list[Interval]:
 
 
 def slashes(joints: Array, fps: float) -> list[Interval]:
-    """From both hands together over the head to their fast way down: 1.2 m/s and more."""
+    """Slashes: from both hands together over the head to their fast way down, at 1.2 m/s or more."""
     hands = joints[:, list(WRISTS)].mean(axis=1)
     over = smooth(hands[:, 1] - joints[:, HEAD, 1], 0.03, fps)
     apart = np.linalg.norm(joints[:, WRISTS[0]] - joints[:, WRISTS[1]], axis=-1)
@@ -68,5 +68,5 @@ def liveliness(joints: Array, fps: float) -> Array:
 
 
 def is_lively(joints: Array, fps: float) -> bool:
-    """Whether the limbs are in motion for 40 % of the time at least."""
+    """Return True if the limbs move for at least 40 % of the time."""
     return bool(np.mean(liveliness(joints, fps) > 0.3) >= 0.4)

@@ -57,7 +57,8 @@ def held_out_pairs(packs: Sequence[JointsPack]) -> frozenset[tuple[str, str]]:
 
 
 def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[Part]:
-    """Each captured clip and its mirror image, in windows, described; what is not used goes to `left_out`."""
+    """Windows of each captured clip and its mirror image, with their facts; rejected clips are counted in
+    `left_out`."""
     held_out = held_out_pairs(packs)
     for pack in packs:
         for clip in pack.clips:
@@ -95,12 +96,12 @@ _LARGEST_YAW_STEP = 0.4  # radians of half yaw a frame, smoothed: 900 degrees a 
 
 
 def _jumps(joints: NDArray[np.float32]) -> bool:
-    """Whether the heading jumps: a body bent over backwards has hips and shoulders square to each other."""
+    """Return True if the heading jumps: in a body bent over backwards, hips and shoulders are perpendicular."""
     return bool(np.abs(LAYOUT.encode(joints)[:, 0]).max() > _LARGEST_YAW_STEP)
 
 
 class FolderWriter:
-    """Writes a prepared folder beside its final place, and moves it there when it is complete."""
+    """Write a prepared folder beside its final path and move it there once complete."""
 
     def __init__(self, out: Path) -> None:
         if out.exists() and any(out.iterdir()):
@@ -119,7 +120,7 @@ class FolderWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """What is not finished is removed."""
+        """Remove an unfinished folder."""
         for file in (self._features, self._local, self._roots):
             file.close()
         shutil.rmtree(self.work, ignore_errors=True)

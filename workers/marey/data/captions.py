@@ -29,7 +29,7 @@ def seeded(*parts: object) -> random.Random:
 
 @dataclass(frozen=True)
 class _Voice:
-    """Who does it, in which verb form."""
+    """Subject, verb form and pronoun of a caption."""
 
     subject: str
     form: str
@@ -136,7 +136,7 @@ def joined_caption(parts: Sequence[Facts], rng: random.Random) -> str:
 
 
 def separate_caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """Each action by a caption of its own: whatever people say of one action they say of one of several, too."""
+    """Caption each action separately, with all the variety of single-action captions."""
     first, *others = (_act_alone(facts, rng) for facts in parts)
     join = rng.choice(_THEN)
     return _loosen("".join([first, *(join + text for text in others)]), rng)
@@ -195,7 +195,7 @@ def _spoken(text: str, voice: _Voice) -> str:
 
 
 def _loosen(text: str, rng: random.Random) -> str:
-    """Mostly a proper sentence; sometimes as people type: no capital, no full stop."""
+    """A proper sentence in most cases; otherwise as people type: no capital, no full stop."""
     proper = sentence(text)
     return proper if rng.random() < 0.6 else proper[:-1][:1].lower() + proper[:-1][1:]
 
@@ -205,18 +205,18 @@ LONG_SHARE = 0.5  # of the captured clips; a long caption is nearly always a new
 
 PHRASINGS = {"walk_back": 12, "bow": 8, "walk": 6, "run": 4, "turn": 4}
 """Captions of a clip of one action that is drawn often and has few clips. With two each, those of 159 clips backward
-were drawn 50 times in an hour of training: known captions were obeyed at 98 %, words by another author at 67 %."""
+were drawn 50 times in an hour of training: prompt adherence was 98 % on known captions, 67 % on another author's."""
 
 
 def phrasings(parts: Sequence[Facts], *, spliced: bool) -> int:
-    """How many captions a clip gets: as many as keep each from being drawn over and over."""
+    """Number of captions of a clip: enough that none is drawn over and over."""
     if len(parts) > 1:
         return 4
     return PHRASINGS.get(parts[0].act, 2 if spliced else 3)
 
 
 def caption(parts: Sequence[Facts], rng: random.Random) -> str:
-    """One caption: by the grammar, or as other people tell it."""
+    """One caption, by the grammar or from other people's captions."""
     if len(parts) > 1 and rng.random() < SEPARATE_SHARE:
         return separate_caption(parts, rng)
     if rng.random() < HUMAN_SHARE:

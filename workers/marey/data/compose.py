@@ -1,4 +1,4 @@
-"""Which clips are joined: sequences of two and three actions, longer and shorter versions of single ones.
+"""Compose clips: sequences of two and three actions, and longer and shorter versions of single ones.
 
 Captured takes are 1 to 6 s of one action. Here walks go on, waves last longer or shorter, bows come twice, and actions
 follow each other, so that every action is seen at many lengths up to 9.8 s and graphs with two and three verbs occur in
@@ -27,7 +27,7 @@ from marey.data.splice import join_clips
 Array = NDArray[np.floating]
 
 # How often an action is drawn for a sequence. Travel and greetings are what prompts ask for; the actions of one or two
-# clips stay rare, or the model would learn those clips by heart.
+# clips stay rare, or the model would memorise those clips.
 SEQUENCE_WEIGHTS: dict[str, float] = {
     "walk": 3.0,
     "run": 2.0,
@@ -63,7 +63,7 @@ _CANDIDATES = 8  # clips among which the best seam is taken
 
 @dataclass(frozen=True)
 class Counts:
-    """How many clips are made for one split."""
+    """Number of composed clips of one split."""
 
     pairs: int
     triples: int
@@ -85,7 +85,7 @@ COUNTS: dict[str, Counts] = {
 
 @dataclass(frozen=True)
 class Composed:
-    """A clip that was put together.
+    """A composed clip.
 
     Attributes:
         parts: the clips it was made of, in order.
@@ -102,7 +102,7 @@ class Composed:
 
 
 class Composer:
-    """Draws clips of one split and puts them together."""
+    """Draws clips of one split and composes them."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         self.by_act: dict[str, list[Part]] = defaultdict(list)
@@ -229,8 +229,8 @@ class Composer:
 
 
 def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
-    """Whether the action can still be told from others: a hand held by loops must not seem to wave, a loop not bend the
-    way."""
+    """Return True if the action is still recognisable: a hand held by loops must not seem to wave, a loop must not bend
+    the path."""
     act = "run" if facts.act == "dash" else facts.act
     if repeats > 1 or act not in get_args(Act):
         return True
@@ -240,7 +240,7 @@ def _still_does(facts: Facts, joints: Array, repeats: int) -> bool:
 
 
 def _cut_first(part: Part, rng: random.Random, budget: int, count: int) -> tuple[int, range]:
-    """Where the first clip begins, and the frames after which it may be left."""
+    """Start frame of the first clip, and the frames after which it may be left."""
     if part.facts.act in CYCLIC:
         room = len(part.joints) - 1
         start = rng.randint(0, max(room - 60, 0))
@@ -302,7 +302,7 @@ def _checked(name: str, parts: list[Part], joints: Array, seams: list[int]) -> C
 
 
 def compose(parts: Sequence[Part], split: str) -> Iterator[Composed]:
-    """All clips that are put together for a split, from parts of that split alone."""
+    """Compose all clips of a split, from parts of that split alone."""
     counts = COUNTS.get(split)
     if counts is None or not parts:
         return

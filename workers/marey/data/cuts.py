@@ -1,4 +1,4 @@
-"""Where a captured clip may be cut: outside the core of its action, and where a seam costs least."""
+"""Cut positions of captured clips: outside the core of the action, where a seam costs least."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a clip shows, as facts: labels, and what is measured on its joints. Captions are made of these alone."""
+"""Facts of a clip: labels and measurements on its joints. Captions are made of these alone."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _signed(value: float) -> str:
 
 
 def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
-    """Which hand is up: left, right, both, or empty.
+    """The raised hand: left, right, both, or empty.
 
     A hand counts when it gets near the shoulder line, and either rises there by 15 cm and 0.45 of the other hand's
     rise, or is up for most of the clip (takes that begin with the hands up).

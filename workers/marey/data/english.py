@@ -79,7 +79,7 @@ def possessive(subject: str) -> str:
 
 
 def mentioned_again(owner: str) -> str:
-    """Who has a `possessive`, mentioned once more: `he`, `she` or `the person`."""
+    """Pronoun for the owner of a `possessive`: `he`, `she` or `the person`."""
     return {"his": "he", "her": "she"}.get(owner, "the person")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Style:
-    """How a style is said."""
+    """Phrases of a style."""
 
     after: tuple[str, ...]
     adjective: tuple[str, ...]
@@ -21,7 +21,7 @@ class Style:
 
 @dataclass(frozen=True)
 class Words:
-    """How an action is said.
+    """Phrases of an action.
 
     Attributes:
         phrases: verb phrases.
@@ -40,7 +40,7 @@ class Words:
 
 @dataclass(frozen=True)
 class Joins:
-    """How actions follow each other.
+    """Phrases that join actions.
 
     Attributes:
         two, three: frames for any actions.
@@ -58,7 +58,7 @@ class Joins:
 
 @dataclass(frozen=True)
 class Detail:
-    """How a measured detail is said: behind the action, or as a sentence."""
+    """Phrases of a measured detail: after the action, or as a sentence."""
 
     clause: tuple[str, ...]
     sentence: tuple[str, ...]

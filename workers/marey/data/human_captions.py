@@ -1,9 +1,9 @@
-"""Whole captions in other people's words: `human_captions.toml`, whose three authors knew neither the grammar nor any
+"""Captions in the words of other people: `human_captions.toml`, by three authors without access to the grammar or any
 prompt.
 
 A grammar joins a subject, a verb phrase and an adverb. People also say "Before waving, she walks up to the fence" or
-"left arm up, then the right": a model that never read such sentences obeyed 78 % of a stranger's prompts, and 95 % of
-those by the grammar's own author.
+"left arm up, then the right": a model trained without such sentences followed 78 % of another author's prompts, and
+95 % of those by the grammar's author.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _FORMS = {None: "third", "ing": "gerund", "base": "base"}
 
 @dataclass(frozen=True)
 class HumanCaptions:
-    """`human_captions.toml`.
+    """Content of `human_captions.toml`.
 
     Attributes:
         actions: by action, or action and `_one` or `_both` hands: captions of it.
@@ -57,7 +57,7 @@ def human_captions() -> HumanCaptions:
 
 
 def human_caption(facts: Facts, rng: random.Random) -> str | None:
-    """A caption of one action, its style in a sentence or an adverb of its own; None where nobody wrote one."""
+    """A caption of one action, its style in a sentence or an adverb of its own; None if no author wrote one."""
     rows = human_captions().acts.get(_key(facts), ())
     text = _some(rows, fields(facts, rng, "the"), rng) if facts.repeats == 1 else None
     if text is None or rng.random() > STYLED_SHARE:

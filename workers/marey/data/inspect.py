@@ -1,4 +1,4 @@
-"""What a prepared folder holds, for people: counts, lengths, captions, bytes."""
+"""Summarise a prepared folder for people: counts, lengths, captions, bytes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in a prepared folder: manifest and clip lines, as models."""
+"""Models of a prepared folder's manifest and clip lines."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Manifest(BaseModel):
 
 
 class Measured(BaseModel):
-    """What was measured on a clip; angles in degrees, positive to the left."""
+    """Measurements on a clip; angles in degrees, positive to the left."""
 
     model_config = ConfigDict(frozen=True)
 

@@ -1,5 +1,4 @@
-"""What may be said of one action: a phrase whose field was not measured, or whose condition does not hold, is not
-used."""
+"""Select phrases of an action: a phrase with an unmeasured field or a false condition is not used."""
 
 from __future__ import annotations
 
@@ -29,7 +28,7 @@ def pace_of(facts: Facts) -> str | None:
 
 
 def height_of(facts: Facts) -> str | None:
-    """How high the hand goes that is up (the lower one of both)."""
+    """Height of the raised hand (the lower one of both)."""
     if facts.side not in ("left", "right", "both"):
         return None
     hands = [h for h, name in zip(facts.hands, ("left", "right"), strict=True) if facts.side in (name, "both")]
@@ -49,7 +48,7 @@ def lasting_of(facts: Facts) -> str | None:
 
 
 def fields(facts: Facts, rng: random.Random, pronoun: str) -> dict[str, str]:
-    """What the braces of phrases may be filled with; what was not measured is absent."""
+    """Values of the phrases' fields; unmeasured ones are absent."""
     words = rng.random() < 0.5
     out = {"seconds": number(facts.gait.duration, words=words)} if facts.gait.duration > 1.4 else {}
     if facts.act in LOCOMOTION:

@@ -51,12 +51,12 @@ class Splits(BaseModel):
             splits = cls.model_validate(read_json(path))
         except NotFound:
             raise NotFound(
-                "no split file", where=str(path), hint="Give it with --splits, or put it beside the archive."
+                "no split file", where=str(path), hint="Give it with --splits, or put it next to the archive."
             ) from None
         except ValidationError as error:
             raise InvalidFile(f"not a split file: {error.errors()[0]['msg']}", where=str(path)) from error
         if len(splits.by_clip()) != sum(map(len, (splits.train, splits.val, splits.test, splits.compositional))):
-            raise InvalidFile("a clip stands in two splits", where=str(path))
+            raise InvalidFile("a clip is listed in two splits", where=str(path))
         return splits
 
     def by_clip(self) -> dict[str, str]:
@@ -73,7 +73,7 @@ def pack_bandai_namco(
         source: archive or folder.
         splits: split file; by default `bandai-namco-splits.json` beside the source.
         processes: how many retarget at once.
-        progress: told of each clip.
+        progress: called for each clip.
 
     Raises:
         NotFound, InvalidFile, TooLarge: what is wrong with the source or the splits, with the clip's name.
@@ -85,7 +85,7 @@ def pack_bandai_namco(
         if match is None:
             raise InvalidFile("the name has not the form dataset-N_CONTENT_STYLE_TAKE", where=name)
         if name not in split_of:
-            raise InvalidFile("stands in no split", where=name, hint="The split file belongs to another release.")
+            raise InvalidFile("is in no split", where=name, hint="The split file belongs to another release.")
         content = f"{match['set']}/{match['content']}"
         return PackClip(name, "bandai-namco", content, match["style"], split_of[name], 0, 0)
 
@@ -109,7 +109,7 @@ def pack_cmu(
         table = {name: str(row["description"]) for name, row in read_json(path).items()}
     except NotFound:
         raise NotFound(
-            "no caption file", where=str(path), hint="Give it with --captions, or put it beside the archive."
+            "no caption file", where=str(path), hint="Give it with --captions, or put it next to the archive."
         ) from None
     except (KeyError, TypeError, AttributeError) as error:
         raise InvalidFile("not a table of trials with descriptions", where=str(path)) from error

@@ -128,7 +128,9 @@ def read_manifest(path: Path) -> Manifest:
     try:
         document = read_json(file)
     except NotFound:
-        raise NotFound("no prepared data here", where=str(path), hint="Make it with `marey data prepare`.") from None
+        raise NotFound(
+            "no prepared data in this folder", where=str(path), hint="Make it with `marey data prepare`."
+        ) from None
     try:
         manifest = Manifest.model_validate(document)
     except ValidationError as error:
@@ -137,7 +139,7 @@ def read_manifest(path: Path) -> Manifest:
         raise InvalidFile(f"format {manifest.format!r}", where=str(file), hint=f"This version reads {names.FORMAT}.")
     missing = [name for name in names.FILES if name not in manifest.files]
     if missing:
-        raise InvalidFile(f"names no {missing[0]}", where=str(file))
+        raise InvalidFile(f"does not list {missing[0]}", where=str(file))
     if any(Path(name).name != name or name == names.MANIFEST for name in manifest.files):
         raise InvalidFile("names files outside its folder", where=str(file))
     if min(manifest.frames, manifest.clips, manifest.dim) < 1 or not 0 < manifest.fps < math.inf:

@@ -1,4 +1,4 @@
-"""From a foreign rig to the 22 joints of HumanML3D, at 20 frames a second, with uniform proportions.
+"""Retarget a foreign rig to the 22 joints of HumanML3D at 20 frames per second, with uniform proportions.
 
 The bones of the trunk and arms keep their directions and take the target's lengths, as HumanML3D does (Guo et al. 2022,
 uniform skeleton). Legs are solved from the ground up, because a copied direction on another leg length slides: the toe
@@ -148,7 +148,8 @@ def _sole(leg: Array, lateral: Array, rig: Rig) -> Array:
 
 
 def _ankle_shift(legs: tuple[Array, Array], rig: Rig, scale: float) -> tuple[float, float]:
-    """How much further forward and up the target's ankle is over its flat toe than the source's: hips go along."""
+    """Difference of the ankles' position over the flat toe between target and source, forward and up: hips follow
+    it."""
     bone = scale * np.mean([_bone(leg, 2, 3) for leg in legs])
     pitch = np.radians(rig.sole_pitch)
     return float(bone * np.cos(pitch) - _REST[10, 2]), float(-_REST[10, 1] - bone * np.sin(pitch))

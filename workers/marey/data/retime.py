@@ -21,7 +21,7 @@ Made = tuple[Array, tuple[Part, ...], int]
 
 
 def crop(part: Part, target: int, rng: random.Random) -> Made:
-    """So many poses of a clip, from anywhere in it; all of a shorter one."""
+    """A random crop of `target` poses; the whole clip if it is shorter."""
     length = min(target, len(part.joints))
     first = rng.randint(0, len(part.joints) - length)
     return part.joints[first : first + length].astype(np.float64), (part,), 1

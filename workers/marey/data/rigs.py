@@ -1,4 +1,4 @@
-"""Which joints of a foreign rig play which part: all that retargeting needs to know about a rig, as data."""
+"""Joint mappings of foreign rigs: all that retargeting needs to know about a rig, as data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often each clip is drawn in training."""
+"""Sampling weights of training clips."""
 
 from __future__ import annotations
 

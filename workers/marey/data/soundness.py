@@ -1,4 +1,4 @@
-"""Captures that went wrong: bodies that bend or jump as none does."""
+"""Detect broken captures: bodies that bend or jump impossibly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 
 
 def is_broken(joints: Array, fps: float) -> bool:
-    """Whether a motion (T, 22, 3) has a joint that jumps, a knee bent backward, or a foot folded against the shank."""
+    """Return True if a motion (T, 22, 3) has a jumping joint, a knee bent backward, or a foot folded against the
+    shank."""
     joints = np.asarray(joints, np.float64)
     jerk = np.linalg.norm(np.diff(joints, 3, axis=0), axis=-1) * fps**3
     if jerk.max(initial=0.0) > LARGEST_JERK:

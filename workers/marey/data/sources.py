@@ -1,4 +1,4 @@
-"""Where the data came from: terms, credit, and splits for sources that bring none."""
+"""Sources of training data: terms, credit, and splits for sources without their own."""
 
 from __future__ import annotations
 

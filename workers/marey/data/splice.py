@@ -1,4 +1,4 @@
-"""Joining real clips with inertialized transitions (Bollo 2018, "Inertialization", GDC: the difference of pose and
+"""Join real clips with inertialized transitions (Bollo 2018, "Inertialization", GDC: the difference of pose and
 velocity at the seam is added to the second clip and decays by a quintic).
 
 The second clip is turned to the heading of the first and put so that a standing foot stays where it stands. Root, toes,
@@ -52,7 +52,7 @@ def place_after(first: Array, second: Array, fps: float) -> Array:
 
 
 def _stands(points: Array, fps: float) -> bool:
-    """Whether a toe (n >= 2, 3) stands at the seam."""
+    """Return True if a toe (n >= 2, 3) stands at the seam."""
     speed = np.linalg.norm(points[1] - points[0]) * fps
     return bool(speed < _STAND_SPEED and points[:, 1].min() < _STAND_HEIGHT)
 

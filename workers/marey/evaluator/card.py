@@ -32,7 +32,7 @@ of their short public descriptions.
 
 `r1` to `r3`: R-precision in pools of 32 test clips, text to motion, where a motion of the text's own label is a hit;
 `distinct`: in pools where no label occurs twice. Median ranks are among all test clips, where only the pair is a hit,
-text to motion and back. Captions and pools are drawn 20 times. A label is acts, sides and style
+text to motion and back. Captions and pools are drawn 20 times. A label is actions, sides and style
 (`workers/marey/evaluator/labels.py`).
 
 ## The reference
@@ -45,8 +45,8 @@ evaluate. Neither joints nor features of captured motion are in here.
 
 ## Limits
 
-- Captions are of one grammar, on few acts: it tells those apart, in English. What the data do not show it cannot judge.
-- About one caption in seven of single acts leaves the style out; a motion of another style then counts as a wrong
+- Captions are of one grammar, on few actions, in English. It cannot judge actions that the data do not show.
+- About one caption in seven of single actions leaves the style out; a motion of another style then counts as a wrong
   answer.
 - Its numbers are comparable with numbers of this very bundle alone, never with those of papers.
 """

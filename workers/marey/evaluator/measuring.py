@@ -1,6 +1,6 @@
 """Measure each motion of an evaluation: the checker's verdict, quality, and embedding.
 
-Two rows stand beside each other. `raw` are the features as the network generated them; `exported` are features encoded
+There are two rows. `raw` are the features as the network generated them; `exported` are features encoded
 again from the joints of the npz, after rotations were solved and feet locked: what users get.
 """
 
@@ -150,7 +150,7 @@ def check_measured(measured: Measured, asked: int) -> None:
             f"{missing} of {asked} motions cannot be measured, {missing / asked:.1%} where {MAX_MISSING:.0%} may be; "
             f"the first of {len(broken)} that are broken: {broken[0].reason}",
             where=f"prompt {broken[0].item.index}, repeat {broken[0].item.variant}",
-            hint="Look at the store and at the bundle that made them, then evaluate again.",
+            hint="Check the store and the generator's bundle, then evaluate again.",
         )
 
 

@@ -65,7 +65,7 @@ class DistributionEncoder(nn.Module):
         return self._outputs(x, valid, 1)[:, 0]
 
     def pack(self) -> None:
-        """Pack the matrices for inference on a CPU: what stands beside a row then changes none of its bits."""
+        """Pack the matrices for inference on a CPU: the bits of a row then do not depend on the other rows."""
         self.transformer.prepare_inference(torch.float32)
         pack_linears(self)
 

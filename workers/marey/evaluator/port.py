@@ -107,5 +107,5 @@ def check_motions(motions: Sequence[Motion], width: int, shortest: int, longest:
             raise InvalidInput(
                 f"{broken.size} of {len(motion)} frames hold NaN or infinite numbers, the first is {broken[0]}",
                 where=where,
-                hint="Look at the model that made it: a broken motion has no embedding.",
+                hint="Check the model that generated it: a broken motion has no embedding.",
             )

@@ -81,7 +81,7 @@ def find_reconstruction(evaluator: Bundle, generator: str) -> Reconstruction | N
     except NotFound:
         return None
     except ValidationError as error:
-        raise InvalidFile(f"is no reconstruction: {error.errors()[0]['msg']}", where=str(file)) from error
+        raise InvalidFile(f"is not a reconstruction: {error.errors()[0]['msg']}", where=str(file)) from error
     if (found.generator, found.evaluator) != (generator, evaluator.reference):
         raise InvalidFile(
             f"was measured of {found.generator} by {found.evaluator}, not of {generator} by {evaluator.reference}",
@@ -216,5 +216,7 @@ def _rows(real: RealClips, sources: Mapping[str, Sequence[str]]) -> dict[str, ND
 
 def _file(evaluator: Bundle, generator: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*@[0-9a-f]{12,64}", generator):
-        raise InvalidInput(f"{generator!r} is no exact bundle", where="generator", hint="As hgm3-starter@96a91328572d.")
+        raise InvalidInput(
+            f"{generator!r} is not an exact bundle reference", where="generator", hint="As hgm3-starter@96a91328572d."
+        )
     return evaluator.path / FOLDER / f"{generator}.json"

@@ -133,7 +133,7 @@ class RealClips:
         try:
             clips = _CLIPS.validate_python(bundle.read_json(FILE))
         except ValidationError as error:
-            message = f"is no reference: {error.errors()[0]['msg']}"
+            message = f"is not a reference: {error.errors()[0]['msg']}"
             raise InvalidBundle(message, where=str(bundle.path / FILE)) from error
         motion = bundle.tensors(PART)
         if {name: len(rows) for name, rows in clips.items()} != {name: len(rows) for name, rows in motion.items()}:

@@ -20,10 +20,10 @@ from marey.text.pipeline import refuse_mismatch
 
 
 def open_encoder(spec: TextSpec) -> TextEncoder:
-    """The encoder that a bundle or prepared texts name, from wherever its weights are on this machine.
+    """Load the encoder that a bundle or prepared texts name from the weights on this machine.
 
     Raises:
-        NotFound: they are nowhere.
+        NotFound: they are not installed.
         InvalidBundle: they are others than those named.
     """
     return check_encoder(spec, load_encoder(spec.encoder))

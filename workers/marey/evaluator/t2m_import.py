@@ -52,7 +52,7 @@ def import_t2m(checkpoints: Path, glove: Path, output: Path, config: T2MConfig |
 
     Raises:
         InvalidFile: a file is missing, damaged, or holds something else.
-        Conflict: the bundle is there already.
+        Conflict: the bundle already exists.
     """
     config = config or T2MConfig()
     motion, text = MotionEncoder(config), TextEncoder(config)
@@ -97,7 +97,7 @@ def _checkpoint(file: Path) -> Mapping[str, Any]:
     except (OSError, pickle.UnpicklingError, RuntimeError, EOFError, ValueError) as error:
         raise InvalidFile(f"cannot be read safely: {error}", where=str(file), hint="Download it again.") from error
     if not isinstance(loaded, Mapping):
-        raise InvalidFile("is no checkpoint", where=str(file))
+        raise InvalidFile("is not a checkpoint", where=str(file))
     return loaded
 
 
@@ -120,7 +120,7 @@ def _read_words(folder: Path, config: T2MConfig) -> tuple[list[str], NDArray[np.
     data = folder / "our_vab_data.npy"
     vectors, words, index = _array(data), _plain(folder / "our_vab_words.pkl"), _plain(folder / "our_vab_idx.pkl")
     if not isinstance(words, list) or not isinstance(index, dict) or not {START, END, UNKNOWN} <= set(words):
-        raise InvalidFile("is no vocabulary of the T2M evaluator", where=str(folder))
+        raise InvalidFile("is not a vocabulary of the T2M evaluator", where=str(folder))
     rows = [index.get(word, -1) for word in words]
     if vectors.ndim != 2 or vectors.shape[1] != config.word_width or not all(0 <= r < len(vectors) for r in rows):
         raise InvalidFile(f"vectors of shape {vectors.shape} do not fit the words", where=str(data))
@@ -144,7 +144,7 @@ def _plain(file: Path) -> Any:
         with file.open("rb") as stream:
             return _read_plain(stream)
     except (OSError, pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError, IndexError) as error:
-        raise InvalidFile(f"is no plain list or dictionary: {error}", where=str(file)) from error
+        raise InvalidFile(f"is not a plain list or dictionary: {error}", where=str(file)) from error
 
 
 def _read_plain(stream: IO[bytes]) -> Any:

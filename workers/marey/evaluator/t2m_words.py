@@ -98,7 +98,7 @@ def read_line(line: str, *, where: str) -> tuple[str, Tagged]:
     fields = line.strip().split("#")
     words = [token.rpartition("/") for token in fields[1].split()] if len(fields) == 4 else []
     if not words or not all(word and tag for word, _, tag in words):
-        raise InvalidFile("is no line `caption#word/TAG …#start#end`", where=where)
+        raise InvalidFile("is not a line `caption#word/TAG …#start#end`", where=where)
     return fields[0].strip(), tuple((word, tag) for word, _, tag in words)
 
 

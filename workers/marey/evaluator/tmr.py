@@ -27,7 +27,7 @@ BATCH = 64
 class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
     """A loaded bundle. Not thread-safe.
 
-    On a CPU matrices are packed, and an embedding has the same bits whatever stands beside it in a batch.
+    On a CPU matrices are packed, and the bits of an embedding do not depend on the rest of its batch.
     """
 
     distance: Distance = "cosine"
@@ -58,13 +58,13 @@ class TMREvaluator(Loaded[EvaluatorConfig, MotionEncoder, SentenceEncoder]):
 
         Raises:
             InvalidBundle: not this kind of evaluator, damaged, or trained with another text encoder.
-            NotFound: the text encoder's weights are not here.
+            NotFound: the text encoder's weights are not installed.
             InvalidInput: no such device.
         """
         config, motion, text = load_networks(bundle)
         spec = bundle.manifest.text
         if spec is None or spec.width != config.text_width:
-            raise InvalidBundle("does not say which text encoder it was trained with", where=str(bundle.path))
+            raise InvalidBundle("declares no text encoder", where=str(bundle.path))
         encoder = open_encoder(spec) if encoder is None else check_encoder(spec, encoder)
         return cls(bundle, config, motion, text, encoder, choose_device(device))
 

@@ -93,7 +93,7 @@ class AdaptedMiniLM(nn.Module):
         return {name: value.half().float() for name, value in (kept | self._smoothing(sentences)).items()}
 
     def _smoothing(self, sentences: Sequence[TokenBatch]) -> dict[str, Tensor]:
-        """What to divide the features of a matrix's input by: large inputs, but not those that meet large weights."""
+        """Divisors of the features of a matrix's input: for large inputs, except those that meet large weights."""
         self._largest = {}
         for sentence in sentences:
             self(sentence, (LAYERS,))

@@ -77,8 +77,8 @@ def _quality(result: Validation) -> str:
     lines = [
         f"{result.folds}-fold cross-validation, folds grouped by caption without case and punctuation. An argument",
         "counts when predicate, exact span and role are right. In one caption of twenty the parser overlooked the only",
-        'verb ("A person dances."): whoever finds it has a false predicate and false arguments there, so the scores of',
-        f"the other captions stand beside. With predicates given, arguments have {result.given.arguments.f1:.3f}.",
+        'verb ("A person dances."): finding it counts as a false predicate and false arguments, so the scores of',
+        f"the other captions are given as well. With predicates given, arguments have {result.given.arguments.f1:.3f}.",
         "",
         f"| | {' | '.join(columns)} |",
         "|---" * (len(columns) + 1) + "|",

@@ -1,4 +1,4 @@
-"""Fitting the `light` role labeller: MiniLM's updates and the head together, a random field, averaged weights."""
+"""Fit the `light` role labeller: MiniLM's updates and the head together, a random field, averaged weights."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SMOOTHING_SENTENCES = 150
 
 @dataclass(frozen=True)
 class FitConfig:
-    """How the head and MiniLM's updates are trained; by default, on captions."""
+    """Hyperparameters of the head and MiniLM's updates; the defaults are for captions."""
 
     steps: int = 450
     batch: int = 24  # sentences
@@ -172,7 +172,7 @@ def collate(items: Sequence[Encoded]) -> SentenceBatch:
 def _loss(
     network: LightNetwork, states: Tensor, batch: SentenceBatch, allowed: Tensor, predicate_weight: float
 ) -> Tensor:
-    """Of predicates, and of the tags of frames whose predicate is given."""
+    """Loss of predicates, and of the tags of frames with given predicates."""
     hidden = network.read(states, batch.surface, batch.mask)
     logits = network.predicate_logits(hidden)[batch.mask]
     loss = predicate_weight * F.binary_cross_entropy_with_logits(logits, batch.is_predicate[batch.mask])

@@ -1,4 +1,4 @@
-"""What the role labeller is trained on, batch by batch: first PropBank, then captions."""
+"""Training batches of the role labeller: first PropBank, then captions."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def read_tokens(file: Path) -> Iterator[list[Token]]:
 
 
 def agree(tags: Sequence[str], others: Sequence[str]) -> bool:
-    """Whether two rows of tags are of one sentence."""
+    """Return True if two rows of tags belong to one sentence."""
     same = sum(a == b for a, b in zip(tags, others, strict=False))
     return len(tags) == len(others) and same >= AGREEMENT * len(tags)
 

@@ -1,4 +1,4 @@
-"""How the weights of the role labeller are made, and the scores of its cross-validation."""
+"""Recipe of the role labeller's weights, and the scores of its cross-validation."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How the weights are made."""
+    """The recipe of the weights."""
 
     minilm: Path
     network: LightConfig

@@ -41,7 +41,7 @@ from marey.text.light_network import LightConfig
 
 
 def cross_validate(gold: Sequence[Example], more: Sequence[Example], recipe: Recipe, folds: int) -> Validation:
-    """Train on all folds but one of the gold and whatever more there is, score that one, for each."""
+    """Cross-validate: train on all folds but one of the gold and on all of `more`, and score the one left out."""
     occurs = Counter(example.words for example in gold)
     unique = distinct([*gold, *more])
     found = Validation(folds=folds)

@@ -39,7 +39,7 @@ class Weights:
 
     @classmethod
     def load(cls, file: Path) -> Weights:
-        """What `save` kept.
+        """Load a file of `save`.
 
         Raises:
             InvalidFile: it is another file.

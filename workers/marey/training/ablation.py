@@ -1,4 +1,4 @@
-"""What the ablations of all models share: judging a variant, and the table over variants and seeds."""
+"""Shared code of ablations: judge a variant, and tabulate variants and seeds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from marey.training.adherence import measure
 
 
 def judge(generator: Generator[S], texts: Sequence[TextFeatures], settings: S) -> dict[str, float]:
-    """Shares of obeyed evaluation prompts, foot skate and jerk of one bundle."""
+    """Prompt adherence, foot skate and jerk of one bundle."""
     report = measure(generator, texts, evaluation_prompts(), seeds=[0], settings=settings)
     physical = mean_quality(t.quality for t in report.trials)
     rates = {name: rate.share for name, rate in report.summary.items()}

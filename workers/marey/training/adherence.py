@@ -1,15 +1,14 @@
-"""Does a bundle do what the prompt says? The 200 evaluation prompts, several seeds, judged on the exported joints.
+"""Prompt adherence of a bundle: the 200 evaluation prompts, several seeds, judged on the exported joints.
 
     python -m marey.models.hgm3.obedience models/hgm3-starter --seeds 3 -o report
     python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 -o report
 
-What is chosen by looking at numbers (steps, guidance, temperature) is chosen with `--captions DATA`, the captions of a
-prepared folder's validation clips, or `--prompts development`, never on the evaluation prompts. `--prompts blind` asks
-for a second set of those, by an author who knew neither the training captions nor the first set, and `fresh` for a
-third one, mostly of two actions.
+Choose settings (steps, guidance, temperature) with `--captions DATA`, the captions of a prepared folder's validation
+clips, or with `--prompts development`, never on the evaluation prompts. `--prompts blind` is a second held-out set
+written by another author, and `fresh` a third one with mostly two-action prompts.
 
-The checker reads joints only and knows nothing of the model; its own rate on real clips belongs beside every number
-here. Motions are judged as users get them: feet cleaned, rotations solved.
+The checker reads joints only and is independent of the model; report its own rate on real clips beside every number.
+Motions are judged as exported: feet cleaned, rotations solved.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from marey.text.pipeline import TextPipeline
 
 @dataclass(frozen=True)
 class Trial:
-    """One motion and what the checker says of it."""
+    """One motion and the checker's verdict."""
 
     prompt: str
     group: str
@@ -78,7 +77,7 @@ class Report:
 
     @property
     def groups(self) -> dict[str, Rate]:
-        """By group of prompts."""
+        """Rates by group of prompts."""
         names = dict.fromkeys(t.group for t in self.trials)
         return {name: self.rate(lambda p, name=name: p.group == name) for name in names}
 
@@ -88,7 +87,7 @@ class Report:
         lines = [
             f"Bundle `{self.bundle}`, {len(self.trials)} motions.",
             "",
-            "| prompts | motions | obeyed |",
+            "| prompts | motions | adherence |",
             "|---|---|---|",
         ]
         lines += [
@@ -137,7 +136,7 @@ def measure(
     Args:
         generator: the loaded bundle.
         texts: features of each prompt, in the order of `prompts`.
-        prompts: what to ask for and what must be seen.
+        prompts: prompts with their expectations.
         seeds: one motion a prompt and seed.
         settings: way of drawing.
         frames: length of every motion; None = the length estimator's.
@@ -181,7 +180,7 @@ def _settings(given: Sequence[str]) -> dict[str, Any]:
         try:
             out[name] = json.loads(value)
         except ValueError as error:
-            raise InvalidInput("is no NAME=VALUE", where=f"--set {text}", hint="Such as guidance=3.") from error
+            raise InvalidInput("is not NAME=VALUE", where=f"--set {text}", hint="Such as guidance=3.") from error
     return out
 
 
@@ -203,15 +202,15 @@ def parser_of(program: str) -> argparse.ArgumentParser:
 
 
 def pipeline_of(generator: Generator[Any]) -> TextPipeline:
-    """How the bundle reads prompts. Raises InvalidBundle where it does not say."""
+    """Text pipeline of a bundle. Raise InvalidBundle if the bundle declares none."""
     text = generator.bundle.manifest.text
     if text is None:
-        raise InvalidBundle("does not say how it reads prompts", where=str(generator.bundle.path))
+        raise InvalidBundle("declares no text pipeline", where=str(generator.bundle.path))
     return TextPipeline.load(text)
 
 
 def report_of(generator: Generator[Any], chosen: argparse.Namespace) -> Report:
-    """Measure a bundle as the command line chose, and print what it failed at."""
+    """Measure a bundle as the command line requests, and print its failures."""
     prompts = validation_prompts(chosen.captions) if chosen.captions else evaluation_prompts(chosen.prompts)
     prompts = prompts[:: chosen.every]
     report = measure(

@@ -1,4 +1,4 @@
-"""From the parts of a run to a bundle: what is the same for all generators."""
+"""Assemble a bundle from the parts of a run: the code shared by all generators."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ C = TypeVar("C", bound=ModelConfig)
 
 @dataclass(frozen=True)
 class Gathered:
-    """Finished parts, and what the manifest says of how they were made."""
+    """Finished parts, and the manifest's record of their training."""
 
     parts: dict[str, Part]
     text: TextSpec
@@ -55,7 +55,7 @@ def scatter(
 ) -> None:
     """Write a part for each stage's state dict into a run folder, as if the stages had just finished there.
 
-    What a bundle does not hold of its `tokenizer` is made up: the moving sums of the codebooks are their codes.
+    State of the `tokenizer` that a bundle lacks is reconstructed: the moving sums of the codebooks are their codes.
 
     Raises:
         InvalidInput: the run has parts already.
@@ -63,7 +63,7 @@ def scatter(
     present = [name for name in recipe.stages if (run / name).exists()]
     if present:
         raise InvalidInput(
-            f"has a stage {present[0]} already", where=str(run), hint="Take the bundle apart into a new folder."
+            f"has a stage {present[0]} already", where=str(run), hint="Unpack the bundle into a new folder."
         )
     manifest = bundle.manifest
     data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""

@@ -11,7 +11,7 @@ from marey.core.errors import InvalidInput
 
 @dataclass(frozen=True)
 class Budget:
-    """How long a stage trains: optimiser steps, minutes, or whichever ends first."""
+    """Training budget of a stage: optimiser steps, minutes, or whichever ends first."""
 
     steps: int | None = None
     minutes: float | None = None

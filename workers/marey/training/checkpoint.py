@@ -22,7 +22,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class TrainingState:
-    """Where a run stands. Random numbers and data order are functions of (seed, step, rank): nothing else to keep."""
+    """Position of a run. Random numbers and data order are functions of (seed, step, rank), so they need no state."""
 
     stage: str
     step: int

@@ -1,4 +1,4 @@
-"""Motions that a model drew for captions of training clips: trained on as further clips, with those captions."""
+"""Motions that a model generated for captions of training clips: trained on as further clips with those captions."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class Drawn:
 
     @classmethod
     def of(cls, motions: Sequence[tuple[int, Tensor]]) -> Drawn:
-        """Of clips and the tokens (n, V) drawn for each."""
+        """Collect clips and the tokens (n, V) generated for each."""
         clips = np.array([clip for clip, _ in motions], np.int64)
         return cls(clips, torch.tensor([len(tokens) for _, tokens in motions]), torch.cat([t for _, t in motions]))
 
     def write(self, run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> None:
-        """Leave them in a run folder."""
+        """Write the motions into a run folder."""
         run.mkdir(parents=True, exist_ok=True)
         tensors = {"clips": torch.from_numpy(self.clips), "lengths": self.lengths, "tokens": self.tokens.short()}
         temporary = (run / FILE).with_suffix(".part")
@@ -63,7 +63,7 @@ class Drawn:
 
 
 def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) -> Drawn | None:
-    """What was left in a run folder; None = nothing.
+    """Read the motions of a run folder; None if there are none.
 
     Raises:
         InvalidFile: drawn with another tokenizer, or for other data.

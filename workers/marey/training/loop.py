@@ -1,4 +1,4 @@
-"""The one training loop: a stage says what a loss is, the loop does the rest.
+"""The training loop shared by all stages: a stage defines a loss, the loop does the rest.
 
 Resuming is exact because nothing random is carried along: batches and torch's generator are seeded from
 (seed, step, rank) at every step. With a budget in minutes the schedules depend on the clock, and runs differ.
@@ -37,7 +37,7 @@ log = structlog.get_logger()
 
 @dataclass(frozen=True)
 class StepContext:
-    """What a stage may depend on in one step."""
+    """Inputs that a stage may use in one step."""
 
     step: int
     fraction: float  # of the budget, 0 to 1: every schedule runs on it
@@ -49,7 +49,7 @@ class Stage(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the stage, `tokenizer` for instance."""
+        """Name of the stage, `tokenizer` for instance."""
         ...
 
     @property
@@ -81,7 +81,7 @@ class Stage(Protocol):
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a run is driven; none of it changes what is learnt but seed, budget and precision."""
+    """Options of a run; only seed, budget and precision change the trained weights."""
 
     folder: Path
     budget: Budget
@@ -95,7 +95,7 @@ class RunOptions:
 
 
 def start_process_group() -> None:
-    """Join the other processes when started by torchrun; otherwise nothing."""
+    """Join the process group if started by torchrun; otherwise do nothing."""
     if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not dist.is_initialized():
         dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
 
@@ -135,7 +135,7 @@ class _Run:
                 raise InvalidInput(
                     "the checkpoint was made with another stage, seed or configuration",
                     where=str(self.checkpoint),
-                    hint="Resume with what the run was started with, or start anew in another folder.",
+                    hint="Resume with the options of the first start, or start in another folder.",
                 )
             self.step, self.seconds, self.metrics = state.step, state.seconds, state.metrics
         else:

@@ -153,6 +153,6 @@ def made_once(
 
 
 def fingerprint(network: nn.Module) -> str:
-    """Tells one network's weights from another's."""
+    """A fingerprint of a network's weights."""
     total = sum(float(value.double().abs().sum()) for value in network.state_dict().values())
     return f"{total:.6f}"

@@ -1,4 +1,4 @@
-"""How one training stage is optimised."""
+"""Optimisation settings of a training stage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which clips training draws, each with a caption, and how often."""
+"""Pairs of training clips and captions, and their sampling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a finished stage leaves for the bundle: weights (the average), configuration, metrics and the data's hash."""
+"""Output of a finished stage for the bundle: weights (the average), configuration, metrics and the data's hash."""
 
 from __future__ import annotations
 
@@ -53,4 +53,4 @@ def load_part(folder: Path) -> Part:
         state = load_file(folder / "weights.safetensors")
         return Part(state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}))
     except (AttributeError, KeyError, TypeError, SafetensorError, OSError) as error:
-        raise InvalidFile(f"is no trained part: {error}", where=str(folder)) from error
+        raise InvalidFile(f"is not a trained part: {error}", where=str(folder)) from error

@@ -1,4 +1,4 @@
-"""Captions of all clips as sentence features, on one device."""
+"""Captions of all clips as sentence features on one device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training a bundle stage by stage in one run folder: each reads the parts of those before it and leaves its own.
+"""Train a bundle stage by stage in one run folder: each stage reads the parts before it and writes its own.
 
 run/{stage}/checkpoint    to resume from
 run/{stage}/tensorboard   the curves
@@ -36,7 +36,7 @@ C = TypeVar("C", bound=ModelConfig)
 
 @dataclass(frozen=True)
 class TrainOptions(Generic[C]):
-    """What the command line chooses for any stage."""
+    """Command-line options common to all stages."""
 
     prepared: Path
     run: Path  # one folder for all stages of a bundle
@@ -59,14 +59,14 @@ class TrainOptions(Generic[C]):
 
 @dataclass(frozen=True)
 class Recipe(Generic[C]):
-    """What a model's stages are.
+    """The training stages of a model.
 
     Attributes:
         read: a configuration from its plain values.
         built_from: of each stage in training order the fields of the configuration that its networks are built from;
             how stages were optimised may differ.
         shares: how the minutes of a whole training are dealt out.
-        most_steps: stages that learn by heart beyond so many steps.
+        most_steps: upper limits of steps for stages that overfit beyond them.
     """
 
     read: Callable[[Mapping[str, Any]], C]
@@ -76,13 +76,13 @@ class Recipe(Generic[C]):
 
     @property
     def stages(self) -> tuple[str, ...]:
-        """In training order."""
+        """Stages in training order."""
         return tuple(self.built_from)
 
     def check_name(self, name: str) -> None:
         """Refuse a stage that is not there."""
         if name not in self.stages:
-            raise InvalidInput(f"there is no stage {name!r}", hint=f"Known: {', '.join(self.stages)}, all.")
+            raise InvalidInput(f"unknown stage {name!r}", hint=f"Known: {', '.join(self.stages)}, all.")
 
     def part(self, name: str, config: C, run: Path) -> Part:
         """The finished part of a stage in a run folder.
@@ -110,7 +110,7 @@ class Recipe(Generic[C]):
 
 
 def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: dict[str, float], sha256: str) -> None:
-    """Leave a stage's part: averaged weights, configuration, metrics, and the hash of the data."""
+    """Write a stage's part: averaged weights, configuration, metrics, and the hash of the data."""
     if distributed.rank() == 0:
         budget = {"steps": options.budget.steps, "minutes": options.budget.minutes, "seed": options.seed}
         part = Part(module.state_dict(), options.config.to_dict(), metrics, sha256, budget)
@@ -128,10 +128,10 @@ def train_all(
         InvalidInput: no minutes are given, or a warm start is wanted.
     """
     if options.warm:
-        raise InvalidInput("all stages at once start from nothing", hint="Give --warm to one stage at a time.")
+        raise InvalidInput("--warm needs a single stage", hint="Give --warm to one stage at a time.")
     minutes = options.budget.minutes
     if minutes is None:
-        raise InvalidInput("training all stages needs minutes to deal out", hint="Give --max-minutes.")
+        raise InvalidInput("training all stages needs a budget in minutes", hint="Give --max-minutes.")
     metrics: dict[str, float] = {}
     for name in recipe.stages:
         if (options.run / name / "part" / "part.json").is_file():
@@ -147,6 +147,6 @@ def train_all(
 
 
 def use_threads(threads: int) -> None:
-    """So many threads of torch; 0 leaves its own choice."""
+    """Set the number of torch threads; 0 keeps torch's own choice."""
     if threads:
         torch.set_num_threads(threads)

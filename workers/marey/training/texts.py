@@ -137,7 +137,7 @@ class CaptionTexts:
         try:
             spec = TextSpec.model_validate(parse_json(text_of(arrays["spec"], "spec", where), f"{where}: spec"))
         except ValidationError as error:
-            message = f"these are no text features: {error.errors()[0]['msg']}"
+            message = f"not text features: {error.errors()[0]['msg']}"
             raise InvalidFile(message, where=where, hint=hint) from error
         for name, kind in KINDS.items():
             width = {"strings": (spec.width,), "edges": (3,)}.get(name, ())
@@ -149,7 +149,7 @@ class CaptionTexts:
         ):
             raise InvalidFile("made for other captions", where=where, hint=hint)
         if problem := texts._problem():
-            raise InvalidFile(f"these are no text features: {problem}", where=where, hint=hint)
+            raise InvalidFile(f"not text features: {problem}", where=where, hint=hint)
         return texts
 
     def _problem(self) -> str | None:
@@ -165,7 +165,7 @@ class CaptionTexts:
         if len(self.node_start) != captions + 1 or len(self.edge_start) != captions + 1:
             return "graphs and captions differ in number"
         if len(self.node_level) != len(self.node_string) or not _within(self.node_level, len(LEVELS)):
-            return "`node_level` holds a level that is none"
+            return "`node_level` holds an invalid level"
         if not _within(self.node_string, len(self.strings)):
             return "`node_string` names a string that is not there"
         nodes = np.repeat(np.diff(self.node_start), np.diff(self.edge_start))
@@ -212,7 +212,7 @@ Encode = Callable[[Sequence[Sequence[str]]], Iterator[NDArray[np.float16]]]
 
 @contextmanager
 def _readers(pipeline: TextPipeline, processes: int) -> Generator[tuple[Read, Encode]]:
-    """What parses and what encodes chunks of texts, in their order."""
+    """Functions that parse and encode chunks of texts, in order."""
     if processes == 1:
         yield lambda chunks: map(pipeline.parse, chunks), lambda chunks: (_encode(pipeline, texts) for texts in chunks)
         return

@@ -1,4 +1,4 @@
-"""Training a motion tokenizer: losses on features and joints, windows of clips, errors of reconstruction."""
+"""Train a motion tokenizer: losses on features and joints, windows of clips, reconstruction errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from marey.training.optimisation import StageConfig
 
 
 class TokenizerWeights(Protocol):
-    """What training reads of a tokenizer's own configuration."""
+    """Fields of a tokenizer's configuration that training reads."""
 
     @property
     def levels(self) -> int: ...
@@ -44,7 +44,7 @@ class TokenizerWeights(Protocol):
 
 
 class TokenizerTraining(Protocol):
-    """What training reads of a model's configuration."""
+    """Fields of a model's configuration that training reads."""
 
     @property
     def features(self) -> int: ...
@@ -187,7 +187,7 @@ class TokenizerStage:
         return loss.total if self.penalty is None else loss.total + self.penalty(), logs
 
     def after_step(self, context: StepContext) -> None:
-        """Nothing: the codebooks moved in the forward pass."""
+        """Do nothing: the codebooks are updated in the forward pass."""
 
     def validate(self) -> Mapping[str, float]:
         """Errors on the validation clips, whole."""

@@ -223,7 +223,7 @@ def _write(plan: Planned, clip: MotionClip, elapsed: float, bundle: Bundle, *, o
     for kind in changed:
         if paths[kind].exists() and not overwrite:
             raise Conflict(
-                "is there already and holds something else",
+                "already exists and holds something else",
                 where=str(paths[kind]),
                 hint="Choose another folder, or --overwrite.",
             )

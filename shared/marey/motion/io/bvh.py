@@ -227,7 +227,7 @@ def _first_fault(data: bytes, header: Header, where: str) -> InvalidFile:
                 good = False
             if not good:
                 return InvalidFile(
-                    f"`{word[:40]}` is no number, or not finite, or far too large", where=f"{where}, line {number}"
+                    f"`{word[:40]}` is not a number, not finite or too large", where=f"{where}, line {number}"
                 )
         if words and len(words) != header.channels:
             last = not any(later.strip() for later in lines[number - header.motion_line + 1 :])

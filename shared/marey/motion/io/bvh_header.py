@@ -55,7 +55,7 @@ class Header:
 
     def _read(self, data: bytes) -> None:
         if b"\0" in data[:4096]:
-            raise self.fail("is no text", line=1, hint="A BVH file begins with the word HIERARCHY.")
+            raise self.fail("is not text", line=1, hint="A BVH file begins with the word HIERARCHY.")
         lines = self._lines(data)
         self._hierarchy(lines)
         frames: float | None = None
@@ -79,14 +79,14 @@ class Header:
         if frames is None:
             raise self.fail("`Frames:` is missing before `Frame Time:`")
         if not 0 <= frames < 2**53 or frames != int(frames):
-            raise self.fail(f"{frames:g} is no number of frames", line=self.frames_line)
+            raise self.fail(f"{frames:g} is not a number of frames", line=self.frames_line)
         self.frames = int(frames)
 
     def _number(self, text: str) -> float:
         try:
             number = float(text)
         except ValueError:
-            raise self.fail(f"`{text[:40]}` is no number") from None
+            raise self.fail(f"`{text[:40]}` is not a number") from None
         if not abs(number) <= LARGEST:
             raise self.fail(f"`{text[:40]}` is not finite, or far too large")
         return number
@@ -163,7 +163,7 @@ class Header:
         if key == "CHANNELS":
             self._channels(words, self.joints[stack[-1]] if stack[-1] >= 0 else None)
             return None
-        raise self.fail(f"`{key[:40]}` is no word of BVH")
+        raise self.fail(f"`{key[:40]}` is not a BVH keyword")
 
     def _channels(self, words: list[str], joint: Joint | None) -> None:
         count = self._number(words.pop(0) if words else "")
@@ -177,7 +177,7 @@ class Header:
             word = words.pop(0)
             axis, kind = word[:1].upper(), word[1:].lower()
             if axis not in tuple("XYZ") or kind not in ("position", "rotation"):
-                raise self.fail(f"`{word[:40]}` is no channel", hint="Channels are Xposition … Zrotation.")
+                raise self.fail(f"`{word[:40]}` is not a channel", hint="Channels are Xposition … Zrotation.")
             if (kind[0], axis) in joint.channels and kind == "position":
                 raise self.fail(f"{word} is named twice")
             joint.channels.append((kind[0], axis))

@@ -52,7 +52,7 @@ class LiveBVH:
 
     def __init__(self, path: Path, skeleton: Skeleton, fps: float) -> None:
         if not (math.isfinite(fps) and fps > 0):
-            raise InvalidInput(f"{fps:g} frames a second cannot be", where=str(path))
+            raise InvalidInput(f"{fps:g} frames per second is out of range", where=str(path))
         self.path = path
         self.skeleton = skeleton
         self.fps = fps
@@ -104,7 +104,7 @@ class LiveBVH:
         """
         turns, place = self._checked(rotations, root)
         if missing < 0:
-            raise InvalidInput(f"{missing} missing frames cannot be", where=str(self.path))
+            raise InvalidInput(f"{missing} missing frames is out of range", where=str(self.path))
         if self.frames + missing + 1 > MAX_FRAMES:
             raise TooLarge(f"more than {MAX_FRAMES:,} frames", where=str(self.path))
         before = (turns, place) if self._last is None else self._last[:2]
@@ -205,7 +205,7 @@ def check_place(path: Path | str, *, overwrite: bool = False) -> None:
     if path.is_dir():
         raise InvalidInput("is a folder", where=str(path), hint="Name a file.")
     if path.exists() and not overwrite:
-        raise Conflict("is there already", where=str(path), hint="Choose another name, or --overwrite.")
+        raise Conflict("already exists", where=str(path), hint="Use --overwrite, or choose another name.")
     try:
         with tempfile.TemporaryFile(dir=path.parent):
             pass

@@ -1,4 +1,4 @@
-"""What goes wrong with `marey stream`: what is said, the exit code, what is kept."""
+"""Failures of `marey stream`: message, exit code, files kept."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_a_file_that_cannot_be_written_any_more_is_2_and_the_stream_is_stopped(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("-o", "there.bvh"), "is there already"),
+        (("-o", "there.bvh"), "already exists"),
         (("-o", "clip.npz"), "only a .bvh"),
         (("-o", "none/clip.bvh"), "cannot be written"),
         (("--fetch", "there.bvh"), "cannot write here"),

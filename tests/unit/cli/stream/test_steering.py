@@ -1,4 +1,4 @@
-"""What is typed and piped into `marey stream`, and how it is left."""
+"""Typed and piped input of `marey stream`, and its end."""
 
 from __future__ import annotations
 

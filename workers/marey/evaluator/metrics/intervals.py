@@ -31,7 +31,8 @@ class Interval:
 def repeated(values: Sequence[float] | Numbers) -> Interval:
     """Mean and 95 % interval of repeats, as the T2M evaluator reports them over 20.
 
-    It tells what the repeats redraw: where they draw pools only, not what another generation or training would give.
+    The interval covers what the repeats redraw: where they draw pools only, not what another generation or training
+    would give.
 
     Args:
         values: (n,) one number a repeat, 2 or more.

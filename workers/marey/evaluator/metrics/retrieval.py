@@ -221,7 +221,7 @@ def _unit(name: str, vectors: Array) -> Array:
         raise InvalidInput(
             "a zero vector has no cosine",
             where=f"{name}, row {zero[0]}",
-            hint="look at the network that made it",
+            hint="check the network that produced it",
         )
     return vectors / lengths
 

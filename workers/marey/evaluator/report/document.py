@@ -47,7 +47,7 @@ def from_json(data: bytes, where: str = "report") -> Report:
     try:
         document = json.loads(data, parse_constant=_no_number)
     except ValueError as error:
-        raise InvalidFile(f"is no JSON: {error}", where=where) from None
+        raise InvalidFile(f"is not JSON: {error}", where=where) from None
     fields = check_document(document, where)
     try:
         return _reader().validate_json(json.dumps(fields), strict=True)
@@ -63,7 +63,7 @@ def _reader() -> TypeAdapter[Report]:
 
 
 def _no_number(text: str) -> None:
-    raise ValueError(f"{text} is no number")
+    raise ValueError(f"{text} is not a number")
 
 
 def _text(value: Any, indent: int | None = None) -> str:

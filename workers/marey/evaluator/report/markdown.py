@@ -75,7 +75,7 @@ def _rows(head: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) 
 
 
 def _facts(report: Report) -> str:
-    failed = f", {report.failed} failed and count nowhere" if report.failed else ""
+    failed = f", {report.failed} failed and are not counted" if report.failed else ""
     facts = [
         f"Evaluation {_text(report.evaluation)}, {moment(report.created)}",
         f"{_code(report.generator.name)} (weights {_text(report.licence)})",

@@ -170,7 +170,7 @@ class Report:
         try:
             json.dumps(dict(self.settings), allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise InvalidInput(f"are no JSON: {error}", where="settings") from None
+            raise InvalidInput(f"are not JSON: {error}", where="settings") from None
         self._check_table()
         self._check_changes()
 
@@ -190,13 +190,13 @@ class Report:
         distinct("heat", [(cell.act, cell.style) for cell in self.heat])
         for key in (*ALWAYS, self.judged):
             if key not in rows:
-                raise InvalidInput(f"there is no row {key!r}", where="rows", hint="Give a marked one: Value.missing.")
+                raise InvalidInput(f"missing row {key!r}", where="rows", hint="Give a marked one: Value.missing.")
         for where, keys in [
             *((f"row {r.key}", r.values) for r in self.rows),
             *(("trend", t.values) for t in self.trend),
         ]:
             if unknown := [key for key in keys if key not in metrics]:
-                raise InvalidInput(f"there is no metric {unknown[0]!r}", where=where)
+                raise InvalidInput(f"unknown metric {unknown[0]!r}", where=where)
         if any(a.finished > b.finished for a, b in zip(self.trend, self.trend[1:], strict=False)):
             raise InvalidInput("runs come the oldest first", where="trend")
 
@@ -207,7 +207,7 @@ class Report:
         for change in self.changes:
             where = f"change of {change.metric}"
             if change.metric not in metrics:
-                raise InvalidInput(f"there is no metric {change.metric!r}", where=where)
+                raise InvalidInput(f"unknown metric {change.metric!r}", where=where)
             if change.against not in known:
                 raise InvalidInput(f"there is no {change.against} among the baselines", where=where)
             if change.verdict == "no difference found":

@@ -1,4 +1,4 @@
-"""The parts of a report: numbers, rows, clips, references.
+"""Parts of a report: numbers, rows, clips, references.
 
 A number that does not exist stays a marked place with a reason; NaN and infinity are refused where they enter, so that
 no page ever shows them. Numbers are given in the unit they are printed in: a share in percent is 94.9.
@@ -27,7 +27,7 @@ class Value:
         mean: over the repeats; None = not available.
         half_width: of its 95 % interval over the repeats; None = measured once.
         n: motions (or prompts) that one repeat counts; for a distance of distributions the smaller set.
-        note: what a reader has to know; why there is no number, where there is none.
+        note: a remark for the reader; the reason if there is no number.
         dimensions: of the embeddings, for a metric that needs many motions a dimension (FID).
     """
 
@@ -40,7 +40,7 @@ class Value:
     def __post_init__(self) -> None:
         finite("value", self.mean, self.half_width)
         if self.mean is None and not self.note.strip():
-            raise InvalidInput("a value that is not available says why in its note")
+            raise InvalidInput("a value that is not available needs a note")
         if self.mean is None and self.half_width is not None:
             raise InvalidInput("a value that is not available has no interval")
         if self.half_width is not None and self.half_width < 0:
@@ -186,14 +186,14 @@ class Repeats:
 
     def __post_init__(self) -> None:
         if not 0 <= self.regenerated <= self.count or self.count < 1:
-            raise InvalidInput(f"{self.regenerated} of {self.count} repeats generated anew")
+            raise InvalidInput(f"{self.regenerated} of {self.count} repeats were regenerated")
 
 
 def finite(where: str, *numbers: float | None) -> None:
     """Refuse NaN and infinity."""
     for number in numbers:
         if number is not None and not math.isfinite(number):
-            raise InvalidInput(f"{number} is no number to report", where=where, hint="Say why with Value.missing.")
+            raise InvalidInput(f"{number} cannot be reported", where=where, hint="Give the reason with Value.missing.")
 
 
 def aware(where: str, moment: datetime) -> None:
@@ -203,9 +203,9 @@ def aware(where: str, moment: datetime) -> None:
 
 
 def distinct(where: str, keys: Iterable[object]) -> None:
-    """Refuse a key that stands there twice."""
+    """Refuse duplicate keys."""
     seen: set[object] = set()
     for key in keys:
         if key in seen:
-            raise InvalidInput(f"{key!r} stands there twice", where=where)
+            raise InvalidInput(f"duplicate key {key!r}", where=where)
         seen.add(key)
