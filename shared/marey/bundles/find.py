@@ -1,4 +1,4 @@
-"""Finding bundles: one by its name, or all that are here, broken ones apart."""
+"""Find a bundle by name, or list all installed bundles with the broken ones reported separately."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class BrokenBundle:
 
     @classmethod
     def of(cls, name: str, error: MareyError) -> BrokenBundle:
-        """From the error of opening it; the file's name is told, the folders above are not."""
+        """Describe an error of opening a bundle; keep the file's name, drop the parent folders."""
         file = Path(error.where).name if error.where else ""
         reason = f"{file}: {error.message}" if file and file != name else error.message
         return cls(_shown(name), _shown(reason)[:MAX_REASON], error)
@@ -52,7 +52,7 @@ class Bundles:
 
 
 def _shown(text: str) -> str:
-    """With bytes that are no UTF-8, which a file's name may hold, as escapes."""
+    """Escape bytes that are not UTF-8, which file names may contain."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -91,7 +91,7 @@ def list_bundles(*, config: Settings | None = None, kind: Kind | None = None) ->
 
 
 def scan_bundles(*, config: Settings | None = None, kind: Kind | None = None) -> Bundles:
-    """Open every bundle of the folders of models. A broken one, whatever is wrong with it, hides no other."""
+    """Open every bundle in the model folders. A broken bundle does not hide the others."""
     found: dict[str, Bundle] = {}
     broken: dict[str, BrokenBundle] = {}
     for folder in folders(config or settings()):
@@ -116,7 +116,7 @@ _logged: set[tuple[str, str]] = set()
 
 
 def log_broken(broken: BrokenBundle) -> None:
-    """Log why a bundle is left out, once for each reason."""
+    """Log the reason why a bundle is skipped, once per reason."""
     key = (broken.name, str(broken.error))
     if key not in _logged and len(_logged) < MAX_LOGGED:
         _logged.add(key)
