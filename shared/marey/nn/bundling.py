@@ -97,10 +97,11 @@ def fill(network: nn.Module, bundle: Bundle, part: str) -> None:
     state = {name: torch.tensor(value) for name, value in bundle.tensors(part).items()}
     where = f"{bundle.path}: {part}"
     try:
-        found = network.load_state_dict(state, strict=False)
+        found: Any = network.load_state_dict(state, strict=False)
     except RuntimeError as error:  # a shape differs
         raise InvalidBundle(f"tensors do not fit the configuration: {error}", where=where) from error
-    missing, unknown = sorted(filter(stored, found.missing_keys)), sorted(found.unexpected_keys)
+    missing: list[str] = sorted(name for name in found.missing_keys if stored(name))
+    unknown: list[str] = sorted(found.unexpected_keys)
     if missing or unknown:
         raise InvalidBundle(
             f"tensors do not fit the configuration: missing {missing[:3]}, unknown {unknown[:3]}", where=where

@@ -21,8 +21,8 @@ def keep_stored_names(module: nn.Module) -> None:
     Call it in the module's constructor. It covers `state_dict` and `load_state_dict` of the module and of every module
     that contains it; `named_parameters` has the attributes' names.
     """
-    module.register_state_dict_post_hook(_write_stored)
-    module.register_load_state_dict_pre_hook(_read_stored)
+    module.register_state_dict_post_hook(_write_stored)  # pyright: ignore[reportUnknownMemberType]
+    module.register_load_state_dict_pre_hook(_read_stored)  # pyright: ignore[reportUnknownMemberType]
 
 
 def stored_parameters(module: nn.Module) -> list[tuple[str, nn.Parameter]]:
