@@ -21,7 +21,7 @@ from marey.evaluator.bundle import load_networks
 from marey.evaluator.config import TINY, EvaluatorConfig
 from marey.evaluator.labels import label_of
 from marey.evaluator.loading import load_evaluator
-from marey.evaluator.reference import FILE, Reference
+from marey.evaluator.reference import FILE, RealClips
 from marey.evaluator.sentences import open_encoder
 from marey.evaluator.stage_tmr import TMRStage
 from marey.evaluator.tmr import TMREvaluator
