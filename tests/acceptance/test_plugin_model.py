@@ -1,0 +1,93 @@
+"""A model from a package of its own: trained, served and fetched from, without an edit of the product."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from marey.motion.clip import load_npz
+from tests.support.marey import REPOSITORY, Marey, serving
+from tests.support.plugin_wheels import install_plugin
+from tests.support.prepared import write_prepared
+
+BUNDLE = "sway-starter"
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
+    """The command line with the plug-in and a bundle that it trained."""
+    folder = tmp_path_factory.mktemp("plugin")
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    marey = Marey(home, folder / "models", install_plugin("toy_model", folder))
+    data = write_prepared(folder / "prepared")
+    trained = marey("train", "sway", "pose", data, "--run", folder / "run", "--side", "right", "--steps", 1).ok()
+    assert trained.out.startswith("height = ")
+    output = folder / "models" / BUNDLE
+    made = marey("train", "sway", "bundle", data, "--run", folder / "run", "-o", output, "--side", "right").ok()
+    assert made.out.startswith(f"{BUNDLE}@")
+    shutil.copytree(REPOSITORY / "models" / "srl-light", folder / "models" / "srl-light")
+    yield marey
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="module")
+def served(trained: Marey) -> Iterator[Marey]:
+    """The command line with a server."""
+    with serving(trained) as server:
+        assert "worker" in server.children()
+        yield trained
+
+
+def test_the_product_alone_does_not_know_it(trained: Marey) -> None:
+    alone = Marey(trained.home, trained.models)
+    alone("generate", "a person stands", "--bundle", BUNDLE).refused(2, "which does not run here", "hgm3")
+    alone("worker", "sway").refused(2, "there is no worker 'sway'")
+
+
+def test_it_is_shown_with_its_settings(served: Marey) -> None:
+    shown = served("models", "show", "sway").ok().out
+    assert "Stands where training clips stand on average" in shown
+    assert "width = 0.1 (0 to 0.5)  Metres from side to side." in shown
+    assert "beats = 2 (whole, 1 to 8)" in shown
+    assert "metric" not in shown
+    assert "pose/height" in served("models", "show", "sway", "--metrics").ok().out
+
+
+def test_what_is_submitted_to_it_is_fetched(served: Marey, tmp_path: Path) -> None:
+    table = "prompt,name,seconds,seed,settings\na person stands,calm,2,0,width=0\na person stands,wild,2,0,\n"
+    lines = served(
+        "submit", "-f", "-", "--model", "sway", "--set", "width=0.4", "--set", "beats=3",
+        "--fetch", tmp_path, "--json", stdin=table,
+    ).ok().lines  # fmt: skip
+    assert [line["model"] for line in lines] == ["sway", "sway"]
+    calm, wild = (load_npz(line["files"]["npz"]) for line in lines)
+    assert wild.manifest["settings"] == {"width": 0.4, "beats": 3}
+    assert calm.manifest["settings"] == {"width": 0.0, "beats": 3}
+    sideways = [np.ptp(clip.joints[:, 0], axis=0).max() for clip in (calm, wild)]
+    assert sideways[0] < 0.02 < 0.3 < sideways[1]
+
+
+def test_a_setting_out_of_its_range_is_refused_by_the_server_with_the_line(served: Marey) -> None:
+    table = "prompt,settings\na person stands,width=0.2\na person stands,beats=2.5\na person stands,steps=3\n"
+    served("submit", "-f", "-", "--model", "sway", stdin=table).refused(
+        2, "line 3: settings: beats: is 2.5, not a whole number", "line 4: settings: 'steps' is not a setting of sway-"
+    )
+
+
+def test_it_generates_without_a_server(trained: Marey, tmp_path: Path) -> None:
+    made = trained(
+        "generate", "a person stands", "--model", "sway", "--seed", 1, "--set", "width=0.3", "-o", tmp_path, "--json"
+    ).ok()  # fmt: skip
+    assert load_npz(made.lines[0]["files"]["npz"]).manifest["settings"] == {"width": 0.3, "beats": 2}
+    trained("generate", "a person stands", "--model", "sway", "--set", "width=3").refused(
+        2, "width: 3 is outside 0 to 0.5"
+    )
+
+
+def test_what_it_cannot_do_is_told(trained: Marey) -> None:
+    trained("worker", "sway", "--only", "live").refused(2, "names 0 models that stream")
