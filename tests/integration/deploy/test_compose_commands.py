@@ -95,12 +95,12 @@ def test_an_evaluation_ends_in_a_report(stack: Stack, tmp_path: Path) -> None:
 
 
 def test_whoever_has_a_port_for_metrics_tells_them(stack: Stack) -> None:
-    first = {"scheduler": "marey_scheduler_rounds_total", "worker-mogo": "marey_items_total"}
+    first = {"scheduler": "marey_scheduler_rounds_total", "worker": "marey_items_total"}
     for process in stack.processes.values():
         if process.metrics:
             told = _get(process.metrics)
             assert first.get(process.service.name, "marey_batch_items") in told
-    assert "marey_live_streams" in _get(stack.processes["worker-mogo"].metrics + 1)
+    assert "marey_live_streams" in _get(stack.processes["worker"].metrics + 1)
 
 
 def _get(port: int) -> str:

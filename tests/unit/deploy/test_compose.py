@@ -34,10 +34,19 @@ def settings_of(service: Service, monkeypatch: pytest.MonkeyPatch, secrets: str)
 
 
 def test_every_part_of_the_platform_is_there() -> None:
-    ours = {"migrate", "api", "scheduler", "parser", "text", "worker-hgm3", "worker-mogo", "evaluator"}
+    ours = {"migrate", "api", "scheduler", "parser", "text", "worker", "evaluator"}
     assert set(ALL) == ours | {"postgres", "redis", "objectstore"}
     assert {service.name for service in OURS} == ours
-    assert {service.command[1] for service in OURS if service.command[0] == "worker"} == set(known_queues())
+    workers = [service for service in OURS if service.command[0] == "worker"]
+    roles = [service.command[1] if service.command[1:] else service.environment["MAREY_ROLE"] for service in workers]
+    assert sorted(queue for role in roles for queue in role.split("+")) == sorted(known_queues())
+
+
+def test_a_plug_in_is_served_without_an_edit_of_the_file() -> None:
+    chosen = services({"MAREY_ROLE": "hgm3+sway", "MAREY_PLUGINS": "marey-sway==1.0.0"})
+    assert chosen["worker"].environment["MAREY_ROLE"] == "hgm3+sway"
+    built = [service.raw["build"]["args"]["PLUGINS"] for service in chosen.values() if service.ours]
+    assert set(built) == {"marey-sway==1.0.0"}
 
 
 @each
@@ -89,7 +98,8 @@ def test_a_command_is_one_of_the_command_line_with_arguments_it_takes(service: S
         command = command.commands[arguments.pop(0)]  # pyright: ignore[reportAttributeAccessIssue]
     command.make_context(service.name, arguments)  # refuses what it does not know
     if service.command[0] == "worker":
-        assert parse_roles(service.command[1]) == [(service.command[1],)]
+        (role,) = service.command[1:] or [service.environment["MAREY_ROLE"]]
+        assert parse_roles(role) == [tuple(role.split("+"))]
 
 
 @each_of_ours
@@ -140,8 +150,8 @@ def test_a_service_reads_the_secrets_it_is_given_and_no_other(service: Service) 
 
 def test_whoever_is_stopped_gets_the_time_it_asks_for() -> None:
     work = worker.STOP_SECONDS + worker.KILL_SECONDS
-    assert min(ALL[name].grace for name in ("text", "worker-hgm3", "evaluator")) > work
-    assert ALL["worker-mogo"].grace > max(children.STOP_SECONDS, live.STOP_SECONDS) > work
+    assert min(ALL[name].grace for name in ("text", "evaluator")) > work
+    assert ALL["worker"].grace > max(children.STOP_SECONDS, live.STOP_SECONDS) > work
     assert ALL["scheduler"].grace > 2 * scheduler.STOP_SECONDS
     assert ALL["postgres"].raw["stop_signal"] == "SIGINT"
 

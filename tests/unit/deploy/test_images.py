@@ -49,13 +49,14 @@ def test_an_image_runs_as_an_ordinary_user_and_compiles_nothing(stage: str) -> N
     assert dict(steps)["ENTRYPOINT"] == '["marey"]'
 
 
-def test_everything_that_python_installs_is_hashed_or_ours_or_torch() -> None:
+def test_everything_that_python_installs_is_hashed_or_ours_or_torch_or_asked_for() -> None:
     installs = re.findall(
         r"pip install (.*?)(?= && |$)", " && ".join(r for v, r in instructions("worker-build") if v == "RUN")
     )
     loose = [words for words in installs if "--require-hashes" not in words]
-    assert len(installs) == 4
-    assert all(words.strip().endswith((" .", "torch==2.13.0")) for words in loose)
+    assert len(installs) == 5
+    assert all(words.strip().endswith((" .", "torch==2.13.0", "--no-deps $PLUGINS")) for words in loose)
+    assert ("ARG", "PLUGINS=") in instructions("server-build"), "nobody's, until one is named"
 
 
 @pytest.fixture
