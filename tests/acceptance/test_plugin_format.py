@@ -1,0 +1,100 @@
+"""An export format from a package of its own: written, fetched, converted and erased without an edit of the product."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from marey.motion.clip import load_npz
+from tests.support.marey import TINY, Marey, serving
+from tests.support.plugin_wheels import install_plugin
+
+SECRET = "zanzibar"
+PROMPT = f"a person walks to {SECRET}"
+
+
+@pytest.fixture(scope="module")
+def installed(models: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
+    """The command line with the plug-in."""
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    environment = install_plugin("toy_format", tmp_path_factory.mktemp("plugin"))
+    yield Marey(home, models, {**environment, "MAREY_RETENTION_SECONDS": "1"})
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="module")
+def serving_with(installed: Marey) -> Iterator[Marey]:
+    """The same with a server, whose worker and scheduler have the plug-in."""
+    with serving(installed):
+        yield installed
+
+
+def test_it_is_written_fetched_converted_and_erased(serving_with: Marey, tmp_path: Path) -> None:
+    marey, folder = serving_with, tmp_path / "clips"
+    (line,) = marey("submit", PROMPT, "--bundle", TINY, "--seconds", 2, "--fetch", folder, "--json").ok().lines
+    assert sorted(line["files"]) == ["bvh", "npz", "poses"]
+    file = Path(line["files"]["poses"])
+    assert file.suffix == ".pose"
+    poses, npz = json.loads(file.read_bytes()), load_npz(line["files"]["npz"])
+    np.testing.assert_array_equal(np.array(poses["rotations"], np.float32), npz.rotations)
+    assert poses["manifest"]["prompt"] == PROMPT
+
+    with (folder / "manifest.csv").open(newline="", encoding="utf-8") as stream:
+        (row,) = csv.DictReader(stream)
+    assert row["file:poses"] == file.name
+    with marey.client() as client:
+        motion = client.get(f"/v1/motions/{line['motion']}")
+        (stored,) = (each for each in motion["files"] if each["format"] == "poses")
+        assert stored["media_type"] == "application/json"
+        with client.stream(f"/v1/motions/{line['motion']}/files/poses", {}) as answer:
+            assert answer.headers["Content-Type"] == "application/json"
+            assert answer.headers["Content-Disposition"].endswith('.pose"')
+            assert b"".join(answer.iter_bytes()) == file.read_bytes()
+
+    marey("convert", file, tmp_path / "again.npz").ok()
+    np.testing.assert_array_equal(load_npz(tmp_path / "again.npz").joints, npz.joints)
+    marey("convert", file, tmp_path / "again.bvh").ok()
+    assert (tmp_path / "again.bvh").read_bytes() == Path(line["files"]["bvh"]).read_bytes()
+
+    marey("jobs", "erase", line["job"], "--yes").ok()
+    after = tmp_path / "after"
+    deadline = time.monotonic() + 60
+    while (
+        len((fetched := marey("fetch", line["job"], "-o", after, "--json", "--overwrite").ok().lines[0])["files"]) < 3
+    ):
+        assert time.monotonic() < deadline, fetched
+        time.sleep(0.5)
+    erased = Path(fetched["files"]["poses"]).read_bytes()
+    assert SECRET.encode() not in erased
+    assert json.loads(erased)["manifest"]["erased"] is True
+    assert json.loads(erased)["rotations"] == poses["rotations"]
+    stored_files = [path for path in (marey.home / "assets").rglob("*") if path.is_file()]
+    assert len(stored_files) >= 3
+    for path in stored_files:
+        data = path.read_bytes()
+        assert not any(SECRET.encode(coding) in data for coding in ("utf-8", "utf-32-le")), path
+
+
+def test_it_is_generated_without_a_server(installed: Marey, tmp_path: Path) -> None:
+    line = installed(
+        "generate", PROMPT, "--bundle", TINY, "--seconds", 2, "--seed", 1, "--format", "poses", "-o", tmp_path, "--json"
+    ).ok().lines[0]  # fmt: skip
+    assert list(line["files"]) == ["poses"]
+    assert json.loads(Path(line["files"]["poses"]).read_bytes())["manifest"]["prompt"] == PROMPT
+
+
+def test_the_product_alone_does_not_know_it(installed: Marey, offline: Marey, tmp_path: Path) -> None:
+    offline("generate", PROMPT, "--bundle", TINY, "--format", "poses", "-o", tmp_path).refused(
+        2, "'poses' is not a known motion format", "bvh, npz"
+    )
+    (tmp_path / "a.pose").write_text("{}")
+    offline("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "Known: .bvh, .npz.")
+    installed("convert", tmp_path / "a.pose", tmp_path / "b.npz").refused(2, "is not a file of poses")
