@@ -53,11 +53,12 @@ chaos: $(STAMP) ## 10,000 items three times, whatever is killed or falls silent;
 soak: $(STAMP) ## Steady load for SOAK_MINUTES (15), and whether memory, descriptors or connections grow
 	$(BIN)/python -m benchmarks.soak
 
-lint: $(STAMP) ## ruff, basedpyright, import-linter
+lint: $(STAMP) ## ruff, basedpyright, import-linter, words
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/basedpyright
 	PYTHONPATH=shared:workers:services:migrations $(BIN)/lint-imports
+	$(BIN)/python -m tests.lint.words
 
 docs: $(STAMP) ## The documentation as a site, into out/site
 	$(BIN)/python docs/build_site.py out

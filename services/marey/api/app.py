@@ -76,7 +76,7 @@ def create_app(config: Settings, routers: Sequence[APIRouter] = ROUTERS) -> Fast
         lifespan=lambda app: _lifespan(app, config),
         generate_unique_id_function=_operation_id,
         dependencies=[Depends(known_query)],
-        openapi_url=None,  # a route of `docs`, which refuses unknown queries as all do
+        openapi_url=None,  # part of `docs`, which refuses unknown query parameters as all routes do
         docs_url=None,
         redoc_url=None,
     )
@@ -103,7 +103,7 @@ async def _lifespan(app: FastAPI, config: Settings) -> AsyncIterator[None]:
             where="MAREY_DATABASE_URL",
             hint="Set it, or use `marey serve`, which brings one.",
         )
-    Allowed.of(config.webhook_allow)  # what is wrong with it is said at the start
+    Allowed.of(config.webhook_allow)  # report its faults at start-up
     if config.webhook_key is not None:
         Vault.of(config)
     url = config.database_url.get_secret_value()
@@ -152,7 +152,7 @@ def serve() -> None:
     """Serve at `MAREY_HOST` and `MAREY_PORT` until SIGTERM.
 
     Raises:
-        InvalidInput: the database passes no notifications on.
+        InvalidInput: the database does not forward notifications.
     """
     config = settings()
     options = prepare_process("api", config)

@@ -16,7 +16,7 @@ from marey.http.queries import check_query
 from marey.tenants import ApiKey, authenticate
 
 METRICS = "metrics"
-"""The scope to see all tenants' queues; no other holds it."""
+"""Scope for the queues of all tenants; no other scope includes it."""
 bearer = HTTPBearer(auto_error=False, description="An API key: `marey admin keys create`.")
 
 
@@ -24,7 +24,7 @@ def caller(shared: Shared, credentials: Annotated[HTTPAuthorizationCredentials |
     """Return the key of a request.
 
     Raises:
-        Unauthenticated: none, or not a valid one.
+        Unauthenticated: no key, or an invalid one.
     """
     return authenticated(shared, None if credentials is None else credentials.credentials)
 
@@ -41,11 +41,11 @@ def authorize(shared: Context, key: ApiKey, scope: str, kind: str | None = None)
     """Validate that the key has the scope, and count the request against its rate limit.
 
     Args:
-        kind: class of the request (`marey.core.rates`), where it is not called as its scope.
+        kind: class of the request (`marey.core.rates`), if it differs from the scope.
 
     Raises:
         Refused: it lacks the scope.
-        Busy: it has asked too often.
+        Busy: its rate limit is exhausted.
     """
     check_scope(key, scope)
     shared.rates.take(key, kind or scope)
@@ -55,7 +55,7 @@ def check_scope(key: ApiKey, scope: str) -> None:
     """Validate that the key has the scope. `admin` includes all scopes of its own tenant.
 
     Raises:
-        Refused: it has not.
+        Refused: the key lacks it.
     """
     if scope not in key.scopes and ("admin" not in key.scopes or scope == METRICS):
         raise Refused(f"the key {key.name!r} lacks the scope {scope!r}", hint="Use a key that has it.")
@@ -64,7 +64,7 @@ def check_scope(key: ApiKey, scope: str) -> None:
 def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiKey, SecurityScopes], ApiKey]:
     """Return a dependency: the caller's key, authorized for the scopes that the route's `Security` names.
 
-    The OpenAPI document says them, too.
+    The OpenAPI document lists the scopes, too.
     """
 
     def check(
@@ -72,7 +72,7 @@ def requires(kind: str | None = None) -> Callable[[HTTPConnection, Context, ApiK
     ) -> ApiKey:
         for scope in wanted.scopes:
             authorize(shared, key, scope, kind)
-        check_query(asked)  # only now: nobody unknown is told what a route takes
+        check_query(asked)  # only now: unauthenticated callers learn no parameters
         return key
 
     return check

@@ -23,15 +23,15 @@ from marey.tenants import ApiKey, keys_still_valid
 log = structlog.get_logger(__name__)
 
 PERIOD = 0.5
-"""Seconds between two readings of one job: two progress messages a second at most, however fast it goes."""
+"""Seconds between two reads of one job: at most two progress messages a second."""
 WAIT = 0.25
 REREAD_SECONDS = 10.0
-"""Each job that is followed is read this often, whether a notification came or not."""
+"""Seconds between reads of each followed job, with or without a notification."""
 RECONNECT_SECONDS, REFUSED_SECONDS = 0.5, 30.0
 KEY_SECONDS = 2.0
-"""Between two looks whether the keys of those who follow are still valid, as for sockets."""
+"""Seconds between checks of the followers' keys, as for sockets."""
 QUEUE_LIMIT = 1000
-"""Batches a slow client may lag behind before its stream is closed; it comes back with Last-Event-ID."""
+"""Batches a slow client may lag behind before its stream is closed; it reconnects with Last-Event-ID."""
 PROGRESS = "progress"
 
 CLOSED = None
@@ -43,7 +43,7 @@ class EventBatch:
 
     wire: bytes
     last: bool
-    """Nothing follows: the job has ended."""
+    """True if the job has ended: no batch follows."""
 
 
 @dataclass(eq=False)
@@ -113,7 +113,7 @@ class EventBroadcaster:
         while not self._stopping.is_set():
             try:
                 with Listener(self._url, (EVENT_CHANNEL,)) as listener:
-                    self._mark_all()  # what was told while nobody listened
+                    self._mark_all()  # notifications sent while not listening
                     while not self._stopping.is_set():
                         self._mark(n.payload for n in listener.wait(WAIT))
                         self._mark_old()
@@ -122,7 +122,7 @@ class EventBroadcaster:
             except Unreachable as error:
                 log.warning("tailer_disconnected", error=error.message)
                 self._stopping.wait(RECONNECT_SECONDS)
-            except InvalidInput as error:  # a pooler was put in between since the start
+            except InvalidInput as error:  # a pooler was added since the start
                 log.error("tailer_refused", error=str(error))
                 self._stopping.wait(REFUSED_SECONDS)
             except Exception:
@@ -189,7 +189,7 @@ class EventBroadcaster:
                 events: list[EventRow] = []
                 while page := events_after(conn, followers[0].tenant, job, events[-1].seq if events else seq):
                     events.extend(page)
-        except NotFound:  # deleted
+        except NotFound:  # job deleted
             _tell((follower, CLOSED) for follower in followers)
             return
         if not events:
@@ -211,7 +211,7 @@ def _tell(told: Iterable[tuple[Subscription, EventBatch | None]]) -> None:
     for subscription, batch in told:
         by_loop[subscription.loop].append((subscription, batch))
     for loop, pairs in by_loop.items():
-        with contextlib.suppress(RuntimeError):  # the loop is closed: so are its streams
+        with contextlib.suppress(RuntimeError):  # the loop is closed, and its streams with it
             loop.call_soon_threadsafe(_put_all, pairs)
 
 

@@ -10,7 +10,7 @@ from marey.core.settings import Settings
 from marey.jobs.generators import GeneratorCapabilities, capabilities_of
 
 FRESH_SECONDS = 5.0
-"""A replaced bundle is noticed within this; 100,000 lines of one submit ask the disk once."""
+"""Seconds until a replaced bundle is noticed; 100,000 lines of one submit read the disk once."""
 
 
 class Catalogue:

@@ -26,7 +26,7 @@ from marey.http.slots import SlotCounter, SlotLimits
 from marey.storage import AssetStore
 
 LARGE_THREADS = 1
-"""Two would take turns with each other instead of with the requests beside them: the interpreter is one."""
+"""More than one would compete with each other instead of with other requests: there is one interpreter lock."""
 
 
 @dataclass
@@ -41,13 +41,13 @@ class Context:
     rates: Rates
     texts: TextService
     readiness: Readiness
-    """The cached checks of `/readyz`."""
+    """Cached checks of `/readyz`."""
     streams: Hub | None = None
-    """None where no Redis is named."""
+    """None if no Redis is configured."""
     body_budget: BodyBudget = field(default_factory=BodyBudget)
-    """For bodies too long for memory."""
+    """Budget of bodies too large for memory."""
     large_threads: CapacityLimiter = field(default_factory=lambda: CapacityLimiter(LARGE_THREADS))
-    """In which such bodies are read and written on; the threads of other requests stay free."""
+    """Threads for such bodies; other requests keep their threads."""
     event_streams: SlotCounter = field(init=False)
     """Open streams of server-sent events."""
 
@@ -66,11 +66,11 @@ Shared = Annotated[Context, Depends(context)]
 
 
 CONNECTIONS = 20
-"""Of one process to the database."""
+"""Database connections of one process."""
 HELD = 10
-"""Of these, how many routes hold at once; who comes later waits for its turn without a thread. A route keeps its
-connection while it waits for a thread, and its key is looked up on another: if routes could hold them all, sixty
-requests at once would wait for each other until the pool's patience is over."""
+"""Maximum connections held by routes; further requests wait without a thread. A route keeps its connection while it
+waits for a thread, and its key is looked up on another: if routes could hold them all, sixty concurrent requests
+would deadlock until the pool's timeout."""
 
 
 DEADLINE = "marey_deadline"
@@ -96,7 +96,7 @@ def connection(shared: Shared, asked: HTTPConnection) -> Iterator[sa.Connection]
     """Open a transaction for the duration of the route's function; it commits before the answer is sent.
 
     Raises:
-        Unauthenticated: no key is shown. Strangers take no connection; whether a key is valid is looked up later.
+        Unauthenticated: no key. Requests without a key take no connection; its validity is checked later.
     """
     if not asked.headers.get("authorization"):
         raise no_key()

@@ -1,8 +1,7 @@
 """JSON bodies with one long list, parsed from a file piece by piece: memory does not grow with the list.
 
-Every value is decoded by Python's own `json`, which a whole body would be read with too. So the same is accepted, and
-what is refused is told in the same words with the same line and column. Only the object around the list, and the list's
-commas, are read here.
+Every value is decoded by Python's own `json`, as for a whole body. So the same documents are accepted, and errors
+have the same words, line and column. Only the enclosing object and the list's commas are parsed here.
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from marey.core.errors import InvalidInput, TooLarge
 from marey.items.item import MAX_ITEMS
 
 MAX_VALUE = 2**20
-"""Characters of one element, and of all other fields together."""
+"""Maximum characters of one element, and of all other fields together."""
 PIECE = 2**20
-"""Bytes that are read at a time."""
+"""Bytes per read."""
 NEAR_END = 16
-"""Characters: a literal or an escape that is cut off is told of where it begins, this much before the end at most."""
+"""Characters: a truncated literal or escape is reported at its start, at most this far before the end."""
 BLANK = re.compile(r"[ \t\n\r]*")
 _decoder = json.JSONDecoder()
 
@@ -32,9 +31,9 @@ class Document:
 
     Args:
         body: the file; read from its beginning by each call.
-        path: names that lead to the list.
-        hint: what to do about a body that is another thing than an object.
-        limit: elements after which `fields` reads no further: the list is too long, which its reader will say.
+        path: names of nested fields that lead to the list.
+        hint: advice for a body that is not an object.
+        limit: elements after which `fields` stops reading: the list is too long, which its reader reports.
     """
 
     def __init__(
@@ -42,16 +41,16 @@ class Document:
     ) -> None:
         self._body, self._path, self._hint, self._limit = body, path, hint, limit
         self.has_list = False
-        """There is a list at the path. Known after `fields`, as the next."""
+        """True if there is a list at the path. Set by `fields`, like the next attribute."""
         self.is_cut = False
-        """It has more than `limit` elements, and what follows it was not read."""
+        """True if it has more than `limit` elements; the rest was not read."""
 
     def fields(self) -> dict[str, Any]:
         """Return all fields but the list; a value in its place that is not a list is included.
 
         Raises:
-            InvalidInput: it is no JSON, no object, or names the list twice.
-            TooLarge: an element, or all the rest, is over `MAX_VALUE` characters.
+            InvalidInput: not JSON, not an object, or the list occurs twice.
+            TooLarge: an element, or the rest, is over `MAX_VALUE` characters.
         """
         found: dict[str, Any] = {}
         for number, _ in self._read(found):
@@ -121,7 +120,7 @@ class _Window:
 
     def __init__(self, body: BinaryIO) -> None:
         body.seek(0)
-        encoding = json.detect_encoding(body.read(4))  # as `json.loads` of bytes
+        encoding = json.detect_encoding(body.read(4))  # as `json.loads` of bytes does
         body.seek(0)
         self._body = body
         self._decode = codecs.getincrementaldecoder(encoding)("surrogatepass").decode
@@ -170,7 +169,7 @@ class _Window:
         """Parse the value that begins here.
 
         Raises:
-            InvalidInput: it is no JSON.
+            InvalidInput: not JSON.
             TooLarge: it has over `MAX_VALUE` characters.
         """
         self._fill()
@@ -208,7 +207,7 @@ class _Window:
             self._whole = not read
             try:
                 parts.append(self._decode(read, final=self._whole))
-            except UnicodeDecodeError as error:  # its object begins with what the decoder kept of the piece before
+            except UnicodeDecodeError as error:  # its object includes bytes that the decoder kept
                 raise _undecodable(error, self._bytes - (len(error.object) - len(read))) from None
             self._bytes += len(read)
             ahead += len(parts[-1])

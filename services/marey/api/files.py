@@ -58,7 +58,7 @@ def file_response(shared: Context, tenant: str, name: str, file: FileView, part:
     """Answer a request for a file. Its ETag is its SHA-256; HEAD reports the whole file's size.
 
     Args:
-        name: of the download, as `download_name` makes it.
+        name: name of the download (`download_name`).
     """
     etag = f'"{file.sha256}"'
     if part.if_none_match is not None and (etag in part.if_none_match or part.if_none_match.strip() == "*"):
@@ -69,7 +69,7 @@ def file_response(shared: Context, tenant: str, name: str, file: FileView, part:
         "Cache-Control": "private, immutable, max-age=86400",
         "Content-Disposition": attachment(name),
     }
-    if part.request.method == "HEAD":  # also of a bucket, whose URLs are signed for GET alone
+    if part.request.method == "HEAD":  # also for a bucket, whose URLs are signed for GET only
         return Response(headers={**headers, "Content-Length": str(file.size)}, media_type=file.media_type)
     object_key = asset_key(tenant, file.sha256)
     if part.redirect and (url := shared.store.presign(object_key, filename=name, media_type=file.media_type)):

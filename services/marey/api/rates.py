@@ -20,9 +20,9 @@ from marey.runtime.queue import redis_client
 from marey.tenants import ApiKey
 
 TIMEOUT = 0.5
-"""A counter is worth less than the request it counts: who waits longer for Redis goes without."""
+"""Seconds to wait for Redis: a counter is worth less than its request, which then proceeds uncounted."""
 AWAY_SECONDS = 5.0
-"""After Redis did not answer nobody asks it for so long: requests shall not wait for it one after the other."""
+"""Circuit breaker: skip Redis for 5 s after an error, so that requests do not wait for it one after the other."""
 PREFIX = "marey:rate"
 
 log = structlog.get_logger(__name__)
@@ -31,8 +31,8 @@ log = structlog.get_logger(__name__)
 class Rates:
     """Rate limiter, one per process; connects lazily.
 
-    While Redis is away requests are served uncounted, and the log says so: a limit keeps a loop of somebody's script
-    from crowding others out, and quotas, which hold what costs something, stand in the database.
+    While Redis is down requests are served uncounted, with a log line: rate limits only keep a looping script from
+    crowding out other clients; quotas, which protect costly resources, are stored in the database.
     """
 
     def __init__(self, config: Settings) -> None:
@@ -45,14 +45,14 @@ class Rates:
             storage = RedisStorage("redis://", connection_pool=pool, key_prefix=PREFIX, wrap_exceptions=True)
             self._limiter = SlidingWindowCounterRateLimiter(storage)
         self._lock = threading.Lock()
-        self._again = 0.0  # when Redis may be asked
+        self._again = 0.0  # time of the next attempt after an error
         self._away = False
 
     def take(self, key: ApiKey, kind: str) -> None:
         """Count one request of a class.
 
         Raises:
-            Busy: it is one too many in the window that ends now.
+            Busy: the limit of the current window is exceeded.
         """
         rate = self._rate(key, kind)
         if rate is None or self._limiter is None or time.monotonic() < self._again:

@@ -1,7 +1,7 @@
 """The checks of `/readyz`: they run in the background, each in a thread of its own.
 
-A check that hangs holds up nothing but itself: its last result grows old, and an old result counts as a failure.
-The checks themselves are in `marey.api.health.checks`.
+A hanging check blocks nothing else: its last result grows old, and an old result counts as a failure. The checks
+themselves are in `marey.api.health.checks`.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import structlog
 from marey.core.errors import MareyError
 
 INTERVAL_SECONDS = 2.0
-"""Between the end of one round of a check and its next."""
+"""Seconds between the end of one run of a check and the next."""
 DEADLINE_SECONDS = 5.0
-"""A check that takes longer counts as failed, until it ends."""
+"""Seconds after which a running check counts as failed."""
 STALE_SECONDS = INTERVAL_SECONDS + DEADLINE_SECONDS
 
 log = structlog.get_logger(__name__)
@@ -29,8 +29,8 @@ class Result:
     """Result of a check.
 
     Attributes:
-        message: for everybody: what is down, never where or how.
-        required: requests cannot be answered without it.
+        message: public: names what is down, never where or how.
+        required: True if requests cannot be answered without it.
     """
 
     ok: bool
@@ -43,9 +43,9 @@ class Check:
     """A dependency that must work.
 
     Attributes:
-        run: raises MareyError when it does not.
-        message: what everybody is told then; the log has the error itself.
-        required: requests cannot be answered without it; else it is told, and the API stays ready.
+        run: raises MareyError on failure.
+        message: public message of a failure; the log has the error itself.
+        required: True if requests cannot be answered without it; else it is reported, and the API stays ready.
     """
 
     run: Callable[[], object]

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from marey.http import problems
 
 LOCAL_SERVER = "/"
-"""The server that the document comes from."""
+"""The server that serves the document."""
 _MOTION = "0199f3a2-6c1d-7b4e-9a55-3f1c2d7e8b90"
 _ITEM = {"prompt": "a person walks forward and waves with the right hand", "name": "greeting", "tags": ["shot=010"]}
 _MEASURED = {"bundle": "hgm3-starter", "split": "test", "repeats": 3}
@@ -35,15 +35,15 @@ EXAMPLES: dict[tuple[str, str], Any] = {
     ("NewWebhookBody", "application/json"): {"url": "https://hooks.example.com/marey", "events": ["job.ended"]},
     ("WebhookPatch", "application/json"): {"paused": True},
 }
-"""By schema and media type of a body."""
+"""Examples by schema and media type of a body."""
 
 
 def build_reference(app: FastAPI, models: Sequence[type[BaseModel]], public_url: str | None) -> dict[str, Any]:
     """Return the OpenAPI 3.1 document of an application; `docs/openapi.json` is a copy of it.
 
     Args:
-        models: schemas of bodies that routes read by hand.
-        public_url: where clients reach the API; None = where they found the document.
+        models: schemas of bodies that routes parse themselves.
+        public_url: URL of the API for clients; None = relative to the document.
     """
     document = get_openapi(
         title=app.title,

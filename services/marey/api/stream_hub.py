@@ -15,21 +15,21 @@ from marey.runtime.queue import redis_client
 Answer = TypeVar("Answer")
 
 SOCKETS = 200
-"""Open at once in one process: each waits for its frames in a thread of its own."""
+"""Maximum open sockets per process: each waits for its frames in a thread of its own."""
 CALLS = 16
-"""Threads for all that answers at once; the database's pool holds 20, and the routes want some."""
+"""Threads for short calls; the database's pool has 20 connections, of which routes need some."""
 
 
 class Hub:
     """Created once per process, on its event loop; connects lazily.
 
     Args:
-        url: of the Redis that holds the frames.
-        tenant, key: sockets that one of them may have open.
+        url: URL of the Redis with the frames.
+        tenant, key: maximum open sockets of one tenant or key.
     """
 
     def __init__(self, url: str, *, tenant: int = SOCKETS, key: int = SOCKETS) -> None:
-        # The sockets would use twice as many as redis-py's own 100 connections.
+        # The sockets would use twice as many as redis-py's own limit of 100 connections.
         self.redis = redis_client(url, max_connections=2 * SOCKETS)
         self._reads = CapacityLimiter(SOCKETS)
         self._calls = CapacityLimiter(CALLS)

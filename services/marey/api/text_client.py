@@ -23,10 +23,10 @@ SOCKET = "unix://"
 PATH = "/v1/texts/parse"
 JSON = "application/json"
 MAX_ANSWER = 8 * 2**20
-"""Bytes. The graphs of 64 prompts that are as long as they may be take one of them."""
+"""Bytes. The graphs of 64 prompts of maximum length take one of them."""
 RETRY = re.compile(r"[0-9]{1,5}")
 PASSED_ON = (200, 404, 413, 422, 429, 503)
-"""Answers that are the caller's business; any other is a fault of ours."""
+"""Statuses caused by the caller; others are faults of the server."""
 
 log = structlog.get_logger(__name__)
 
@@ -35,7 +35,7 @@ class TextService:
     """Forwards prompts to the text service over HTTP; on the event loop, no thread waits.
 
     Raises:
-        InvalidInput: it is named, but the secret is not.
+        InvalidInput: a URL is configured without the secret.
     """
 
     def __init__(self, config: Settings) -> None:
@@ -48,7 +48,7 @@ class TextService:
 
         Raises:
             Busy: too much is being parsed.
-            Unreachable: it does not answer in time, or there is none.
+            Unreachable: no answer in time, or no text service.
         """
         if self._http is None:
             raise Unreachable(
@@ -99,14 +99,14 @@ async def _passed_on(answer: httpx2.Response) -> Response:
     """Return the answer if it is the text service's own; answers of other servers are not passed to clients.
 
     Raises:
-        Unreachable: it is another.
+        Unreachable: it is another server.
     """
     status = answer.status_code
     view, media_type = (GraphsView, JSON) if status == 200 else (ProblemBody, MEDIA_TYPE)
     if status not in PASSED_ON or answer.headers.get("Content-Type", "").partition(";")[0].strip() != media_type:
         raise _away(f"it answered {status}")
     content = bytearray()
-    async for part in answer.aiter_raw():  # nothing is decompressed: it was not asked for
+    async for part in answer.aiter_raw():  # not decompressed: compression was not requested
         content += part
         if len(content) > MAX_ANSWER:
             raise _away(f"its answer is over {MAX_ANSWER:,} bytes")

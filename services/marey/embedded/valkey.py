@@ -40,12 +40,12 @@ def valkey_url(home: Path) -> str:
 def start_valkey(home: Path) -> EmbeddedServer:
     """Start the Valkey of `home`, its append-only file in `home/valkey`.
 
-    One that a killed owner left running is stopped first. The same rule for threads as `start_postgres`.
+    A server left by a killed owner is stopped first. The same rule for threads as `start_postgres`.
 
     Raises:
         InvalidInput: `home` cannot be written.
         Conflict: another process runs it.
-        StartFailed: it did not start; the message holds the end of its log.
+        StartFailed: it did not start; the message includes the end of its log.
     """
     make_private(home)
     data = home / "valkey"

@@ -23,23 +23,23 @@ from marey.items.item import MAX_BODY_BYTES
 
 Result = TypeVar("Result")
 MAX_OTHER_BODY = 2**20
-"""Bytes of any body but those that hold many prompts."""
+"""Maximum bytes of any body except those with many prompts."""
 SMALL_BODY = 2**16
-"""Bytes that any request may have in memory."""
+"""Bytes that any request may hold in memory."""
 OTHER_BODIES = 64 * MAX_OTHER_BODY
-"""Bytes of bodies over that in memory at the same time. They are read before it is known who sends them."""
+"""Total bytes of larger bodies in memory. They are read before authentication."""
 NO_ROOM = "Try again; if it stays so, look at the disk of the API's temporary files (TMPDIR)."
 PROMPTS_PATHS = ("/v1/jobs", "/v1/evaluations", "/v1/schedules")
-"""Where such bodies go; their routes read them, once they know who sends them."""
+"""Paths of such bodies; their routes read them, after authentication."""
 MIN_RATE = 4096
-"""Bytes a second, on average, below which a body is too slow: half of what a modem did."""
+"""Minimum bytes a second, on average: half of a modem's rate."""
 INCOMING = "marey.incoming"
-"""Key of the scope of a request whose route reads the body itself."""
+"""Scope key of a request whose route reads the body itself."""
 LINGER_SECONDS = 2.0
 SILENT_SECONDS = 0.25
 LINGER_BYTES = 2**20
-"""What is read, and thrown away, of a body that was refused: a client that still sends when the connection closes may
-lose the answer that says why."""
+"""Bytes of a refused body that are read and discarded: a client that still sends when the connection closes may lose
+the answer with the reason."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Patience:
     """Time limits of a body.
 
     Attributes:
-        seconds: for the whole of it.
-        pause: for its first bytes, and in all while it comes slower than `MIN_RATE`.
+        seconds: limit of the whole body.
+        pause: limit for its first bytes, and in total while it is slower than `MIN_RATE`.
     """
 
     seconds: float
@@ -118,8 +118,8 @@ class BodyGuard:
     """Reads bodies up to their limits before a route sees them. Routes that take many prompts read their own, within
     the same time limits.
 
-    Whatever is answered before the whole body is here is the last answer on its connection: what still comes would be
-    read for as long as the client likes to send.
+    An answer before the end of the body closes the connection: the rest would otherwise be read for as long as the
+    client sends.
     """
 
     def __init__(self, app: ASGIApp, patience: Patience) -> None:
@@ -210,19 +210,18 @@ class BodyLimits(Protocol):
 
     body_budget: BodyBudget
     large_threads: CapacityLimiter
-    """Threads in which large bodies are read."""
+    """Threads that read large bodies."""
 
 
 @asynccontextmanager
 async def kept_body(request: Request, limits: BodyLimits, tenant: str) -> AsyncGenerator[KeptBody]:
     """Receive the body of a request with many prompts, in a file above a size; the file is removed after the block.
 
-    A long body waits until there is room for it before it is read. One that does not say its length takes as much as
-    the longest.
+    A large body waits for budget before it is read. One without a declared length takes the maximum.
 
     Raises:
         TooLarge, TooSlow, InvalidInput: as `_parts`.
-        Overloaded: there is no room for it now.
+        Overloaded: no budget is free now.
         Unreachable: the file cannot be written.
     """
     async with AsyncExitStack() as stack:
@@ -251,7 +250,7 @@ def _declared(request: Request, limit: int) -> int:
 
     Raises:
         TooLarge: it is over `limit`.
-        InvalidInput: it is not a number, or the body is compressed.
+        InvalidInput: not a number, or the body is compressed.
     """
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal():
@@ -268,9 +267,9 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
     """Yield the body of a request as it arrives.
 
     Raises:
-        TooLarge: over `limit` bytes; it is not read further.
+        TooLarge: over `limit` bytes; the rest is not read.
         TooSlow: it does not come fast enough.
-        InvalidInput: the length it declares is not a number, it is compressed, or the client left in its middle.
+        InvalidInput: the declared length is not a number, the body is compressed, or the client disconnected.
     """
     _declared(request, limit)
     size = 0
@@ -280,7 +279,7 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
             if size > limit:
                 raise _too_large(limit)
             yield part
-    except ClientDisconnect:  # nobody reads this, but it is no bug either
+    except ClientDisconnect:  # the client is gone, but this is no bug
         raise InvalidInput("the client went away before it was whole", where="body") from None
 
 

@@ -12,13 +12,13 @@ from marey.core.errors import Overloaded
 from marey.items.item import MAX_BODY_BYTES
 
 ROOM_BYTES = 3 * MAX_BODY_BYTES
-"""In files of the temporary folder. In docker-compose.yml that is in memory: 256 MB, of the 1 GiB of the container."""
+"""Bytes in files of the temporary folder. In docker-compose.yml that is in memory: 256 MB, of the container's 1 GiB."""
 TENANT_BYTES = 2 * MAX_BODY_BYTES
-"""Of one tenant: another always finds room."""
+"""Bytes of one tenant: others always find some."""
 WAIT_SECONDS = 10.0
 WAITING = 32
-"""Requests that wait at the same time; their clients have sent nothing but what fits into the buffers of a socket. A
-tenant may have no more of them than places are free: another always finds one."""
+"""Maximum waiting requests; their clients have sent only what fits into the buffers of a socket. A tenant may have
+at most as many as are free: others always find one."""
 RETRY_SECONDS = 5
 
 
@@ -32,7 +32,7 @@ class _Waiter:
 class BodyBudget:
     """Grants bytes in order of arrival; on the event loop alone.
 
-    A request whose tenant has all it may have is passed by the requests of others.
+    A request whose tenant is at its limit is overtaken by requests of others.
     """
 
     def __init__(self, total: int = ROOM_BYTES, tenant: int = TENANT_BYTES, *, seconds: float = WAIT_SECONDS) -> None:
@@ -51,7 +51,7 @@ class BodyBudget:
         """Hold `size` bytes during the block; waits for them.
 
         Raises:
-            Overloaded: there is no room within `seconds`, or too many wait already.
+            Overloaded: no budget within `seconds`, or too many waiting requests.
         """
         await self._wait(tenant, size)
         try:
@@ -75,7 +75,7 @@ class BodyBudget:
                 self._forget(waiter)
                 raise _overloaded() from None
         except asyncio.CancelledError:
-            if waiter.turn.done():  # it was given, and nobody takes it
+            if waiter.turn.done():  # granted, but the waiter was cancelled
                 self._give_back(tenant, size)
             self._forget(waiter)
             raise
@@ -89,7 +89,7 @@ class BodyBudget:
     def _forget(self, waiter: _Waiter) -> None:
         if waiter in self._waiting:
             self._waiting.remove(waiter)
-        self._admit()  # it may have stood before others
+        self._admit()  # it may have blocked others
 
     def _admit(self) -> None:
         """Grant waiting requests in order."""

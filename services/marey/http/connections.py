@@ -49,7 +49,7 @@ class PatientProtocol(H11Protocol):
         self.head_timer = None
         if self.transport.is_closing() or self.conn.their_state is not h11.IDLE:
             return
-        if self.conn.trailing_data[0]:  # who said nothing is told nothing: browsers connect ahead
+        if self.conn.trailing_data[0]:  # no answer without a request: browsers connect ahead
             self._say_late()
         self.transport.close()
 

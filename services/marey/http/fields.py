@@ -26,7 +26,7 @@ MAX_MODEL = 165
 """Characters: a name of 100, `@` and 64 hexadecimal digits."""
 PROMPT: JsonDict = {"minLength": 1, "maxLength": MAX_CHARACTERS}
 _HIDDEN = LINE_PATTERN.removeprefix("^[^").removesuffix("]*$")
-"""Characters that free text may not hold, as part of a class."""
+"""Forbidden characters of free text, as part of a character class."""
 _DEVICE = "".join(
     f"[{c.upper()}{c}]" if c.isalpha() else c for c in r"(con((in|out)\$)?|prn|aux|nul|(com|lpt)[0-9¹²³])"
 )
@@ -34,13 +34,13 @@ NAME_PATTERN = (
     rf"^(?! *{_DEVICE}( *\..*)? *$)(?!.*\.\.) *[^\x00-/:-@\[-`{{-\x7f{_HIDDEN}]"
     rf"([^/\\{_HIDDEN}]*[^/\\. {_HIDDEN}])? *$"
 )
-"""Of names of motions: it begins with a letter or digit, holds no separators and no `..`, ends with no dot, and is no
-device of Windows. As exact as a pattern can be that every language reads alike, which have no common word for the
-letters of all scripts: of ASCII it takes what the check takes."""
+"""Pattern of motion names: begins with a letter or digit, no separators and no `..`, no dot at the end, no device of
+Windows. As exact as a portable pattern can be: languages have no common class for the letters of all scripts, so it
+accepts for ASCII what the check accepts."""
 ITEM_NAME: JsonDict = {"minLength": 1, "maxLength": MAX_NAME, "pattern": NAME_PATTERN}
 ITEM_MODEL: JsonDict = {"maxLength": MAX_MODEL, "pattern": f"^{MODEL.pattern}$"}
 TAG_PATTERN = rf"^(?=.*[^ ]){LINE_PATTERN.removeprefix('^')}"
-"""Not of spaces alone."""
+"""Not blank."""
 TAGS: JsonDict = {"items": {"type": "string", "minLength": 1, "maxLength": MAX_TAG_LENGTH, "pattern": TAG_PATTERN}}
 _MORE = "|".join(sorted({STRAIGHT, *(side for sides in SIDED.values() for side in sides)}))
 _ACT = rf"({'|'.join(ACTS)})( ({_MORE})){{0,2}}"

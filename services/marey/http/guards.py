@@ -17,9 +17,9 @@ from marey.http.problems import problem_response
 class HostGuard:
     """Answers only requests for configured hosts: a web page that rebinds its name to this port gets no access.
 
-    A page of any origin may open a socket, unlike a request: browsers leave it to the server to check the page's
-    origin. Allowed are pages of this server's own hosts and of the origins that may read its answers. Clients that are
-    no browsers send no origin.
+    Unlike a request, a socket may be opened by a page of any origin: browsers leave it to the server to check the
+    origin. Allowed are pages of this server's own hosts and of the configured origins. Clients other than
+    browsers send no origin.
     """
 
     def __init__(self, app: ASGIApp, allowed: Sequence[str], origins: Sequence[str] = ()) -> None:

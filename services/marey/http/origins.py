@@ -23,14 +23,14 @@ ANSWER_HEADERS = ", ".join(
     )
 )
 MAX_AGE = 600
-"""Seconds for which a browser need not ask again."""
+"""Seconds for which a browser caches a pre-flight."""
 
 
 class OriginGuard:
     """Allows pages of the configured origins to read answers, and to send requests with an API key.
 
-    The origin is named, never `*`, and cookies play no part: `Access-Control-Allow-Credentials` is not sent. A
-    pre-flight is answered here, without a look at the route, its key or its body, always with the same lists.
+    The origin is named, never `*`, and cookies are not used: `Access-Control-Allow-Credentials` is not sent. A
+    pre-flight is answered here, independent of the route, its key or its body, always with the same lists.
     """
 
     def __init__(self, app: ASGIApp, origins: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ def page_response(request: Request, content: bytes, media_type: str, *, etag: st
     """Answer with a page or one of its files; 304 if the browser has it already.
 
     Args:
-        etag: of the content.
+        etag: ETag of the content.
         policy: the content security policy.
     """
     headers = {

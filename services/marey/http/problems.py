@@ -30,11 +30,11 @@ from marey.tenants import QuotaHeadroom
 TYPE_PREFIX = "urn:marey:problem:"
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER = "2"
-"""Seconds: a database or store that restarts is back in about that."""
+"""Seconds: typical restart of a database or store."""
 
 LONGEST_VALUE = 80
 OF_THE_REQUEST = ("body", "prompts")
-"""Places that a caller knows: they are part of the request."""
+"""Prefixes of locations that a caller knows: they are part of the request."""
 SUBJECT = re.compile(r"^\w+ should")
 
 log = structlog.get_logger(__name__)
@@ -81,14 +81,14 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
     code: {"description": "Problem", "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemBody"}}}}
     for code in ("4XX", "5XX")
 }
-"""What every route may answer besides its own."""
+"""Problem responses that every route may return."""
 
 
 def public_error(error: MareyError) -> MareyError:
     """Return the part of an error that clients may see.
 
-    Faults of the server's own side may name its hosts, files and settings, and reach callers without a key: these are
-    told what is down, never where or how. The log has the error itself.
+    Faults of the server may name its hosts, files and settings, and reach callers without a key: these learn what is
+    down, never where or how. The log has the error itself.
     """
     if error.status < 500:
         return error
@@ -163,7 +163,7 @@ def install(app: FastAPI) -> None:
 def _validation(error: RequestValidationError) -> JSONResponse:
     problems = [_field_problem(e) for e in error.errors()]
     names = ", ".join(dict.fromkeys(p.field or "body" for p in problems))
-    many = len(problems) > 1  # of one, `where` says the field
+    many = len(problems) > 1  # for a single one, `where` names the field
     body = ProblemBody(
         type=TYPE_PREFIX + InvalidInput.problem_type,
         title="Invalid input",
@@ -179,7 +179,7 @@ def _validation(error: RequestValidationError) -> JSONResponse:
 def _of_status(request: Request, error: HTTPException) -> JSONResponse:
     if error.status_code == NotFound.status:
         return problem_response(NotFound("there is nothing at this path", where=_clean(request.url.path)))
-    if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that is no UTF-8 or nested too deeply
+    if error.status_code == HTTPStatus.BAD_REQUEST:  # FastAPI's, for a body that is not UTF-8 or nested too deeply
         return problem_response(InvalidInput("the body cannot be read", where="body", hint="Send JSON in UTF-8."))
     phrase = HTTPStatus(error.status_code).phrase
     body = ProblemBody(

@@ -12,17 +12,17 @@ from marey.runtime.logs import configure_logging
 from marey.runtime.malloc import one_heap
 
 GRACE_SECONDS = 3
-"""For answers under way at SIGTERM; event streams and sockets end at once."""
+"""Seconds for open answers at SIGTERM; event streams and sockets end at once."""
 SWITCH_SECONDS = 0.001
-"""Longest turn of a thread while another waits for the interpreter (Python: 5 ms). The event loop answers between the
-turns of threads that read large bodies."""
+"""Switch interval of threads (Python's default: 5 ms). The event loop answers in between threads that read large
+bodies."""
 
 
 def prepare_process(name: str, config: Settings) -> dict[str, Any]:
     """Set up memory, signals, logs and traces of this process; return options of uvicorn."""
     one_heap()
     sys.setswitchinterval(SWITCH_SECONDS)
-    # When it has ended well, uvicorn raises the signal once more: that must not look like a process that was killed.
+    # After a graceful end, uvicorn raises the signal again: that must not look like a killed process.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     configure_logging(name, level=config.log_level, json=config.log_json)
     configure_tracing(name)

@@ -25,7 +25,7 @@ def check_query(asked: HTTPConnection) -> None:
     """Validate that the route knows every query parameter of the request. Sockets check their own.
 
     Raises:
-        InvalidInput: it does not know one.
+        InvalidInput: an unknown parameter.
     """
     route = asked.scope.get("route")
     if not asked.query_params or not isinstance(route, APIRoute):

@@ -41,7 +41,7 @@ class FreeText:
 
 
 Name = Annotated[str, Field(max_length=MAX_NAME), FreeText()]
-"""Of a job, evaluation, schedule or webhook."""
+"""Name of a job, evaluation, schedule or webhook."""
 Comment = Annotated[str, Field(max_length=MAX_COMMENT), FreeText(lines=True)]
 Reason = Annotated[str, Field(max_length=MAX_REASON), FreeText(lines=True)]
 

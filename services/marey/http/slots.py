@@ -31,8 +31,8 @@ class SlotLimits:
 class SlotCounter:
     """Counts open connections; on the event loop alone.
 
-    Besides its share a tenant may hold no more places than are free. So a tenant that has none always finds one: with
-    `n` tenants that take all they can, one in `n + 1` places stays free.
+    A tenant may hold no more slots than are free. So a tenant without any always finds one: with `n` greedy tenants,
+    one in `n + 1` slots stays free.
     """
 
     def __init__(self, what: str, shares: SlotLimits, gauge: Gauge | None = None) -> None:
@@ -51,7 +51,7 @@ class SlotCounter:
         """Hold one slot during the block.
 
         Raises:
-            Busy: the key or its tenant has its share, or no place is free.
+            Busy: the key or its tenant has reached its limit, or no slot is free.
         """
         self._check(key)
         self._count(key, 1)

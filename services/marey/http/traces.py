@@ -8,7 +8,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from marey.core import tracing
 
 UNTRACED = frozenset({"/livez", "/readyz", "/metrics"})
-"""Asked every few seconds by machines."""
+"""Paths that machines poll every few seconds."""
 
 
 class Trace:

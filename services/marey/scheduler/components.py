@@ -1,8 +1,8 @@
 """The scheduler's threads, and detection of stalled ones.
 
-A part makes progress with each statement that its thread gets an answer to, and with each end of a round. Rounds may
-take hours (retention, garbage); one statement or one object may not. A part without progress for `STALL_SECONDS` hangs
-in something that no deadline ends: the process then exits, and its supervisor starts another.
+A component makes progress with each answered statement of its thread, and with each end of a round. Rounds may take
+hours (retention, garbage); one statement or one object may not. A component without progress for `STALL_SECONDS`
+hangs without a deadline: the process then exits, and its supervisor restarts it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from marey.runtime.logs import logger
 log = logger(__name__)
 
 STALL_SECONDS = 180.0
-"""Three times the longest that a statement may take at the database, and far beyond the deadlines of calls."""
+"""Three times the limit of a statement at the database, and far beyond the deadlines of calls."""
 LOOK_SECONDS = 5.0
 LOOKS = 3
-"""Looks that must agree: after SIGSTOP or a suspended machine the first finds every part silent."""
+"""Consecutive checks that must agree: after SIGSTOP or a suspended machine the first finds every component silent."""
 EXIT_STALLED = 70  # EX_SOFTWARE
 
 
@@ -32,9 +32,9 @@ class SchedulerComponent(threading.Thread):
     """A thread of the scheduler.
 
     Args:
-        name: as metrics and logs call it.
+        name: name in metrics and logs.
         pause: seconds between two rounds.
-        allowance: seconds that a round may wait on purpose, beside `STALL_SECONDS`.
+        allowance: seconds that a round may wait intentionally, in addition to `STALL_SECONDS`.
     """
 
     def __init__(self, name: str, *, pause: float, allowance: float = 0.0) -> None:

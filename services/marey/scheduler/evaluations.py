@@ -89,7 +89,7 @@ class Evaluations:
         """planned → generating; or failed, when its inputs no longer exist, or exceed the tenant's quota for good.
         Waits for free quota."""
         try:
-            with conn.begin_nested():  # a submit that is refused half way leaves nothing
+            with conn.begin_nested():  # a refused submit must leave nothing
                 prompts = None if row.prompts is None else load_prompts(conn, row.tenant, row.prompts)
                 plan = plan_evaluation(row.request, prompts, self._config)
                 sha256 = row.prompts or store_prompts(conn, row.tenant, plan.prompts)

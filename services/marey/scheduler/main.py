@@ -43,8 +43,8 @@ log = logger(__name__)
 NOBODY = Problem(
     "unreachable", "no worker showed this stream for 15 minutes", hint="See that a worker of its model runs."
 )
-STALE_ASSETS_SECONDS = 600.0  # assets half written by a dead worker wait an hour anyway
-ABANDONED_SECONDS = 900.0  # a stream waits this long for a worker, or for its worker's successor
+STALE_ASSETS_SECONDS = 600.0  # assets of a dead worker wait an hour anyway
+ABANDONED_SECONDS = 900.0  # seconds that a stream waits for a worker, or for its worker's successor
 ABANDONED_EVERY = 30.0
 BEAT_SECONDS = 5.0
 STOP_SECONDS = 10.0
@@ -53,10 +53,10 @@ STOP_SECONDS = 10.0
 def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None) -> int:
     """Run until SIGTERM or SIGINT, or until `stopping` is set (then no signal handler is installed).
 
-    Neither database, queue nor store has to be there at the start: every part waits for what it needs.
+    Database, queue and store may be down at the start: every component waits for its dependencies.
 
     Raises:
-        InvalidInput: a setting is missing, one of webhooks makes no sense, or the database passes no notifications on.
+        InvalidInput: a setting is missing or invalid, or the database does not forward notifications.
     """
     if chosen.database_url is None or chosen.queue_url is None:
         raise InvalidInput(
@@ -82,7 +82,7 @@ def scheduler_main(chosen: Settings, *, stopping: threading.Event | None = None)
     parts: list[SchedulerComponent] = [relay, *periodic, *_webhooks(engine, chosen, stopping)]
     beats = create_engine(database_url, pool_size=1)
     name = f"scheduler-{socket.gethostname()}-{os.getpid()}"
-    presence = Periodic("presence", Presence(beats, name, parts).tell, seconds=BEAT_SECONDS, stopping=stopping)
+    presence = Periodic("presence", Presence(beats, name, parts).renew, seconds=BEAT_SECONDS, stopping=stopping)
     parts.append(presence)
     note_progress(engine)
     note_progress(beats)
@@ -117,7 +117,7 @@ class Presence:
         self._name = name
         self._parts = parts
 
-    def tell(self) -> None:
+    def renew(self) -> None:
         """Renew the row, unless a component has made no progress for half of the allowed time.
 
         Raises:
@@ -134,7 +134,7 @@ def _retire(engine: sa.Engine, name: str) -> None:
         with transaction(engine) as conn:
             retire(conn, name)
     except Unreachable as error:
-        log.warning("not_retired", error=error.message)  # the row says by its age that nobody is there
+        log.warning("not_retired", error=error.message)  # the age of the row shows that this scheduler is gone
 
 
 def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Deliverer]:
@@ -149,7 +149,7 @@ def _webhooks(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
 
 
 def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) -> list[Periodic]:
-    assert chosen.queue_url is not None  # the caller looked
+    assert chosen.queue_url is not None  # validated by the caller
     queue_url = chosen.queue_url.get_secret_value()
     store = open_store(chosen)
     evaluations = Evaluations(engine, chosen)
@@ -188,7 +188,7 @@ def _periodic(engine: sa.Engine, chosen: Settings, stopping: threading.Event) ->
             log.info("retained", jobs_deleted=deleted, files_rewritten=rewritten)
 
     return [
-        # A lease that ran out while the database was away is not its worker's fault: let heartbeats come first.
+        # A lease that expired during an outage of the database is not its worker's fault: let heartbeats come first.
         Periodic(
             "sweeper",
             sweep_once,

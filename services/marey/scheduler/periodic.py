@@ -17,8 +17,8 @@ class Periodic(SchedulerComponent):
     """Calls `action` every `seconds` until `stopping`.
 
     After an outage, `probe` is called until it does not raise `Unreachable`, then `meanwhile` once; then `grace`
-    seconds pass before the next call, for others must first find the database again. `outages` counts those that a
-    retry has hidden: with a `grace`, each round probes first, and one more than before is an outage like any other.
+    seconds pass before the next call, since other processes must reconnect first. `outages` counts outages that a
+    retry has hidden: with a `grace`, each round probes first, and a higher count is handled like any outage.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Periodic(SchedulerComponent):
         """Run one round.
 
         Raises:
-            Unreachable: what the action needs is away.
+            Unreachable: a dependency of the action is down.
         """
         if self.away or self._grace > 0:
             self._probe()

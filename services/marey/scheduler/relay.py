@@ -1,8 +1,8 @@
 """The relay: notifies workers, by hints in Redis, of waiting rows in Postgres. Level-triggered and stateless.
 
-Every half second, and at once on NOTIFY, each queue's list is topped up to min(waiting batches, live workers). A lost
-list (FLUSHALL), a lost hint or a second relay need no special path: the next round looks at the rows again, and a hint
-too many finds nothing to claim.
+Every half second, and at once on NOTIFY, each queue's list is topped up to min(waiting batches, live workers). A
+lost list (FLUSHALL), a lost hint or a second relay need no special handling: the next round reads the rows again,
+and a surplus hint finds nothing to claim.
 """
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
 
@@ -29,11 +29,11 @@ log = logger(__name__)
 
 BATCH_SIZES: Mapping[str, int] = {TEXT_QUEUE: 64, EVALUATOR_QUEUE: 1}
 DEFAULT_BATCH_SIZE = 32
-"""Items of one claim, for counting the batches that wait; a wrong guess costs a hint, never an item."""
+"""Items per claim, for counting waiting batches; a wrong value costs a hint, never an item."""
 
 REFUSED_SECONDS = 30.0
-LEAST_PAUSE = 0.05  # seconds between two rounds: a submit in many transactions notifies as often
-TICK_SECONDS = 30.0  # an idle worker gets a hint this often: its claim shows that hints still reach it
+LEAST_PAUSE = 0.05  # minimum seconds between two rounds: a submit in many transactions notifies as often
+TICK_SECONDS = 30.0  # seconds between hints to idle workers: their claims show that hints still arrive
 
 
 class Relay(SchedulerComponent):
@@ -60,7 +60,7 @@ class Relay(SchedulerComponent):
 
     def run(self) -> None:
         while not self._stopping.is_set():
-            self.progressed()  # also while the database is away: waiting for it is no standstill
+            self.progressed()  # also while the database is down: waiting for it is not a stall
             try:
                 with Listener(self._listen_url, (QUEUE_CHANNEL,)) as listener:
                     while not self._stopping.is_set():
@@ -74,7 +74,7 @@ class Relay(SchedulerComponent):
             except Unreachable as error:
                 metrics.ROUNDS.labels(self.name, "waiting").inc()
                 log.warning("relay_waits", error=error.message)
-            except InvalidInput as error:  # a pooler was put in between since the start
+            except InvalidInput as error:  # a pooler was added since the start
                 metrics.ROUNDS.labels(self.name, "failed").inc()
                 log.error("relay_refused", error=str(error))
                 self._stopping.wait(REFUSED_SECONDS)
@@ -119,7 +119,7 @@ class Relay(SchedulerComponent):
 def publisher(app: Celery) -> Callable[[str], None]:
     """Return a function that sends one hint to a queue, by name: the scheduler imports no worker.
 
-    Raises (from what it gives): `Unreachable`, after a bounded number of tries.
+    Raises (from the returned function): `Unreachable`, after a bounded number of retries.
     """
 
     def publish(queue: str) -> None:

@@ -21,10 +21,10 @@ from marey.webhooks.addresses import choose_address
 
 CONNECT_SECONDS = 5.0
 ATTEMPT_SECONDS = 15.0
-"""For the whole of a try: name, connection, request, answer."""
+"""Seconds of a whole attempt: name resolution, connection, request, answer."""
 DRAIN_SECONDS = 2.0
 MAX_ANSWER = 16 * 2**10
-"""Bytes of an answer that are read, and thrown away: only its status tells."""
+"""Bytes of an answer that are read and discarded: only its status matters."""
 
 
 class Sender:
@@ -62,12 +62,12 @@ class Sender:
         """Return the status of the answer, and the delay in seconds that it asks for."""
         client = httpx2.AsyncClient(
             verify=self._tls,
-            trust_env=False,  # a proxy would look the name up once more
+            trust_env=False,  # a proxy would resolve the name again
             follow_redirects=False,
             timeout=httpx2.Timeout(self._seconds, connect=CONNECT_SECONDS),
         )
         async with client:
-            async with asyncio.timeout(self._seconds):  # the client's own limits are for each read
+            async with asyncio.timeout(self._seconds):  # the client's own limits apply to each read
                 response = await self._ask(client, url, headers, body)
             async with contextlib.aclosing(response):
                 await _drain(response)
@@ -120,7 +120,7 @@ async def _drain(response: httpx2.Response) -> None:
                 if read > MAX_ANSWER:
                     return
     except (TimeoutError, httpx2.HTTPError):
-        return  # its status is here already
+        return  # the status is known already
 
 
 def _refusal(status: int) -> str:

@@ -33,13 +33,13 @@ from marey.webhooks.vault import Vault
 log = logger(__name__)
 
 SLOTS = 64
-"""Tries at the same time; they wait for others, and compute nothing."""
+"""Concurrent attempts; they wait for receivers, and compute nothing."""
 EACH = 4
-"""Tries of one webhook at the same time."""
+"""Concurrent attempts of one webhook."""
 LOOKUPS = 16
-"""Names looked up at the same time."""
+"""Concurrent name look-ups."""
 STOP_SECONDS = 5.0
-"""For tries under way at the end; then they are given back."""
+"""Seconds for open attempts at shutdown; then they are released."""
 
 OUTCOMES: dict[DeliveryState | None, str] = {
     DeliveryState.DELIVERED: "delivered",
@@ -47,7 +47,7 @@ OUTCOMES: dict[DeliveryState | None, str] = {
     DeliveryState.FAILED: "failed",
     None: "lost",
 }
-"""What metrics call the state after a try; None = somebody else wrote down how it went."""
+"""Metric label of the state after an attempt; None = another process recorded the result."""
 
 Given = TypeVar("Given")
 
@@ -72,7 +72,7 @@ class Deliverer(SchedulerComponent):
         self._api = api
         self._interval = interval
         self._stopping = stopping
-        self._database = ThreadPoolExecutor(2, "webhooks-database")  # apart from look-ups, which may hang
+        self._database = ThreadPoolExecutor(2, "webhooks-database")  # separate from look-ups, which may hang
         self._under_way: dict[asyncio.Task[None], DueDelivery] = {}
         self._away = False
 
@@ -120,7 +120,7 @@ class Deliverer(SchedulerComponent):
             try:
                 await self._blocking(lambda: self._give_back(list(left.values())))
             except Unreachable as error:
-                log.warning("webhooks_not_given_back", error=error.message)  # their claims run out
+                log.warning("webhooks_not_given_back", error=error.message)  # their claims expire
 
     def _forget_ended(self) -> None:
         for task in [task for task in self._under_way if task.done()]:
@@ -131,7 +131,7 @@ class Deliverer(SchedulerComponent):
         try:
             state = await self._blocking(lambda: self._record(due, attempt))
         except Unreachable as error:
-            log.warning("webhook_not_recorded", event_id=str(due.event), error=error.message)  # told again, later
+            log.warning("webhook_not_recorded", event_id=str(due.event), error=error.message)  # delivered again, later
         except Exception:
             log.exception("webhook_not_recorded", event_id=str(due.event))
         else:
@@ -145,7 +145,7 @@ class Deliverer(SchedulerComponent):
         except InvalidInput as error:
             return Attempt(None, 0.0, str(error).splitlines()[0])
         except Exception:
-            # It counts as a try: one that trips us up must not be tried every minute for ever.
+            # It counts as an attempt: a message that causes an error here must not be retried every minute for ever.
             log.exception("webhook_failed", event_id=str(due.event))
             return Attempt(None, 0.0, "an internal error; the scheduler's log has its traceback")
 

@@ -29,7 +29,7 @@ class TextHandler:
         """Load the text pipeline of `bundle`; bundles of one specification share it.
 
         Raises:
-            NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or not the one it names.
+            NotFound, InvalidBundle: the bundle, its encoder or its labeller is missing or does not match.
         """
         spec = find_bundle(bundle, verify=False).manifest.text
         if spec is None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from marey.core.errors import Busy
 
 MAX_WORDS = 4000
-"""Words in flight in one process: four seconds of one core. A request that is alone may have more."""
+"""Words in flight in one process: four seconds of one core. A single request may have more."""
 RETRY_SECONDS = 2
 
 
@@ -47,9 +47,9 @@ class WordLimit:
         """Count the words of a request.
 
         Raises:
-            Busy: they are too many beside those in flight.
+            Busy: with those in flight, they are too many.
         """
-        words = sum(max(1, len(prompt.split())) for prompt in prompts)  # any white space is between words
+        words = sum(max(1, len(prompt.split())) for prompt in prompts)  # split at any white space
         with self._lock:
             if self._words and self._words + words > self._limit:
                 raise Busy(

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from marey.text.pipeline import TextPipeline
 
 MAX_PROMPTS = 64
-"""Of one request: a second of work; more belong into a job."""
+"""Prompts of one request: a second of work; more belong in a job."""
 THREADS = 4
-"""Requests parsed at once: torch serves one after the other, but a request may wait for a rewriter."""
+"""Concurrent requests: torch serves one after the other, but a request may wait for a rewriter."""
 MAX_LOADED = 4
-"""Pipelines kept: bundles of one text specification share one."""
+"""Cached pipelines: bundles of one text specification share one."""
 _loading = threading.Lock()
 _loaded: dict[str, TextPipeline] = {}
 
@@ -70,11 +70,11 @@ class GraphView(BaseModel):
     """The semantic graph of a prompt."""
 
     prompt: str
-    """The prompt as it was checked and stored."""
+    """The validated and stored prompt."""
     text: str
-    """The text that the model reads: the prompt, or the prompt rewritten."""
+    """The text that the model reads: the prompt, or its rewrite."""
     rewrite_reason: str | None
-    """Why `text` differs from `prompt`, or why a rewrite was not used."""
+    """Reason why `text` differs from `prompt`, or why a rewrite was not used."""
     warnings: list[str]
     """Notes for the author: no action found, or parts over the model's limits."""
     words: list[str]
@@ -100,10 +100,10 @@ def text_router(config: Settings) -> APIRouter:
     """Return the route of the text service.
 
     Args:
-        config: its `text_key` is the secret that a request must show.
+        config: its `text_key` is the secret that a request must have.
 
     Raises:
-        InvalidInput: there is no such secret.
+        InvalidInput: the secret is not configured.
     """
     if config.text_key is None:
         raise InvalidInput(
@@ -164,7 +164,7 @@ def pipeline_of(model: str) -> TextPipeline:
     """Return the text pipeline of a model or bundle.
 
     Raises:
-        InvalidInput: it reads none.
+        InvalidInput: it does not read prompts.
         NotFound, InvalidBundle: as `choose_bundle` and `TextPipeline.load`.
     """
     with named_by("model"):

@@ -1,6 +1,6 @@
 """`marey text serve`: the process that parses prompts for the API.
 
-It needs no database: whoever may call it shows the secret that it shares with the API (`MAREY_TEXT_KEY`).
+It needs no database: callers authenticate with the secret that it shares with the API (`MAREY_TEXT_KEY`).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def create_text_app(config: Settings, *, preload: bool = True) -> FastAPI:
     """Create the application of the text service.
 
     Args:
-        preload: load what the bundles here need as soon as it starts; `/readyz` answers 503 until then.
+        preload: load the pipelines of all bundles at start-up; `/readyz` answers 503 until then.
 
     Raises:
         InvalidInput: `MAREY_TEXT_KEY` is not set.
@@ -74,7 +74,8 @@ def serve_text(path: Path | None = None) -> None:
     """Serve until SIGTERM.
 
     Args:
-        path: of the Unix socket to listen on, readable by this user alone; None = `MAREY_HOST` and `MAREY_PORT`.
+        path: path of the Unix socket to listen on, readable by this user alone; None = `MAREY_HOST` and
+            `MAREY_PORT`.
     """
     config = settings()
     app = create_text_app(config)

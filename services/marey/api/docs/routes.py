@@ -26,7 +26,7 @@ POLICY = "; ".join(
         "frame-ancestors 'none'",
     )
 )
-"""Content security policy: files of this server alone, no inline code or style."""
+"""Content security policy: files of this server only, no inline code or style."""
 TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 FILES = ("swagger-ui.css", "swagger-ui-bundle.js", "docs.css", "docs.js")
 

@@ -60,7 +60,7 @@ def compare_runs(shared: Context, tenant: str, before: UUID, after: UUID) -> Com
 
     Raises:
         NotFound: there is no such evaluation, or the report of one is gone.
-        InvalidInput: one is not done, or they are of other prompts or evaluators.
+        InvalidInput: one is not done, or prompts or evaluators differ.
         InvalidFile: a report cannot be read.
         Unreachable: the store does not answer.
     """

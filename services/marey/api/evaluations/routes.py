@@ -108,4 +108,4 @@ def get_comparison(
 
 
 SCHEMAS = (NewEvaluationBody,)
-"""Bodies that are read by hand, for the OpenAPI document."""
+"""Bodies that routes parse themselves, for the OpenAPI document."""

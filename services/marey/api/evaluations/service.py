@@ -21,7 +21,7 @@ from marey.items.evaluation_prompts import MAX_PROMPTS, EvaluationPrompt, read_p
 from marey.items.item import CHECKS, InvalidItems, Problem
 
 OWN_PROMPTS = "prompts"
-"""What prompts are called that came without a name."""
+"""Default name of custom prompts."""
 HINT = 'Write {"bundle": "hgm3", "split": "test"}, or "prompts": [{"prompt": "…"}] in place of the split.'
 
 
@@ -37,11 +37,11 @@ class Asked:
         """Return the plan that would run now.
 
         Raises:
-            InvalidItems, InvalidInput, InvalidBundle, Refused: it cannot.
+            InvalidItems, InvalidInput, InvalidBundle, Refused: it cannot run.
         """
         try:
             return plan_evaluation(self.request, self.prompts, config)
-        except NotFound as error:  # what is not found is not at this path
+        except NotFound as error:  # the problem is a field's, not the path's
             raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
 
 
@@ -54,13 +54,13 @@ def read_asked(model: type[Fields], values: Mapping[str, Any], document: Documen
     """Parse the fields of a body, which include those of an evaluation, and its prompts.
 
     Args:
-        values: what stands beside the prompts in `document`; and at their place, if that is no list.
+        values: fields beside the prompts in `document`; and the value in their place, if that is not a list.
 
     Raises:
         InvalidItems: with the problems of all fields, or of all prompts.
         InvalidInput: neither a split nor prompts, or both.
     """
-    if document.is_cut:  # its other fields may stand behind
+    if document.is_cut:  # other fields may follow the list
         read_prompts(document.elements(), where="prompts")
     others = dict(values)
     other = others.pop("prompts", None)
@@ -96,7 +96,7 @@ def create(
             body_sha256=request_sha256("evaluations", body) if idempotency_key else None,
         )
         made = evaluations.create_evaluation(conn, new)
-        assert made is not None  # only one of a schedule can be there already
+        assert made is not None  # only one of a schedule can exist already
         replayed = made != new.id
         if not replayed:
             note(conn, key, "evaluation.begin", made, bundle=plan.request.bundle)
@@ -107,7 +107,7 @@ def stored(conn: sa.Connection, tenant: str, plan: Plan) -> str:
     """Store the prompts of a plan and return their digest. Validates the baseline, too.
 
     Raises:
-        InvalidInput: it cannot be compared with that baseline.
+        InvalidInput: the baseline is not comparable.
     """
     sha256 = evaluations.store_prompts(conn, tenant, plan.prompts)
     evaluations.check_baseline(conn, tenant, plan.request, sha256)

@@ -22,7 +22,7 @@ def readiness_checks(config: Settings, engine: sa.Engine, store: AssetStore) -> 
         "queue": Check(lambda: _check_queue(config), "the queue does not answer, or is too old"),
         "store": Check(store.check, "the asset store does not answer"),
         "model": Check(ModelCheck(engine), "no worker has its model loaded yet"),
-        # Submits and reads work without it, so a load balancer must not take this API away.
+        # Submits and reads work without a scheduler, so a load balancer must not remove this API.
         "scheduler": Check(lambda: _check_scheduler(engine), "the scheduler stalls or was killed", required=False),
     }
 

@@ -25,7 +25,7 @@ from marey.jobs import (
 )
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-"""Any other is counted as `other`: a client may make up as many as it likes."""
+"""Other methods are counted as `other`: a client may invent any number of them."""
 _rendering = threading.Lock()
 
 
@@ -39,7 +39,7 @@ def render(engine: sa.Engine) -> bytes:
         depths, workers = queue_depths(conn), live_workers(conn)
         streams, outbox = open_stream_counts(conn), outbox_state(conn)
         schedulers = {row.host: row.silence for row in reversed(list_schedulers(conn))}
-    with _rendering:  # two scrapes at once would clear each other's gauges
+    with _rendering:  # two concurrent scrapes would clear each other's gauges
         _show_queues(bounded(depths))
         _show(metrics.WORKERS, workers)
         _show(metrics.SCHEDULERS, schedulers)

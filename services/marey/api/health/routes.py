@@ -39,8 +39,8 @@ async def readyz(shared: Shared) -> JSONResponse:
     """Check that database, queue and store answered within seconds, and that a worker has loaded its model. A stalled
     scheduler is reported too, and leaves the API ready.
 
-    The checks run in the background, so the answer comes at once whatever is down. It says what is down, to everybody;
-    the server's log says why.
+    The checks run in the background, so the answer is immediate. It names what is down, without authentication; the
+    server's log has the reason.
     """
     results = shared.readiness.results()
     checks = {name: Check(ok=result.ok, message=result.message) for name, result in results.items()}

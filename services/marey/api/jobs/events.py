@@ -39,8 +39,8 @@ def last_event_id(header: str | None, after: int) -> int:
 class EventStream(EventSourceResponse):
     """A stream that occupies one slot of its key while it is sent, however it ends.
 
-    The place is taken when the answer begins, so that a request that is dropped before never holds one; where there is
-    none, the answer is a problem.
+    The slot is taken when the answer begins, so that a request dropped earlier never occupies one; without a free
+    slot, the answer is a problem.
     """
 
     def __init__(self, places: SlotCounter, key: ApiKey, content: AsyncIterator[bytes]) -> None:

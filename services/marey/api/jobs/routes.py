@@ -79,7 +79,7 @@ async def submit_job(
 ) -> Response:
     """Submit prompts: a JSON object with `items`, or NDJSON with one item a line (at most 100,000, 64 MiB).
 
-    For NDJSON, what concerns the job as a whole stands in the query. All problems of all lines are told at once, and
+    For NDJSON, fields of the job as a whole are in the query. All problems of all lines are reported at once, and
     then nothing is written.
     """
     kind = request.headers.get("content-type", JSON).partition(";")[0].strip().lower()
@@ -188,7 +188,7 @@ def get_place(job: UUID, conn: Connection, key: Reader) -> QueueView:
 def patch_job(job: UUID, patch: JobPatch, conn: Connection, key: Operator, reason: Reason = None) -> JobView:
     """Change the priority, the comment or the failure ratio that ends the job early.
 
-    Where more than that share has failed already, the rest is cancelled at once.
+    If more than that share has failed already, open items are cancelled at once.
     """
     row = jobs.get_job(conn, key.tenant, job)
     why = reason or f"set by {key.name}"
@@ -259,8 +259,8 @@ def retry_job(
 def erase_job(job: UUID, conn: Connection, key: Operator) -> ErasureView:
     """Erase the prompts of a job that has ended; motions, names and tags stay.
 
-    What the database holds of them goes at once. Files that hold them are given to nobody any more, and written anew
-    within minutes: `files_left` says how many are still to be. There is no way back.
+    Prompts in the database are erased at once. Files that hold them are no longer served, and rewritten within
+    minutes: `files_left` counts the remaining ones. This cannot be undone.
     """
     erased = takes.erase(conn, key.tenant, job, by=key.name)
     note(conn, key, "job.erase", job)
@@ -313,8 +313,8 @@ def list_events(
 ) -> Response:
     """List events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
 
-    A stream sends at most two progress messages a second, and ends when the job has, or within seconds of the key's
-    end; then a new request says why.
+    A stream sends at most two progress messages a second. It ends with the job, or within seconds after the key
+    becomes invalid; a new request then reports the reason.
     """
     row = jobs.get_job(conn, key.tenant, job)
     if SSE not in request.headers.get("accept", ""):
@@ -329,4 +329,4 @@ def list_events(
 
 
 SCHEMAS = (NewJobBody, NewItemBody)
-"""Bodies that are read by hand, for the OpenAPI document."""
+"""Bodies that routes parse themselves, for the OpenAPI document."""

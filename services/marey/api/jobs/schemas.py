@@ -79,7 +79,7 @@ class CheckedView(View):
 
     valid: bool
     items: int
-    """Motions that would be made."""
+    """Number of motions."""
     bundles: list[str]
     estimate: EstimateView
     quotas: list[QuotaBody] = Field(description="Those the tenant has, of queued items and of bytes; with room for it.")

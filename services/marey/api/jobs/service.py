@@ -20,11 +20,11 @@ from marey.jobs.generators import GeneratorCapabilities, new_items
 
 Fields = TypeVar("Fields", bound=BaseModel)
 MAX_MODELS = 100
-"""Names of models in one body: each is looked for on the disk."""
+"""Maximum distinct models in one body: each is looked up on disk."""
 MAX_LINES = 1_000_000
-"""Of NDJSON, blank ones too."""
+"""Maximum lines of NDJSON, including blank ones."""
 Raws = Callable[[], Iterator[tuple[int, object]]]
-"""What a body holds, with its lines, from its beginning at each call."""
+"""Function that yields the items of a body with their lines, from its beginning at each call."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ class Submission:
 
     fields: JobFields
     count: int
-    """Motions to make."""
+    """Number of motions."""
     by_bundle: Counter[tuple[str, str]]
-    """Motions by model and exact bundle."""
+    """Number of motions by model and exact bundle."""
     _raws: Raws
     _offers: Mapping[str | None, GeneratorCapabilities]
-    """The exact bundle by what the item says of its model."""
+    """Generator capabilities by the item's model name."""
 
     @property
     def bundles(self) -> list[str]:
@@ -56,7 +56,7 @@ def read_ndjson(body: BinaryIO, fields: JobFields, catalogue: Catalogue) -> Subm
 
     Raises:
         InvalidItems: with the problems of all lines.
-        InvalidInput: there are none.
+        InvalidInput: there are no items.
         TooLarge: more than 100,000 items, or a line of more than `MAX_VALUE` bytes.
     """
     return _checked(fields, lambda: _lines(body), catalogue)
@@ -81,7 +81,7 @@ def read_document(body: BinaryIO, catalogue: Catalogue) -> Submission:
 
     Raises:
         InvalidItems: with the problems of all items.
-        InvalidInput: the object itself is wrong.
+        InvalidInput: the object itself is invalid.
         TooLarge: more than 100,000 items, or one of more than `MAX_VALUE` characters.
     """
     hint = 'Write {"items": [{"prompt": "…"}]}.'
@@ -96,7 +96,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
     by_bundle: Counter[tuple[str, str]] = Counter()
     offers: dict[str | None, GeneratorCapabilities] = {}
     failed: dict[str | None, MareyError] = {}
-    """Models of a body by name; a missing one is looked up once, however many lines name it."""
+    """Models of a body by name; a missing one is looked up once, for any number of lines."""
     default_model: set[Problem] = set()
     line = 0
 
@@ -119,7 +119,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
             except MareyError as error:
                 failed[model] = error
         if (error := failed.get(model)) is not None:
-            problem = _problem(error, None if model is None else line, "model")  # the default stands in no line
+            problem = _problem(error, None if model is None else line, "model")  # the default model is named by no line
             if problem not in default_model:
                 yield problem
             if model is None:

@@ -28,12 +28,12 @@ def examples(catalogue: Catalogue) -> tuple[str, ...]:
     """Return prompts that this server's model performed correctly while streaming; none for a bundle without
     measurements.
 
-    `python -m marey.models.mogo.examples` measures them.
+    Measured by `python -m marey.models.mogo.examples`.
     """
     try:
         reference = catalogue.offer(catalogue.live_model).bundle.reference
     except MareyError:
-        return ()  # no such model here: the page says so when a stream is begun
+        return ()  # no such model here: the page reports it when a stream is started
     return tuple(row["prompt"] for row in _measured().get(reference, [])[:MOST_EXAMPLES])
 
 

@@ -40,7 +40,7 @@ class ModelView(View):
     version: str
     config: str
     random: bool
-    """Weights were never trained."""
+    """True for random weights that were never trained."""
     licence: str
     commercial: bool
     skeleton: str | None
@@ -86,7 +86,7 @@ class BrokenView(View):
     """A bundle that exists and cannot be used."""
 
     name: str
-    """Of its folder."""
+    """Name of its folder."""
     reason: str
 
     @classmethod

@@ -78,4 +78,4 @@ def list_runs(
 
 
 SCHEMAS = (NewScheduleBody, SchedulePatch)
-"""Bodies that are read by hand, for the OpenAPI document."""
+"""Bodies that routes parse themselves, for the OpenAPI document."""

@@ -21,7 +21,7 @@ def create(shared: Context, key: tenants.ApiKey, body: BinaryIO) -> ScheduleView
     """Create a schedule.
 
     Raises:
-        InvalidItems, InvalidInput, InvalidBundle, Refused: of its times, or as for an evaluation that could not run.
+        InvalidItems, InvalidInput, InvalidBundle, Refused: invalid times, or an evaluation that cannot run.
     """
     document = prompts_document(body, hint=HINT)
     fields, asked = read_asked(NewScheduleBody, document.fields(), document)

@@ -23,7 +23,7 @@ from marey.streams import get_stream, prompts_with_rewrites
 
 PROTOCOL = "marey.stream.v1"
 KEY_PREFIX = "marey.key."
-"""Of the subprotocol that carries a key: a browser can send no header with a socket."""
+"""Prefix of the subprotocol that carries a key: a browser cannot send headers with a socket."""
 MAX_FRAME = 2**32
 Slow = Literal["skip", "pause"]
 SLOW: tuple[str, ...] = get_args(Slow)
@@ -35,7 +35,7 @@ log = structlog.get_logger(__name__)
 async def accept_connection(websocket: WebSocket, stream: str, shared: Context) -> None:
     """Serve a stream to a client until it ends or the client disconnects; refusals are reported by close code.
 
-    The handshake is always answered: a browser does not show what stands in one that is refused.
+    The handshake always succeeds: a browser does not reveal the body of a refused one.
     """
     offered: list[str] = websocket.scope["subprotocols"]
     writer = SocketWriter(websocket)
@@ -66,14 +66,14 @@ def _authorize(shared: Context, secret: str | None, stream: str, query: QueryPar
     """Return the validated request of a client.
 
     Raises:
-        Unauthenticated, Refused, InvalidInput, NotFound: by what is wrong.
+        Unauthenticated, Refused, InvalidInput, NotFound: by the cause.
     """
     key = authenticated(shared, secret)
     authorize(shared, key, "read")
     _check_names(query)
     first, slow = first_frame(query.get("from")), _slow(query.get("slow"))
     if slow == "pause":
-        check_scope(key, "submit")  # it is a message like those a client sends
+        check_scope(key, "submit")  # a pause is a control message, which needs the scope
     try:
         identifier = UUID(stream)
     except ValueError:
@@ -97,7 +97,7 @@ def first_frame(given: str | None) -> int:
     """Parse the number of the first requested frame.
 
     Raises:
-        InvalidInput: it is none.
+        InvalidInput: not a frame number.
     """
     if given is None:
         return 0

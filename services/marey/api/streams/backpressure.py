@@ -10,7 +10,7 @@ from marey.streams.control import Control, ControlQueue
 BEHIND_FRAMES = 40
 """Two seconds."""
 BLOCKED_SECONDS = 0.05
-"""One frame's time: a send that takes longer waits for the client, not for us."""
+"""Duration of one frame: a send that takes longer waits for the client."""
 
 
 class LagTracker:
@@ -23,7 +23,7 @@ class LagTracker:
         """Return True if the client is two seconds further behind than it was at best.
 
         Args:
-            behind: frames that are there and that it has not.
+            behind: number of available frames that the client lacks.
         """
         self._best = min(self._best, behind)
         return behind > self._best + BEHIND_FRAMES

@@ -17,9 +17,9 @@ from marey.streams.control import Control
 from marey.tenants import ApiKey
 
 MAX_BYTES = 8 * 1024
-"""Of a message; a prompt has at most 2,000 characters."""
+"""Maximum size of a message; a prompt has at most 2,000 characters."""
 A_SECOND = 20
-"""Messages."""
+"""Maximum messages a second."""
 
 
 class Rate:
@@ -61,7 +61,7 @@ class Messages:
         """Parse and validate a message.
 
         Raises:
-            Refused, Busy, TooLarge, InvalidInput: by what is wrong with it.
+            Refused, Busy, TooLarge, InvalidInput: by the cause.
         """
         if not self._rate.allows(time.monotonic()):
             raise Busy(f"more than {A_SECOND} messages a second", hint="Send it again, later.", seconds=1)

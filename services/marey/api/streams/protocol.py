@@ -10,28 +10,28 @@ from typing import Any
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 BUFFER_BYTES = 4096
-"""Twenty frames of 22 joints, a second."""
+"""Bytes of twenty frames of 22 joints, one second."""
 MAX_MESSAGE = 64 * 2**10
-"""Bytes. A message that is too long for its route is answered; one longer than this is not even read."""
+"""Bytes. A message over its route's limit is answered; a message over this one is not even read."""
 PING_SECONDS, PONG_SECONDS = 20.0, 20.0
-"""Between an answer and the next ping, and for the answer."""
+"""Seconds between an answer and the next ping, and for the answer."""
 FLUSH_SECONDS = 5.0
-"""For what is still on its way when a socket is closed."""
+"""Seconds for pending data when a socket is closed."""
 
 
 class StreamProtocol(WebSocketsSansIOProtocol):
     """uvicorn's WebSockets with buffers that hold no more than two seconds of frames.
 
-    Its own, and those of the kernel, hold minutes of them: sends would go on long after the client stopped to take
-    what is sent, and what it then gets first is as old.
+    The default buffers, and those of the kernel, hold minutes of frames: sends would succeed long after the client
+    stopped reading, and the client would then receive old frames.
 
-    A socket that is closed is gone soon, too. asyncio closes a connection when all is sent, which a client that takes
-    nothing puts off for ever: it would keep its place here, and the stream that it had us pause.
+    A closed socket ends soon, too. asyncio closes a connection when everything is sent, which a client that reads
+    nothing delays for ever: it would keep its slot, and its stream paused.
     """
 
     def __init__(self, *args: object, **options: object) -> None:
         super().__init__(*args, **options)  # type: ignore[arg-type]
-        self.conn.debug = False  # it would write headers to the log, and with them the key
+        self.conn.debug = False  # it would log headers, including the key
 
     def keepalive_timeout(self) -> None:
         """Handle an unanswered ping."""
@@ -50,7 +50,7 @@ class StreamProtocol(WebSocketsSansIOProtocol):
             self._cut_after(self.close_timeout + FLUSH_SECONDS)
 
     def _cut_after(self, seconds: float) -> None:
-        self.loop.call_later(seconds, self.transport.abort)  # nothing, where the connection is gone by then
+        self.loop.call_later(seconds, self.transport.abort)  # does nothing if the connection is already closed
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Open the connection."""
@@ -69,5 +69,5 @@ def socket_options() -> dict[str, Any]:
         "ws_max_size": MAX_MESSAGE,
         "ws_ping_interval": PING_SECONDS,
         "ws_ping_timeout": PONG_SECONDS,
-        "ws_per_message_deflate": False,  # rotations hardly shrink, and each socket would pay for a window
+        "ws_per_message_deflate": False,  # rotations hardly compress, and each socket would need a window
     }

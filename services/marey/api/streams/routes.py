@@ -23,7 +23,7 @@ router = APIRouter(prefix="/v1/streams", tags=["streams"], responses=RESPONSES)
 def begin_stream(body: NewStreamBody, response: Response, shared: Shared, key: Submitter) -> StreamDetailView:
     """Create a live stream; its frames come over the WebSocket at its path.
 
-    It waits while every slot of every worker is taken. 429 when the key has as many open ones as it may.
+    It waits while all slots of all workers are taken. 429 if the key has reached its limit of open streams.
     """
     view = service.begin(shared, key, body)
     response.headers["Location"] = f"/v1/streams/{view.id}"

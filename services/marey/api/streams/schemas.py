@@ -24,7 +24,7 @@ from marey.streams import StreamPrompt, StreamRow, StreamState
 
 MIN_SECONDS, MAX_SECONDS = 1.0, 600.0
 DIGITS = 6
-"""Of offsets: a thousandth of a millimetre."""
+"""Digits of offsets: a thousandth of a millimetre."""
 GONE = "null when the bundle is no longer here."
 
 

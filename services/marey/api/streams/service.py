@@ -30,14 +30,14 @@ log = structlog.get_logger(__name__)
 
 STOPPED = "stopped"
 NEVER_TAKEN = 0
-"""Fence of a stream that no worker has had yet: leases count from 1."""
+"""Fence of a stream without a worker so far: leases count from 1."""
 
 
 def hub_of(shared: Context) -> Hub:
     """Return the hub of the frames' Redis.
 
     Raises:
-        Unreachable: none is named.
+        Unreachable: no Redis is configured.
     """
     if shared.streams is None:
         raise Unreachable(
@@ -53,8 +53,8 @@ def begin(shared: Context, key: ApiKey, body: NewStreamBody) -> StreamDetailView
     """Create a stream that waits for a worker.
 
     Raises:
-        InvalidInput: of a prompt, name, seed or setting that cannot be used, or a model that cannot stream.
-        Busy: the key has as many as it may.
+        InvalidInput: an invalid prompt, name, seed or setting, or a model that cannot stream.
+        Busy: the key has reached its limit.
     """
     hub = hub_of(shared)
     new = _new_stream(key, body, shared.catalogue)
@@ -99,7 +99,7 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> Non
 
     Raises:
         NotFound: the tenant has no such stream.
-        Conflict: it is over.
+        Conflict: it has ended.
         Unreachable: Redis or the database does not answer.
     """
     with transaction(shared.engine) as conn:
@@ -117,9 +117,9 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> Non
 def stop(shared: Context, key: ApiKey, stream: UUID) -> StreamRow:
     """Ask a stream to end, and return its new state. A waiting one ends at once; one that has ended stays so.
 
-    A worker may take the stream at this very moment. Both lock its row, and look again once they have it: if we come
-    first, the worker finds it over and takes nothing; if it comes first, the row has the number of its lease,
-    nothing is ended here, and the worker finds our message, which stays in the queue until it reads.
+    A worker may take the stream at the same moment. Both lock its row, and check again under the lock: if this
+    transaction is first, the worker finds the stream ended and takes nothing; if the worker is first, the row has
+    its lease number, nothing is ended here, and the worker reads the message, which stays in the queue.
 
     Raises:
         NotFound: the tenant has no such stream.
@@ -139,7 +139,7 @@ def _new_stream(key: ApiKey, body: NewStreamBody, catalogue: Catalogue) -> NewSt
     item = _checked(body)
     offer = _offer(item, catalogue)
     manifest = offer.bundle.manifest
-    fps = manifest.fps or 0.0  # an offer has one
+    fps = manifest.fps or 0.0  # generator capabilities always include one
     return NewStream(
         tenant=key.tenant,
         key=key.id,
@@ -166,7 +166,7 @@ def _offer(item: Item, catalogue: Catalogue) -> GeneratorCapabilities:
     try:
         with named_by("model"):
             offer = catalogue.offer(item.model or catalogue.live_model)
-    except NotFound as error:  # what is not found is not at this path
+    except NotFound as error:  # the problem is a field's, not the path's
         raise InvalidInput(error.message, where=error.where, hint=error.hint) from error
     manifest = offer.bundle.manifest
     spec = find_model(manifest.model)

@@ -1,7 +1,7 @@
 """One WebSocket client of a stream: frames as they are made, and changes of the stream's state.
 
-What stands here of frames is one number, that of the next to send: every send is awaited, and what a client does not
-take stays in Redis, or is skipped.
+The only state about frames is the number of the next one to send: every send is awaited, and frames that a client
+does not read stay in Redis, or are skipped.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from marey.streams.redis import FrameStream, Gap, StoredFrame
 from marey.tenants import ApiKey, check_key
 
 BATCH = 20
-"""Frames of one read: a second."""
+"""Frames per read: one second."""
 IDLE_SECONDS, FLOW_SECONDS = 1.0, 2.0
-"""Between looks at the row: where no frame comes or the row is behind what frames say, and where they flow."""
+"""Seconds between reads of the row: without frames or with unknown prompts, and with steady frames."""
 LAST_SECONDS = 0.2
-"""The same after the last frame: the row is over any moment."""
+"""The same after the last frame: the row ends soon."""
 HOLD_SECONDS = 0.25
 MEASURE_SECONDS = 0.5
-"""Between two looks at how far a client is behind: where we are what is slow, asking more often would make it worse."""
+"""Seconds between checks of a client's lag: if this server is slow, more checks would make it worse."""
 OUTAGE_SECONDS = 8.0
-"""A Redis or Postgres that restarts is back by then."""
+"""Maximum outage: a restarted Redis or Postgres is back by then."""
 AGAIN_SECONDS = 0.5
 
 
@@ -50,9 +50,9 @@ class SessionRequest:
     """A validated request to watch a stream.
 
     Attributes:
-        row, prompts, made: how the stream stood when it came.
-        first: number of the first frame it wants.
-        pauses: where it is slow, the stream stands still rather than have it lose frames.
+        row, prompts, made: state of the stream at the time of the request.
+        first: number of the first requested frame.
+        pauses: pause the stream when the client is slow, rather than skip frames.
     """
 
     key: ApiKey
@@ -67,8 +67,8 @@ class Session:
     """Streams frames and messages to one client.
 
     Args:
-        writer: to the client; the handshake is done.
-        request: what it came for.
+        writer: connected to the client; the handshake is done.
+        request: the validated request.
     """
 
     def __init__(self, writer: SocketWriter, hub: Hub, shared: Context, request: SessionRequest) -> None:
@@ -85,9 +85,9 @@ class Session:
         self._at = request.first
         self._prompt = 0  # the highest number that a frame carried
         self._last = False
-        self._sending: float | None = None  # a frame, since when
+        self._sending: float | None = None  # start time of the current send
         self._measured = -MEASURE_SECONDS
-        self._away: float | None = None  # Redis or Postgres, since when
+        self._away: float | None = None  # start time of an outage of Redis or Postgres
 
     async def run(self) -> None:
         """Run until the stream ends, the client disconnects or the server stops."""
@@ -100,7 +100,7 @@ class Session:
                     group.start_soon(_and_then_none, task, group)
         finally:
             with anyio.CancelScope(shield=True), suppress(Unreachable):
-                await self._pause.release()  # nobody else would
+                await self._pause.release()  # no other session would resume it
 
     async def _show(self) -> None:
         await self._writer.send_message(StreamMessage(stream=self._detail()))
@@ -197,7 +197,7 @@ class Session:
     def _stand(self) -> tuple[StreamRow, Sequence[StreamPrompt]]:
         """Read the row, and the prompts if there may be new ones: frames carry a number that is not known here."""
         with transaction(self._shared.engine) as conn:
-            check_key(conn, self._request.key.id)  # revoked, expired or suspended since
+            check_key(conn, self._request.key.id)  # the key may be revoked, expired or suspended by now
             row = get_stream(conn, self._row.tenant, self._row.id)
             known = self._prompt < len(self._prompts) and not is_over(row)
             return row, self._prompts if known else prompts_with_rewrites(conn, row.id)
@@ -206,7 +206,7 @@ class Session:
         """Send the rest of an ended stream."""
         while found := await self._hub.wait(lambda: self._read(0)):
             await self._pass_on(found)
-        if self._at < self._row.frames:  # an hour after its end it has none
+        if self._at < self._row.frames:  # frames expire an hour after the end
             await self._tell_gap(Gap(self._at, self._row.frames - self._at))
         await self._writer.send_message(EndMessage(stream=self._detail()))
         await self._writer.close(1000)
@@ -226,7 +226,7 @@ class Session:
     async def _renew(self) -> None:
         """Refresh the viewer's presence while this runs."""
         while True:
-            with suppress(Unreachable):  # told by `_show`
+            with suppress(Unreachable):  # reported by `_show`
                 await self._hub.call(self._presence.refresh)
             await anyio.sleep(REFRESH_SECONDS)
 
@@ -237,7 +237,7 @@ class Session:
             since = self._sending
             if since is None or time.monotonic() - since < BLOCKED_SECONDS or self._row.state is not StreamState.LIVE:
                 continue
-            with suppress(Unreachable):  # told by `_show`
+            with suppress(Unreachable):  # reported by `_show`
                 if self._lag.is_falling_behind(await self._behind()):
                     await self._pause.engage()
 

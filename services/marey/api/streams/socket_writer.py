@@ -15,7 +15,7 @@ log = structlog.get_logger(__name__)
 AWAY = 1013
 """Close code: try again later."""
 TOLD = (401, 403, 404, 422)
-"""HTTP statuses that are close codes too, with 4000 added; what has another may work later."""
+"""HTTP statuses that become close codes, with 4000 added; others may work later."""
 REASON_BYTES = 123  # RFC 6455
 
 
@@ -48,7 +48,7 @@ class SocketWriter:
 
     async def send_message(self, message: SocketMessage) -> None:
         """Send a text message; raises as `send`."""
-        # As over HTTP: a problem leaves out what it has not, everything else says null.
+        # As over HTTP: a problem omits empty fields, other messages have null.
         text = message.model_dump_json(exclude_none=isinstance(message, ErrorMessage))
         async with self._lock:
             if not self._closed:

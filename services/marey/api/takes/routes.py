@@ -54,7 +54,7 @@ def motion_filter(
     said = review or []
     return takes_store.MotionFilter(
         tags=tag or (),
-        name=name and unicodedata.normalize("NFC", name),  # as names and prompts are stored
+        name=name and unicodedata.normalize("NFC", name),  # as stored names and prompts
         text=text and unicodedata.normalize("NFC", text),
         reviews=[jobs.Review(each) for each in said if each is not ReviewFilter.NEW],
         unreviewed=ReviewFilter.NEW in said,
@@ -93,7 +93,7 @@ def review_motions(body: NewReviewBody, conn: Connection, key: Submitter) -> lis
 def reroll_motions(body: NewRerollBody, conn: Connection, shared: Shared, key: Submitter) -> RerollsView:
     """Make motions again with the next seeds, all or none: new items in their jobs, linked to the motions they replace.
 
-    A motion has one take after it; asked again, the same one is answered. To go on, re-roll that take.
+    A motion has at most one re-roll: a repeated request returns the same one. To continue, re-roll that take.
     """
     takes = takes_store.reroll(
         conn,

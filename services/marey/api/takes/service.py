@@ -11,7 +11,7 @@ from marey.jobs import ItemRow, MotionRow, NewItem
 from marey.jobs.generators import new_items
 
 WORDS = 48
-"""Characters of the prompt in the name of a file."""
+"""Characters of the prompt in a file name."""
 
 
 def file_stem(row: MotionRow) -> str:
@@ -26,7 +26,7 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
     """Return the item as a new one, by the same exact bundle with the same settings.
 
     Raises:
-        Conflict: this server no longer has the bundle, or it no longer takes what the item asks for.
+        Conflict: this server no longer has the bundle, or the bundle no longer accepts the item's settings.
     """
     item = Item(
         prompt=row.prompt,
