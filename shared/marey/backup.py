@@ -123,7 +123,7 @@ class JobBackup(_Record):
             if made != (item.motion is not None):
                 raise ValueError(f"item {item.id} is {item.state} and has {'a' if item.motion else 'no'} motion")
             if item.replaces is not None and item.replaces not in motions:
-                raise ValueError(f"item {item.id} replaces a motion that is not there")
+                raise ValueError(f"item {item.id} replaces an unknown motion")
         for what, count in (
             ("id", len({i.id for i in self.items})),
             ("position", len({i.position for i in self.items})),
@@ -158,9 +158,9 @@ def back_up(conn: sa.Connection, tenant: str, job: UUID) -> JobBackup:
     """
     found = _rows(conn, tables.job, JobRecord, tables.job.c.id == job, tables.job.c.tenant_id == tenant)
     if not found or found[0]["finished_at"] is None:
-        raise Conflict("the job has gone on or is gone", where=f"job {job}", hint="Back it up later.")
+        raise Conflict("the job has continued or was deleted", where=f"job {job}", hint="Back it up later.")
     if conn.execute(_erasing(job)).scalar_one():
-        raise Conflict("files of it are being written anew without prompts", where=f"job {job}", hint="Wait a minute.")
+        raise Conflict("its files are being rewritten without prompts", where=f"job {job}", hint="Wait a minute.")
     file, asset, motion = tables.motion_file.c, tables.asset.c, tables.motion.c
     files: dict[UUID, list[dict[str, Any]]] = {}
     query = (
@@ -215,7 +215,7 @@ def restore(conn: sa.Connection, tenant: str, backup: JobBackup) -> bool:
         _write_job(conn, tenant, backup)
     except (exc.DataError, exc.IntegrityError) as error:
         reason = (str(error.orig).splitlines() or ["?"])[0]
-        raise InvalidFile(f"the database does not take it: {reason}", where=f"job {job.id}") from error
+        raise InvalidFile(f"the database refuses it: {reason}", where=f"job {job.id}") from error
     return True
 
 

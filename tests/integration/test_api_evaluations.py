@@ -233,7 +233,7 @@ def test_all_bad_prompts_are_told_and_nothing_is_written(http: httpx2.Client) ->
     assert [(p["line"], p.get("field")) for p in problem["problems"]] == [
         (3, "prompt"), (4, "expected"), (5, "seed"), (6, None),
     ]  # fmt: skip
-    assert "known are prompt, seconds, expected" in problem["problems"][2]["message"]
+    assert "known: prompt, seconds, expected" in problem["problems"][2]["message"]
     assert count(http, "evaluations") == before
 
 
@@ -252,8 +252,8 @@ def test_all_lengths_that_the_model_cannot_make_are_told(http: httpx2.Client) ->
         ({"bundle": "../etc"}, "String should match pattern"),
         ({"evaluator": "gone"}, "no model bundle is named 'gone'"),
         ({"evaluator": GENERATOR}, "is a generator, not an evaluator"),
-        ({"prompts": []}, "there is no prompt in it"),
-        ({"prompts": PROMPTS[:1]}, "a single prompt"),
+        ({"prompts": []}, "there are no prompts"),
+        ({"prompts": PROMPTS[:1]}, "more than one prompt"),
         ({"prompts": {"prompt": "walk"}}, "is not a list"),
         ({"prompts": None}, "neither is given"),
         ({"split": "test"}, "both are given"),

@@ -60,7 +60,7 @@ def test_a_tenant_is_made_shown_changed_suspended_and_reinstated(admin: Admin, e
 
 
 def test_what_cannot_be_is_refused_and_says_what_can(admin: Admin) -> None:
-    admin("tenants", "create", "Studio X").refused(2, "name of a tenant")
+    admin("tenants", "create", "Studio X").refused(2, "tenant name")
     admin("tenants", "create", "default").refused(2, "already")
     admin("tenants", "show", "nobody").refused(3, "marey admin tenants list")
     admin("tenants", "set", "default").refused(2, "--queued")

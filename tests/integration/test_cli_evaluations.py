@@ -156,7 +156,7 @@ def test_bad_input_is_2_with_every_line_and_nothing_is_begun(marey: Marey, tmp_p
     for content, *said in (
         ("", "no prompt"),
         ("prompt,seconds\n", "no prompt"),
-        ("prompt\nwalk\n", "a single prompt"),
+        ("prompt\nwalk\n", "more than one prompt"),
         ("prompt,speed\nwalk,1\nrun,2\n", "'speed' is not a known column", "prompt, seconds, expected"),
         (
             "prompt;seconds;expected\nwalk;15;fly\n\nrun;40;\n",

@@ -153,7 +153,7 @@ def test_what_is_no_cursor_is_refused(engine: sa.Engine, text: str) -> None:
         base64.urlsafe_b64encode(text.encode()).decode(),
         "".join(base64.urlsafe_b64encode(part.encode()).decode() for part in text.split("|")),
     ):
-        with transaction(engine) as conn, pytest.raises(InvalidInput, match="no cursor"):
+        with transaction(engine) as conn, pytest.raises(InvalidInput, match="not a cursor"):
             list_jobs(conn, DEFAULT_TENANT, cursor=cursor)
 
 

@@ -43,10 +43,10 @@ def test_a_restart_of_postgres_costs_an_error_and_nothing_else(short_home: Path)
 
 def test_a_database_without_room_says_so_and_names_no_file_of_its_own(engine: sa.Engine) -> None:
     full = "DO $$ BEGIN RAISE disk_full USING MESSAGE = 'could not extend file \"base/5/1\"'; END $$"
-    with pytest.raises(Unreachable, match="no room left") as told, transaction(engine) as conn:
+    with pytest.raises(Unreachable, match="no disk space left") as told, transaction(engine) as conn:
         conn.execute(sa.text(full))
     assert "base/5" not in str(told.value)
-    assert "Make room" in str(told.value)
+    assert "Free disk space" in str(told.value)
 
 
 def test_a_listener_is_told_that_its_connection_is_gone(short_home: Path) -> None:

@@ -164,7 +164,7 @@ def test_nobody_else_reaches_the_servers(short_home: Path) -> None:
 def test_a_folder_laid_as_a_trap_is_refused(short_home: Path) -> None:
     (short_home / "elsewhere").mkdir()
     socket_folder(short_home).symlink_to(short_home / "elsewhere")
-    with pytest.raises(Conflict, match="belongs to somebody else"):
+    with pytest.raises(Conflict, match="belongs to another user"):
         start_valkey(short_home)
 
 

@@ -241,7 +241,7 @@ def test_a_foreign_cursor_is_refused(engine: sa.Engine, cursor: str) -> None:
             lambda: list_items(conn, "default", job, cursor=cursor),
             lambda: list_motions(conn, "default", cursor=cursor),
         ):
-            with pytest.raises(InvalidInput, match="no cursor"):
+            with pytest.raises(InvalidInput, match="not a cursor"):
                 read()
 
 

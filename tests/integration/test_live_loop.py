@@ -299,7 +299,7 @@ def test_a_stream_that_nobody_watches_ends(studio: Studio, start: Start) -> None
         return studio.row(lonely).state is StreamState.ENDED
 
     studio.until(is_over, "the end")
-    assert "nobody watched" in str(studio.row(lonely).reason)
+    assert "no viewer" in str(studio.row(lonely).reason)
     assert studio.row(watched).state is StreamState.LIVE
 
 

@@ -68,7 +68,7 @@ def invalid_knocks(engine: sa.Engine) -> list[Knock]:
         Knock("no key", None, says="no API key"),
         Knock("empty", "", says="no API key"),
         Knock("of another kind", "Basic bWU6bWU=", says="no API key"),
-        Knock("garbage", "Bearer marey_0_0", says="no API key"),
+        Knock("garbage", "Bearer marey_0_0", says="not an API key"),
         Knock("unknown", f"Bearer marey_{secrets.token_hex(4)}_{other}", says="unknown or revoked"),
         Knock("a known prefix with another secret", f"Bearer marey_{prefix}_{other}", says="unknown or revoked"),
         Knock("revoked", f"Bearer {made['revoked']}", says="unknown or revoked"),

@@ -69,9 +69,9 @@ class Rates:
         self._find()
         if not allowed:
             raise Busy(
-                f"this key may make {rate.amount} requests of the class {kind} in {rate.seconds} s, and has made them",
+                f"rate limit exceeded: {rate.amount} {kind} requests in {rate.seconds} s",
                 where=f"rate {kind}",
-                hint="Send it again after the seconds of `Retry-After`.",
+                hint="Send it again after the seconds in `Retry-After`.",
                 seconds=max(math.ceil(seconds), 1),
             )
 

@@ -54,7 +54,7 @@ class TextService:
             raise Unreachable(
                 "there is no text service",
                 where="MAREY_TEXT_URL",
-                hint="Start `marey text serve` and name it by MAREY_TEXT_URL.",
+                hint="Start `marey text serve` and set MAREY_TEXT_URL to its address.",
                 public="this server does not parse texts",
             )
         headers = {"Content-Type": JSON, "Accept-Encoding": "identity"}
@@ -81,9 +81,9 @@ class TextService:
 def _client(config: Settings, url: str) -> httpx2.AsyncClient:
     if config.text_key is None:
         raise InvalidInput(
-            "the text service is named, but not the secret it wants",
+            "the text service is configured without its secret",
             where="MAREY_TEXT_KEY",
-            hint="Set it to what the text service has.",
+            hint="Set it to the secret of the text service.",
         )
     path = url.removeprefix(SOCKET) if url.startswith(SOCKET) else None
     return httpx2.AsyncClient(
@@ -113,7 +113,7 @@ async def _passed_on(answer: httpx2.Response) -> Response:
     try:
         await to_thread.run_sync(view.model_validate_json, bytes(content))
     except ValidationError as error:
-        raise _away(f"it answered {status} with something else than {view.__name__}") from error
+        raise _away(f"it answered {status} with something other than {view.__name__}") from error
     wait = answer.headers.get("Retry-After", "")
     headers = {"Retry-After": wait if RETRY.fullmatch(wait) else RETRY_AFTER} if status >= 429 else {}
     return Response(bytes(content), status, headers, media_type)

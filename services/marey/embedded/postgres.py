@@ -120,7 +120,7 @@ def _make_cluster(data: Path, account: pwd.struct_passwd | None, log: Path, *, d
     process = spawn(command, log, account, signal.SIGTERM)
     if process.wait() != 0:
         shutil.rmtree(data)
-        raise StartFailed("the database cluster could not be made", where=str(data), hint=tail(log))
+        raise StartFailed("the database cluster could not be created", where=str(data), hint=tail(log))
 
 
 def _check_version(data: Path) -> None:
@@ -129,7 +129,7 @@ def _check_version(data: Path) -> None:
         raise StartFailed(
             f"the data folder is of Postgres {found}, this is Postgres {POSTGRES_MAJOR}",
             where=str(data),
-            hint="Dump it with the old version and load it anew, or set MAREY_HOME to another folder.",
+            hint="Dump it with the old version and load it again, or set MAREY_HOME to another folder.",
         )
 
 
@@ -148,7 +148,7 @@ def _stop_leftover(data: Path) -> None:
         return
     except psutil.TimeoutExpired:
         raise Conflict(
-            "an old Postgres of this folder does not stop", where=str(data), hint=f"Its pid stands in {pid_file}."
+            "an old Postgres of this folder does not stop", where=str(data), hint=f"Its pid is in {pid_file}."
         ) from None
 
 

@@ -117,7 +117,7 @@ def make_socket_folder(folder: Path, account: pwd.struct_passwd | None) -> None:
     found = folder.lstat()
     owners = {os.geteuid(), account.pw_uid if account else os.geteuid()}
     if not stat.S_ISDIR(found.st_mode) or found.st_uid not in owners:
-        raise Conflict("the folder for sockets belongs to somebody else", where=str(folder), hint="Remove it.")
+        raise Conflict("the folder for sockets belongs to another user", where=str(folder), hint="Remove it.")
     folder.chmod(0o700)
 
 

@@ -257,7 +257,8 @@ def _declared(request: Request, limit: int) -> int:
         raise InvalidInput("is not a number", where="Content-Length")
     encoding = request.headers.get("content-encoding", "identity")
     if encoding.strip().lower() != "identity":
-        raise InvalidInput(f"{encoding[:40]!r} is not taken", where="Content-Encoding", hint="Send the body as it is.")
+        message = f"{encoding[:40]!r} is not supported"
+        raise InvalidInput(message, where="Content-Encoding", hint="Send the body uncompressed.")
     if int(declared) > limit:
         raise _too_large(limit)
     return int(declared)
@@ -280,7 +281,7 @@ async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
                 raise _too_large(limit)
             yield part
     except ClientDisconnect:  # the client is gone, but this is no bug
-        raise InvalidInput("the client went away before it was whole", where="body") from None
+        raise InvalidInput("the client disconnected before the end of the body", where="body") from None
 
 
 def _holds_prompts(scope: Scope) -> bool:

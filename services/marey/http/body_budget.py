@@ -108,6 +108,6 @@ def _overloaded() -> Overloaded:
     return Overloaded(
         "other large requests are being read",
         where="body",
-        hint="Send it again after the seconds of `Retry-After`.",
+        hint="Send it again after the seconds in `Retry-After`.",
         seconds=RETRY_SECONDS,
     )

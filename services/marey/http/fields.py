@@ -53,4 +53,4 @@ SAMPLING: dict[str, Any] = {
     "propertyNames": {"pattern": f"^{SETTING.pattern}$"},
     "maxProperties": MAX_SETTINGS,
 }
-"""Which settings a model has, and their ranges, `/v1/models/{name}` says."""
+"""A model declares its settings and their ranges: `/v1/models/{name}` lists them."""

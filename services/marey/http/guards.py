@@ -41,13 +41,13 @@ class HostGuard:
         headers = Headers(scope=scope)
         host = _without_port(headers.get("host", "")).lower()
         if host not in self.allowed and "*" not in self.allowed:
-            return _foreign("this server does not answer for that host", host)
+            return _foreign("this server does not serve that host", host)
         origin = headers.get("origin")
         if scope["type"] != "websocket" or origin is None or origin_of(origin) in self.origins:
             return None
         own = _host_of(origin)
         if not own or own not in self.allowed | {host}:
-            return _foreign("this server opens no sockets for pages of that origin", origin, "MAREY_CORS_ORIGINS")
+            return _foreign("pages of that origin may not open sockets", origin, "MAREY_CORS_ORIGINS")
         return None
 
 
@@ -61,7 +61,7 @@ class UpgradeGuard:
         """Pass the request on, or refuse it."""
         if scope["type"] == "http" and "sec-websocket-key" in Headers(scope=scope):
             error = UpgradeMissing(
-                "the WebSocket arrived as an ordinary request: a proxy does not pass on the upgrade",
+                "the WebSocket arrived as an ordinary request: a proxy does not forward the upgrade",
                 hint="Let the proxy send HTTP/1.1 with the headers Upgrade and Connection: docs/how-to/proxy.md.",
             )
             await _refuse(error, scope, receive, send)
@@ -82,7 +82,7 @@ def _host_of(origin: str) -> str:
 
 
 def _foreign(message: str, where: str, setting: str = "MAREY_ALLOWED_HOSTS") -> Refused:
-    return Refused(message, where=where[:100], hint=f"{setting} names those it does.")
+    return Refused(message, where=where[:100], hint=f"{setting} lists the allowed ones.")
 
 
 async def _refuse(error: MareyError, scope: Scope, receive: Receive, send: Send) -> None:

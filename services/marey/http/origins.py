@@ -63,7 +63,7 @@ class OriginGuard:
 
 def _preflight(origin: str, *, allowed: bool) -> Response:
     if not allowed:
-        error = Refused("pages of this origin get no answers", where=origin[:100], hint=HINT)
+        error = Refused("pages of this origin are not allowed", where=origin[:100], hint=HINT)
         response = problem_response(error)
     else:
         response = Response(status_code=204)
@@ -75,4 +75,4 @@ def _preflight(origin: str, *, allowed: bool) -> Response:
     return response
 
 
-HINT = "MAREY_CORS_ORIGINS names those that do."
+HINT = "MAREY_CORS_ORIGINS lists the allowed ones."

@@ -95,7 +95,7 @@ def public_error(error: MareyError) -> MareyError:
     if isinstance(error, Overloaded):
         return error
     if isinstance(error, Unreachable):
-        told = error.public or "something that this server needs does not answer"
+        told = error.public or "a dependency of this server does not answer"
         where = error.where if error.where in OF_THE_REQUEST else None
         return Unreachable(told, where=where, hint="Try again in a moment; the server's log says more.")
     return MareyError("an internal error; the server's log says more")
@@ -210,7 +210,7 @@ def _sentence(error: Mapping[str, Any]) -> str:
     if not isinstance(value, str | int | float) or len(shown := repr(value)) > LONGEST_VALUE:
         return message
     if kind.startswith("uuid"):
-        return f"{shown} is no id: that is a UUID, as 01234567-89ab-cdef-0123-456789abcdef"
+        return f"{shown} is not an id: use a UUID, such as 01234567-89ab-cdef-0123-456789abcdef"
     return f"{shown} cannot be used: {SUBJECT.sub('it should', message)}"
 
 

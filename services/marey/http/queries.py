@@ -34,8 +34,8 @@ def check_query(asked: HTTPConnection) -> None:
     known = sorted({each.alias for each in params if getattr(each.field_info, "in_", None) == ParamTypes.query})
     for name in asked.query_params:
         if name not in known:
-            hint = f"It takes {', '.join(known)}." if known else "It takes none."
-            raise InvalidInput("is no parameter of this route", where=name[:LONGEST_NAME] or "query", hint=hint)
+            message = f"unknown parameter {name[:LONGEST_NAME]!r}; known: {', '.join(known) or 'none'}"
+            raise InvalidInput(message, where=name[:LONGEST_NAME] or "query")
 
 
 def _wants_key(dependant: Dependant) -> bool:

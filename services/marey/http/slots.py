@@ -63,16 +63,16 @@ class SlotCounter:
     def _check(self, key: ApiKey) -> None:
         shares, free = self._shares, self._shares.total - self.taken
         if self._keys[key.id] >= shares.key:
-            raise self._busy(f"this key has {shares.key} {self._what} open, its share", "key")
+            raise self._busy(f"this key has {shares.key} {self._what} open, its limit", "key")
         of_tenant = self._tenants[key.tenant]
         if of_tenant >= shares.tenant:
-            raise self._busy(f"the tenant has {shares.tenant} {self._what} open, its share", "tenant")
+            raise self._busy(f"the tenant has {shares.tenant} {self._what} open, its limit", "tenant")
         if of_tenant >= free:
             whose = f"the tenant has {of_tenant} {self._what} open and {free} are free for others"
             raise self._busy(whose if of_tenant else f"no more {self._what} may be open at this process", "server")
 
     def _busy(self, message: str, whose: str) -> Busy:
-        hint = "Close one, or try again after the seconds of `Retry-After`."
+        hint = "Close one, or try again after the seconds in `Retry-After`."
         return Busy(message, where=f"{self._what} of the {whose}", hint=hint, seconds=RETRY_SECONDS)
 
     def _count(self, key: ApiKey, by: int) -> None:

@@ -100,13 +100,13 @@ class Evaluations:
                 raise
             if isinstance(error, QuotaUsedUp) and error.asked <= error.limit:
                 return  # it fits once other jobs of the tenant are done
-            _end(conn, row, EvaluationState.FAILED, f"it cannot begin: {_told(error)}")
+            _end(conn, row, EvaluationState.FAILED, f"it cannot start: {_told(error)}")
             return
         move_evaluation(
             conn,
             row,
             EvaluationState.GENERATING,
-            f"{job.items} motions of {plan.request.bundle} asked for",
+            f"{job.items} motions of {plan.request.bundle} requested",
             request=plan.request.as_json(),
             prompts_sha256=sha256,
             generate_job_id=job.id,

@@ -41,7 +41,7 @@ from marey.webhooks.vault import Vault
 log = logger(__name__)
 
 NOBODY = Problem(
-    "unreachable", "no worker showed this stream for 15 minutes", hint="See that a worker of its model runs."
+    "unreachable", "no worker served this stream for 15 minutes", hint="Check that a worker of its model runs."
 )
 STALE_ASSETS_SECONDS = 600.0  # assets of a dead worker wait an hour anyway
 ABANDONED_SECONDS = 900.0  # seconds that a stream waits for a worker, or for its worker's successor

@@ -92,7 +92,7 @@ class Sender:
         try:
             found = await loop.getaddrinfo(name, url.port, type=socket.SOCK_STREAM)
         except (socket.gaierror, UnicodeError) as error:
-            raise Refused("the host is not known") from error
+            raise Refused("the host is unknown") from error
         return choose_address([str(each[4][0]) for each in found], url.scheme, self._allowed)
 
 

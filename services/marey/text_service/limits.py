@@ -55,7 +55,7 @@ class WordLimit:
                 raise Busy(
                     "too many prompts are being parsed at this moment",
                     where="prompts",
-                    hint="Send them again after the seconds of `Retry-After`, or submit them as a job.",
+                    hint="Send them again after the seconds in `Retry-After`, or submit them as a job.",
                     seconds=RETRY_SECONDS,
                 )
             self._words += words

@@ -109,7 +109,7 @@ def text_router(config: Settings) -> APIRouter:
         raise InvalidInput(
             "the text service needs a secret that it shares with the API",
             where="MAREY_TEXT_KEY",
-            hint="Set it for both, or use `marey serve`, which draws one.",
+            hint="Set it for both, or use `marey serve`, which creates one.",
         )
     secret = config.text_key.get_secret_value().encode()
     limit, threads = WordLimit(), CapacityLimiter(THREADS)

@@ -130,7 +130,7 @@ def parse_npz(
         raise InvalidFile(_reason(error, "npz"), where=where, hint=hint) from None
     foreign = [name for name, value in arrays.items() if not isinstance(value, np.ndarray)]
     if foreign:  # numpy returns a member that is not an npy file as bytes
-        raise InvalidFile(f"`{foreign[0]}` is no array", where=where, hint=hint)
+        raise InvalidFile(f"`{foreign[0]}` is not an array", where=where, hint=hint)
     return arrays
 
 
@@ -159,7 +159,7 @@ def text_of(array: Array, name: str, where: str) -> str:
     try:
         return str(check_array(array, name, where, kinds="U", shape=())[()])
     except ValueError:  # invalid code points
-        raise InvalidFile(f"`{name}` is no text", where=where) from None
+        raise InvalidFile(f"`{name}` is not text", where=where) from None
 
 
 def _is_finite(array: Array) -> bool:
@@ -172,4 +172,4 @@ def _is_finite(array: Array) -> bool:
 def _reason(error: Exception, kind: str) -> str:
     if "pickle" in str(error) or "Python objects" in str(error):
         return "holds pickled objects, which are never loaded"
-    return f"is no {kind} file, or a broken one"
+    return f"is not a valid {kind} file"

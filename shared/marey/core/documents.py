@@ -122,7 +122,7 @@ def _problem(value: Any, allow_nan: bool, max_depth: int) -> str | None:
                 inner += cast("list[Any]", each)
             elif isinstance(each, str):
                 if not each.isascii() and not _is_unicode(each):
-                    return "holds a text that is no Unicode (a lone surrogate)"
+                    return "holds text that is not Unicode (a lone surrogate)"
             elif isinstance(each, float) and not allow_nan and not math.isfinite(each):
                 return "holds a number that is not finite"
         if not inner:

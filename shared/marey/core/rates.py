@@ -49,6 +49,6 @@ def check_rates(rates: Mapping[str, str], *, where: str) -> dict[str, str]:
     """
     for name, text in rates.items():
         if name not in CLASSES:
-            raise InvalidInput(f"{name[:40]!r} is no class of requests", where=where, hint=f"{', '.join(CLASSES)} are.")
+            raise InvalidInput(f"unknown class {name[:40]!r}; known: {', '.join(CLASSES)}", where=where)
         read_rate(text, where=f"{where}.{name}")
     return dict(rates)

@@ -94,7 +94,7 @@ def configure_tracing(service: str, *, patience: float | None = None) -> None:
     protocol = next((value for name in PROTOCOLS if (value := os.environ.get(name))), SPOKEN)
     if protocol != SPOKEN:
         raise InvalidInput(
-            f"{protocol!r} is not spoken here", where=PROTOCOLS[0], hint=f"Unset it, or set {SPOKEN} (port 4318)."
+            f"{protocol!r} is not supported", where=PROTOCOLS[0], hint=f"Unset it, or set {SPOKEN} (port 4318)."
         )
     try:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
@@ -103,7 +103,7 @@ def configure_tracing(service: str, *, patience: float | None = None) -> None:
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ImportError as error:
         raise InvalidInput(
-            f"traces are asked for, but {error.name} is not installed",
+            f"tracing is configured, but {error.name} is not installed",
             where=ENDPOINTS[0],
             hint="pip install 'marey[tracing]', or unset it.",
         ) from error

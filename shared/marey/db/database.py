@@ -118,8 +118,8 @@ def unreachable(error: BaseException) -> Unreachable:
     """Return the expected error for a database that does not answer, or has no free connection."""
     cause = getattr(error, "orig", None) or error
     if isinstance(cause, psycopg.errors.DiskFull):  # its text names a file of the server
-        hint = "Make room on the disk of Postgres; what waits goes on by itself."
-        message = "the database has no room left"
+        hint = "Free disk space for Postgres; waiting work resumes by itself."
+        message = "the database has no disk space left"
         return Unreachable(message, where="database", hint=hint, public=message)
     if isinstance(cause, psycopg.errors.QueryCanceled):
         hint = "It is overloaded, or another transaction holds a lock for long. Try again."

@@ -116,7 +116,7 @@ class Listener:
                 self._connection.execute(sql.SQL("UNLISTEN {}").format(sql.Identifier(channel)))
                 return
         raise InvalidInput(
-            "the database address leads through a transaction pooler, which passes no notifications on (LISTEN)",
+            "the database address belongs to a transaction pooler, which does not forward notifications (LISTEN)",
             where="MAREY_LISTEN_URL",
             hint="Set it to the address of Postgres itself, or of a pool in session mode (docs/how-to/deployment.md).",
         )

@@ -134,5 +134,5 @@ def read_cursor(cursor: str, kind: Callable[[str], Mark]) -> Mark:
         return kind(SEPARATOR.join(base64.urlsafe_b64decode(part).decode() for part in parts))
     except (binascii.Error, ValueError, OverflowError, OSError) as error:
         raise InvalidInput(
-            "this is no cursor of this listing", where="cursor", hint="Use the one the last page gave."
+            "this is not a cursor of this listing", where="cursor", hint="Use the one of the last page."
         ) from error

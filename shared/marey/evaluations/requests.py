@@ -124,7 +124,7 @@ def _check_layout(generator: Bundle, evaluator: Bundle) -> None:
             f"{evaluator.manifest.name} measures motions of the {what} {measured}; {generator.manifest.name} makes "
             f"them of {made}",
             where="evaluator",
-            hint=f"Choose an evaluator of the generator's {what}: to another one its motions have no meaning.",
+            hint=f"Choose an evaluator of the generator's {what}.",
         )
 
 

@@ -116,7 +116,7 @@ def run_schedule(conn: sa.Connection, tenant: str, schedule: UUID) -> UUID:
     """
     _locked(conn, tenant, schedule)  # wait for a concurrent change: its request and prompts belong together
     row = get_schedule(conn, tenant, schedule)
-    made = create_evaluation(conn, _evaluation(row, None, "asked for, beside the times of its schedule"))
+    made = create_evaluation(conn, _evaluation(row, None, "requested outside the times of its schedule"))
     assert made is not None  # only one with a due time can exist already
     return made
 

@@ -95,7 +95,7 @@ def _check(score: NewScore) -> None:
 
 
 def _refuse(conn: sa.Connection, leased: LeasedItems, item: UUID) -> None:
-    problem = document(Problem("conflict", "the evaluation of this item was over before it was scored"))
+    problem = document(Problem("conflict", "the evaluation had ended before this item was scored"))
     end_items(conn, [item], ItemState.FAILED, Cause.ERROR, problem=problem)
     event = NewEvent("item_failed", str(problem["message"]), item, {"problem": problem})
     record(conn, leased.job, [event], moved={(ItemState.LEASED, ItemState.FAILED): 1})

@@ -59,9 +59,9 @@ def read_prompts(
     prompts = tuple(checked(_counted(raws, where), read, where=where))
     if len(prompts) < MIN_PROMPTS:
         raise InvalidInput(
-            "there is a single prompt in it, and nothing can be measured over one",
+            "an evaluation needs more than one prompt",
             where=where,
-            hint=f"Give at least {MIN_PROMPTS}; a few hundred give numbers that mean something.",
+            hint=f"Give at least {MIN_PROMPTS}; a few hundred give reliable numbers.",
         )
     return prompts
 

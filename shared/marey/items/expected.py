@@ -47,7 +47,7 @@ def read_expected(text: str) -> tuple[ExpectedAct, ...]:
         else:
             parts[-1].append(word)
     if len(parts) > MAX_ACTS:
-        raise InvalidInput(f"{len(parts)} acts are over the limit of {MAX_ACTS}")
+        raise InvalidInput(f"{len(parts)} actions are over the limit of {MAX_ACTS}")
     return tuple(_act(words) for words in parts)
 
 
@@ -59,10 +59,10 @@ def format_expected(acts: tuple[ExpectedAct, ...]) -> str:
 
 def _act(words: list[str]) -> ExpectedAct:
     if not words:
-        raise InvalidInput(f'an act is missing: write "walk", or "walk {JOIN} wave left"')
+        raise InvalidInput(f'an action is missing: write "walk", or "walk {JOIN} wave left"')
     name, *rest = words
     if name not in ACTS:
-        raise InvalidInput(f"{name[:40]!r} is not an act; known are {', '.join(ACTS)}")
+        raise InvalidInput(f"{name[:40]!r} is not an action; known: {', '.join(ACTS)}")
     side, straight = "", False
     for word in rest:
         if word == STRAIGHT and name in TRAVELS and not straight:
@@ -78,4 +78,4 @@ def _act(words: list[str]) -> ExpectedAct:
 
 def _allowed(name: str) -> str:
     words = SIDED.get(name) or ((STRAIGHT,) if name in TRAVELS else ())
-    return f"it may have {' or '.join(words)}" if words else f'acts are joined by "{JOIN}"'
+    return f"it may have {' or '.join(words)}" if words else f'actions are joined by "{JOIN}"'

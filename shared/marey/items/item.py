@@ -179,11 +179,11 @@ def read_fields(
     unknown = [name for name in given if name not in checks]
     known = ", ".join(checks)
     problems = [
-        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known are {known}")
+        Problem(line, ascii(name)[1:41].strip("'"), f"is not a known field; known: {known}")
         for name in unknown[:MAX_UNKNOWN]
     ]
     if len(unknown) > MAX_UNKNOWN:
-        problems.append(Problem(line, None, f"has {len(unknown)} fields that are not known; known are {known}"))
+        problems.append(Problem(line, None, f"has {len(unknown)} unknown fields; known: {known}"))
     values: dict[str, Any] = {}
     for name, check in checks.items():
         if given.get(name) is None:
@@ -267,7 +267,7 @@ def checked(
     if problems:
         raise InvalidItems(problems, where=where, total=total)
     if not good:
-        raise InvalidInput("there is no prompt in it", where=where, hint="Give at least one prompt.")
+        raise InvalidInput("there are no prompts", where=where, hint="Give at least one prompt.")
 
 
 def _name(value: object) -> str:
@@ -278,7 +278,7 @@ def _name(value: object) -> str:
     if len(text) > MAX_NAME:
         raise InvalidInput(f"has {len(text)} characters; file names take up to {MAX_NAME} of it")
     if RESERVED.fullmatch(text):
-        raise InvalidInput(f"{text!r} cannot be a file name: Windows keeps it for a device")
+        raise InvalidInput(f"{text!r} cannot be a file name: it is a device name on Windows")
     if not NAME.fullmatch(text) or text.endswith(".") or ".." in text or not is_printable(text):
         raise InvalidInput(
             f"{text[:60]!r} cannot be a file name: begin with a letter or digit, use no / \\ .. and no dot at the end"

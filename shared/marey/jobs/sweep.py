@@ -96,7 +96,7 @@ def _lose(
             "worker-lost",
             f"the worker was lost {item.attempts + 1} times while it ran this item alone",
             where=f"position {item.position}",
-            hint="The item brings its worker down or takes longer than its lease; see the worker's log.",
+            hint="The item crashes its worker or takes longer than its lease; see the worker's log.",
         )
         events.append(end_dead(conn, item, problem))
     moved = {(ItemState.LEASED, ItemState.READY): len(back), (ItemState.LEASED, ItemState.DEAD): len(dead)}

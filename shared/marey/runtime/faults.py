@@ -76,10 +76,10 @@ def as_problem(error: Exception) -> MareyError:
         return error
     if is_out_of_memory(error):
         return OutOfMemory(
-            "the worker has not enough memory for this motion, even alone",
-            hint="Ask for fewer seconds, or run the worker on a machine with more memory.",
+            "the worker does not have enough memory for this motion, even alone",
+            hint="Request fewer seconds, or run the worker on a machine with more memory.",
         )
     return HandlerError(
         f"the worker failed on this item ({type(error).__name__})",
-        hint="It is tried again by itself; the worker's log has the details.",
+        hint="It is retried automatically; the worker's log has the details.",
     )

@@ -38,7 +38,7 @@ def open_store(chosen: Settings) -> AssetStore:
         return FolderStore(chosen.home / "assets")
     if not where.startswith("s3://"):
         if "://" in where:
-            raise InvalidInput(f"{where!r} is no asset store", where="MAREY_STORE", hint="s3://bucket or a folder.")
+            raise InvalidInput(f"{where!r} is not an asset store", where="MAREY_STORE", hint="s3://bucket or a folder.")
         return FolderStore(Path(where).expanduser())
     if chosen.s3_access_key is None or chosen.s3_secret_key is None:
         raise InvalidInput(

@@ -42,7 +42,7 @@ WORDLESS = frozenset({"AccessDenied", "BadRequest"})
 NO_BUCKET = "NoSuchBucket"
 _KEYS = "does not accept the keys", "Check MAREY_S3_ACCESS_KEY and MAREY_S3_SECRET_KEY."
 _REGION = "is in another region", "Set MAREY_S3_REGION to that of the bucket."
-_FULL = "is full", "Make room, or raise the quota of the bucket; what could not be stored is tried again."
+_FULL = "is full", "Free space, or raise the quota of the bucket; failed uploads are retried."
 REASONS = {
     "SignatureDoesNotMatch": _KEYS,
     "InvalidAccessKeyId": _KEYS,
@@ -50,10 +50,10 @@ REASONS = {
     "PermanentRedirect": _REGION,
     NO_BUCKET: ("has no such bucket", "Check MAREY_STORE; `marey admin migrate` makes the bucket."),
     "AccessDenied": (
-        "does not let these keys do that",
-        "Let them read, write, list and delete objects of the bucket, or check MAREY_S3_ACCESS_KEY.",
+        "denies these keys access",
+        "Allow them to read, write, list and delete objects of the bucket, or check MAREY_S3_ACCESS_KEY.",
     ),
-    "RequestTimeTooSkewed": ("has another time than this machine", "Let both take it from one source (NTP)."),
+    "RequestTimeTooSkewed": ("has a clock that differs from this machine's", "Synchronize both clocks (NTP)."),
     "QuotaExceeded": _FULL,
     "InsufficientStorage": _FULL,
     "XMinioStorageFull": _FULL,

@@ -32,9 +32,10 @@ class Control:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InvalidInput(f"`{self.kind}` is no control message; {', '.join(KINDS)} are", where="stream control")
+            message = f"unknown control message `{self.kind}`; known: {', '.join(KINDS)}"
+            raise InvalidInput(message, where="stream control")
         if (self.kind == "steer") != bool(self.prompt):
-            raise InvalidInput("a steer has a prompt, and no other message has", where="stream control")
+            raise InvalidInput("a steer needs a prompt, and other messages have none", where="stream control")
 
     def to_bytes(self) -> bytes:
         """Encode as JSON."""

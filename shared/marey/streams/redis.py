@@ -224,8 +224,8 @@ class FrameStream:
         return FrameReader(self._redis, self, at)
 
     def _lost(self, lease: Lease) -> LeaseLost:
-        hint = "another worker goes on with the stream"
-        return LeaseLost(f"lease {lease.fence} is no more", where=f"stream {self.stream}", hint=hint)
+        hint = "another worker has the stream"
+        return LeaseLost(f"lease {lease.fence} has expired", where=f"stream {self.stream}", hint=hint)
 
 
 class FrameReader:
@@ -286,9 +286,9 @@ def reached(stream: str) -> Generator[None]:
     try:
         yield
     except (NoConnection, TookTooLong, OutOfMemoryError, ReadOnlyError) as error:
-        hint = "see that Redis runs and has memory left"
+        hint = "Check that Redis runs and has memory left."
         raise Unreachable(
-            f"Redis does not serve: {error}",
+            f"Redis failed: {error}",
             where=f"stream {stream}",
             hint=hint,
             public="the frames of live streams cannot be reached",

@@ -58,8 +58,8 @@ def create_stream(conn: sa.Connection, stream: NewStream, *, limit: int) -> UUID
     mine = sa.select(sa.func.count()).where(table.c.key_id == stream.key, table.c.ended_at.is_(None))
     if conn.execute(mine).scalar_one() >= limit:
         raise Busy(
-            f"this key has {limit} live streams, and may have no more at once",
-            hint="End one of them, or ask again later.",
+            f"this key has {limit} live streams, which is its limit",
+            hint="End one of them, or try again later.",
             seconds=RETRY_SECONDS,
         )
     identifier = new_id()

@@ -199,9 +199,9 @@ def _refuse_streams(conn: sa.Connection, items: Sequence[UUID]) -> None:
     clip = conn.execute(query.limit(1)).scalar_one_or_none()
     if clip is not None:
         raise Conflict(
-            "it is the clip of a live stream, which nothing can play again",
+            "it is the clip of a live stream, which cannot be generated again",
             where=f"item {clip}",
-            hint="Begin a stream with another seed.",
+            hint="Start a stream with another seed.",
         )
 
 

@@ -103,7 +103,7 @@ def authenticate(conn: sa.Connection, secret: str) -> ApiKey:
     """
     form = FORM.fullmatch(secret)
     if form is None:
-        raise Unauthenticated("this is no API key", hint="Keys look like marey_<8>_<43>.")
+        raise Unauthenticated("this is not an API key", hint="Keys look like marey_<8>_<43>.")
     table = tables.api_key.c
     row = conn.execute(_standing().where(table.prefix == form[1])).mappings().one_or_none()
     if row is None or not hmac.compare_digest(row["secret_sha256"], _digest(form[2])):
@@ -124,7 +124,7 @@ def check_key(conn: sa.Connection, key: UUID) -> None:
     """
     row = conn.execute(_standing().where(tables.api_key.c.id == key)).mappings().one_or_none()
     if row is None:
-        raise Unauthenticated("this API key is gone")
+        raise Unauthenticated("this API key no longer exists")
     _valid(row)
 
 
@@ -161,7 +161,7 @@ def rotate_key(conn: sa.Connection, tenant: str, key: UUID, *, overlap: float = 
         InvalidInput: an invalid overlap.
     """
     if not 0 <= overlap <= LONGEST_LIFE:
-        raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap")
+        raise InvalidInput(f"{overlap:g} seconds are not a valid duration", where="overlap")
     table = tables.api_key.c
     ours = (table.tenant_id == tenant) & (table.id == key)
     state = sa.select((table.expires_at <= CLOCK).label("expired")).where(ours).with_for_update()

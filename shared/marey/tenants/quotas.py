@@ -154,9 +154,9 @@ def _refuse_beyond(tenant: str, headroom: QuotaHeadroom) -> None:
 def _queue_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
     """Return message, hint and retry delay."""
     return (
-        f"{headroom.asked} items are more than the quota of queued items has room for: "
+        f"{headroom.asked} items exceed the quota of queued items: "
         f"{headroom.used} of {headroom.limit} are queued, {headroom.left} are left",
-        "Ask again when some are done."
+        "Try again when some are done."
         if headroom.asked <= headroom.limit
         else "Submit it as several jobs, one after the other.",
         QUEUE_SECONDS,
@@ -165,7 +165,7 @@ def _queue_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
 
 def _store_full(headroom: QuotaHeadroom) -> tuple[str, str, int]:
     return (
-        f"some {headroom.asked} bytes are more than the quota of stored bytes has room for: "
+        f"about {headroom.asked} bytes exceed the quota of stored bytes: "
         f"{headroom.stands} of {headroom.limit} are stored, "
         f"{headroom.expected} expected of what is queued, {headroom.left} are left",
         "Delete jobs whose motions are fetched; the operator's next `marey admin gc` frees their bytes.",

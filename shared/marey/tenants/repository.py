@@ -32,14 +32,14 @@ def create_tenant(conn: sa.Connection, tenant: str, quotas: Quotas | None = None
     """
     if not FORM.fullmatch(tenant):
         raise InvalidInput(
-            f"{tenant[:80]!r} cannot be the name of a tenant",
+            f"{tenant[:80]!r} is not a valid tenant name",
             where="tenant",
             hint="1 to 63 small letters, digits, - and _; the first is a letter or digit.",
         )
     values = _columns(asdict(quotas or Quotas()))
     new = insert(tables.tenant).values(id=tenant, **values).on_conflict_do_nothing().returning(tables.tenant.c.id)
     if conn.execute(new).one_or_none() is None:
-        raise Conflict("there is such a tenant already", where=f"tenant {tenant}")
+        raise Conflict("the tenant already exists", where=f"tenant {tenant}")
     return get_tenant(conn, tenant)
 
 

@@ -16,7 +16,7 @@ from marey.core.addresses import Allowed, parse_address
 from marey.core.errors import InvalidInput, Refused
 
 MAX_URL = 2000  # characters
-HINT = "MAREY_WEBHOOK_ALLOW names the networks that may be told."
+HINT = "Allow it with MAREY_WEBHOOK_ALLOW."
 
 
 def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
@@ -29,11 +29,11 @@ def choose_address(found: Sequence[str], scheme: str, allowed: Allowed) -> str:
     """
     addresses = [parse_address(each) for each in found]
     if not addresses:
-        raise Refused("the host leads nowhere")
+        raise Refused("the webhook host does not resolve")
     if not all(allowed.permits(address) for address in addresses):
-        raise Refused("the host leads to an address that may not be told", hint=HINT)
+        raise Refused("the webhook host resolves to a private address", hint=HINT)
     if scheme != "https" and not all(allowed.named(address) for address in addresses):
-        raise Refused("http is only for networks that are named", hint=f"Use https. {HINT}")
+        raise Refused("http is allowed only for the networks in MAREY_WEBHOOK_ALLOW", hint=f"Use https. {HINT}")
     return str(addresses[0])
 
 
@@ -46,13 +46,13 @@ def check_url(text: str, allowed: Allowed) -> str:
     try:
         url = httpx2.URL(text)
     except (httpx2.InvalidURL, ValueError) as error:
-        raise _wrong(f"is no URL: {error}") from error
+        raise _wrong(f"is not a URL: {error}") from error
     if url.scheme not in ("https", "http") or not url.host.strip(".") or "%" in url.host:
-        raise _wrong("is no https URL", hint="Write it as https://studio.example/marey.")
+        raise _wrong("is not an https URL", hint="Write it as https://studio.example/marey.")
     if url.userinfo or url.fragment:
         raise _wrong("holds a user, a password or a fragment", hint="Leave them out: messages are signed.")
     if len(str(url)) > MAX_URL or (url.port is not None and not 0 < url.port < 2**16):
-        raise _wrong(f"is over {MAX_URL} characters, or its port is none")
+        raise _wrong(f"is over {MAX_URL} characters, or has an invalid port")
     literal = _literal(url.host)
     if literal is not None:
         try:

@@ -251,7 +251,7 @@ def _is(webhook: UUID, event: UUID) -> sa.ColumnElement[bool]:
 def _refuse_paused(row: WebhookRow) -> None:
     if row.paused:
         raise Conflict(
-            "the webhook is paused, and what it is told waits",
+            "the webhook is paused, and its deliveries wait",
             where=f"webhook {row.id}",
             hint=f"`marey webhooks resume {row.id}` first.",
         )

@@ -36,7 +36,7 @@ def create_webhook(conn: sa.Connection, new: NewWebhook) -> UUID:
     conn.execute(sa.select(tenant.id).where(tenant.id == new.tenant).with_for_update(key_share=True))
     mine = sa.select(sa.func.count()).select_from(webhook).where(webhook.c.tenant_id == new.tenant)
     if conn.execute(mine).scalar_one() >= MAX_WEBHOOKS:
-        raise Conflict(f"there are {MAX_WEBHOOKS} webhooks, as many as there may be", hint="Remove one first.")
+        raise Conflict(f"the limit of {MAX_WEBHOOKS} webhooks is reached", hint="Remove one first.")
     identifier = new_id()
     conn.execute(
         sa.insert(webhook).values(
@@ -112,7 +112,7 @@ def rotate_secret(
         InvalidInput: an invalid overlap.
     """
     if not 0 <= overlap <= LONGEST_OVERLAP:
-        raise InvalidInput(f"{overlap:g} seconds are not a length of time", where="overlap", hint="Up to 30 days.")
+        raise InvalidInput(f"{overlap:g} seconds are not a valid duration", where="overlap", hint="Up to 30 days.")
     table = webhook.c
     kept = {"previous_secret": table.secret, "previous_until": CLOCK + interval(overlap)}
     values = {"previous_secret": None, "previous_until": None} if overlap == 0 else kept

@@ -96,7 +96,7 @@ def test_a_submit_that_is_refused_half_way_leaves_nothing(
     evaluation = new_evaluation(engine)
     scheduler.round()
     row = evaluation_row(engine, evaluation)
-    assert (row.state, row.reason, jobs_there(engine)) == (S.FAILED, "it cannot begin: one item too many", 0)
+    assert (row.state, row.reason, jobs_there(engine)) == (S.FAILED, "it cannot start: one item too many", 0)
 
 
 def test_an_evaluation_that_another_scheduler_has_in_hand_is_left_alone(

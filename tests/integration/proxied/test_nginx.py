@@ -116,7 +116,7 @@ def test_without_the_upgrade_a_stream_is_told_with_what_to_set(
     nginx = without("Upgrade|Connection")
     with (
         Link(Server(nginx.url, api.key), str(hand.stream)) as link,
-        pytest.raises(InvalidInput, match="a proxy does not pass on the upgrade"),
+        pytest.raises(InvalidInput, match="a proxy does not forward the upgrade"),
     ):
         link.receive(5)
     handshake = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}

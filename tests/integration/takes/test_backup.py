@@ -189,7 +189,7 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], type[MareyError], str]] = {
     "what no text can hold": (
         lambda b: edit_job(b, lambda d: d.replace(b'"name":"rich"', b'"name":"\\u0000"', 1)),
         InvalidFile,
-        "the database does not take it",
+        "the database refuses it",
     ),
 }
 

@@ -97,8 +97,8 @@ def test_nobody_listening_is_told_without_an_address() -> None:
 def test_an_address_that_may_not_be_told_is_not_even_connected_to(receiver: Receiver) -> None:
     for host in ("127.0.0.1", "localhost", "2130706433", "[::ffff:127.0.0.1]"):
         attempt = send(receiver.url(host), ["public"])
-        assert (attempt.status, attempt.error) == (None, "the host leads to an address that may not be told")
-    assert send("https://no-such-host.invalid/").error == "the host is not known"
+        assert (attempt.status, attempt.error) == (None, "the webhook host resolves to a private address")
+    assert send("https://no-such-host.invalid/").error == "the host is unknown"
     assert receiver.received == []
 
 

@@ -67,7 +67,7 @@ def test_a_name_with_path_tricks_is_refused(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("CON", "Windows keeps it for a device"),
+        ("CON", "it is a device name on Windows"),
         ("x" * 300, "has 300 characters"),
         ("_x", "begin with a letter or digit"),
         ("a\u202eb", "U+202E"),

@@ -102,7 +102,7 @@ def test_broken_json_is_told_with_its_line_and_the_rest_is_still_read(tmp_path: 
         tmp_path, "p.jsonl", '{"prompt": "a person waves"}\n{"prompt": \n[1]\n{"prompt": "bows", "speed": 2}\n'
     )
     assert [line.split(":")[0] for line in found] == ["line 2", "line 3", "line 4"]
-    assert "speed: is not a known field; known are prompt," in found[2]
+    assert "speed: is not a known field; known: prompt," in found[2]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +212,7 @@ def test_a_file_of_an_evaluation_has_columns_of_its_own(tmp_path: Path) -> None:
     [
         ("", "no prompt"),
         ("prompt,seconds\n", "no prompt"),
-        ("prompt\na person walks\n", "single prompt"),
+        ("prompt\na person walks\n", "more than one prompt"),
         ("prompt,tags\na person walks,x\n", "known columns are prompt, seconds, expected"),
         ("prompt,seconds\na person walks,soon\na person runs,-1\n", "line 2: seconds"),
         ("prompt,seconds\na person walks,soon\na person runs,-1\n", "line 3: seconds"),

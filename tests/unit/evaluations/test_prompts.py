@@ -45,7 +45,7 @@ def test_capitals_and_blanks_do_not_matter() -> None:
         ("", "missing"),
         ("walk then", "missing"),
         ("then walk", "missing"),
-        ("fly", "'fly' is not an act; known are walk"),
+        ("fly", "'fly' is not an action; known: walk"),
         ("walk, wave", "'walk,' is not an act"),
         ("walk left", "'left' does not belong to 'walk'; it may have straight"),
         ("walk straight straight", "'straight' does not belong"),
@@ -73,11 +73,11 @@ def test_every_bad_line_is_told_with_its_number() -> None:
     assert [(p.line, p.field) for p in caught.value.problems] == [
         (2, "expected"), (3, "seed"), (4, "prompt"), (4, "seconds"),
     ]  # fmt: skip
-    assert "known are prompt, seconds, expected" in caught.value.problems[1].message
+    assert "known: prompt, seconds, expected" in caught.value.problems[1].message
 
 
 def test_one_prompt_is_too_few_and_ten_thousand_and_one_too_many() -> None:
-    with pytest.raises(InvalidInput, match="single prompt"):
+    with pytest.raises(InvalidInput, match="more than one prompt"):
         read_prompts([(1, {"prompt": "a person walks"})])
     with pytest.raises(InvalidInput, match="no prompt"):
         read_prompts([])

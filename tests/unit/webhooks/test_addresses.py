@@ -28,15 +28,15 @@ def test_addresses_of_the_internet_may_be_told_over_https(address: str) -> None:
     ],
 )  # fmt: skip
 def test_no_other_address_is_told_unless_its_network_is_named(address: str) -> None:
-    with pytest.raises(Refused, match="may not be told"):
+    with pytest.raises(Refused, match="private address"):
         choose_address([address], "https", DEFAULT)
 
 
 def test_a_name_that_leads_inside_as_well_as_outside_is_refused() -> None:
     for found in (["8.8.8.8", "10.0.0.1"], ["127.0.0.1", "2606:4700:4700::1111"]):
-        with pytest.raises(Refused, match="may not be told"):
+        with pytest.raises(Refused, match="private address"):
             choose_address(found, "https", DEFAULT)
-    with pytest.raises(Refused, match="leads nowhere"):
+    with pytest.raises(Refused, match="does not resolve"):
         choose_address([], "https", DEFAULT)
 
 
@@ -44,13 +44,13 @@ def test_networks_that_are_named_may_be_told_without_tls_and_nothing_beside_them
     for address in ("10.1.2.3", "::ffff:10.1.2.3", "fd00:1::5"):
         for scheme in ("http", "https"):
             assert choose_address([address], scheme, STUDIO) == address.removeprefix("::ffff:")
-    with pytest.raises(Refused, match="may not be told"):
+    with pytest.raises(Refused, match="private address"):
         choose_address(["10.2.0.1"], "https", STUDIO)
     for found in (["8.8.8.8"], ["10.1.2.3", "8.8.8.8"]):
         assert choose_address(found, "https", STUDIO) == found[0]
-        with pytest.raises(Refused, match="http is only for networks that are named"):
+        with pytest.raises(Refused, match="http is allowed only for the networks in MAREY_WEBHOOK_ALLOW"):
             choose_address(found, "http", STUDIO)
-    with pytest.raises(Refused, match="may not be told"):
+    with pytest.raises(Refused, match="private address"):
         choose_address(["8.8.8.8"], "https", Allowed.of(["10.1.0.0/16"]))
 
 
@@ -58,7 +58,7 @@ def test_networks_that_are_named_may_be_told_without_tls_and_nothing_beside_them
     "host", ["127.0.0.1", "2130706433", "0x7f.1", "127.1", "[::1]", "localhost", "localhost.", "127.0.0.1."]
 )
 def test_an_address_is_seen_however_it_is_written(host: str) -> None:
-    with pytest.raises(InvalidInput, match="may not be told") as refused:
+    with pytest.raises(InvalidInput, match="private address") as refused:
         check_url(f"https://{host}/hook", DEFAULT)
     assert refused.value.where == "url"
     assert "MAREY_WEBHOOK_ALLOW" in (refused.value.hint or "")

@@ -52,7 +52,7 @@ class ModelCheck:
 def _check_queue(config: Settings) -> None:
     url = config.queue_url
     if url is None:
-        raise Unreachable("no queue is named", hint="Set MAREY_QUEUE_URL.")
+        raise Unreachable("no queue is configured", hint="Set MAREY_QUEUE_URL.")
     check_queue(url.get_secret_value())
 
 

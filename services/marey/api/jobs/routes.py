@@ -106,7 +106,7 @@ def _read(kind: str, body: BinaryIO, fields: dict[str, Any], shared: Context) ->
     if kind == JSON:
         return service.read_document(body, shared.catalogue)
     raise InvalidInput(
-        f"{kind[:60]!r} is not a kind of body this takes", where="Content-Type", hint=f"{JSON} or {NDJSON}."
+        f"{kind[:60]!r} is not a supported media type", where="Content-Type", hint=f"{JSON} or {NDJSON}."
     )
 
 

@@ -105,7 +105,7 @@ def _checked(fields: JobFields, raws: Raws, catalogue: Catalogue) -> Submission:
         for line, raw in raws():
             yield line, raw
         if not line:
-            raise InvalidInput("there is no prompt in it", where="body", hint='Write {"prompt": "…"}, one a line.')
+            raise InvalidInput("there are no prompts", where="body", hint='Write {"prompt": "…"}, one a line.')
 
     def check(values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
         """Yield problems of an item that its model cannot handle."""

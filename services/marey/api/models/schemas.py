@@ -52,7 +52,7 @@ class ModelView(View):
     metrics: dict[str, float]
     settings: list[SettingView]
     about: str
-    """What the model can and cannot do, in a few lines; empty where the model is not installed on the server."""
+    """Capabilities and limits of the model, in a few lines; empty if the model is not installed on the server."""
 
     @classmethod
     def of(cls, offer: GeneratorCapabilities) -> ModelView:

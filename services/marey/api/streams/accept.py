@@ -90,7 +90,7 @@ def _check_names(query: QueryParams) -> None:
     from its beginning."""
     for name in query:
         if name not in QUERY:
-            raise InvalidInput(f"{name[:40]!r} is no parameter of a socket; {' and '.join(QUERY)} are", where="query")
+            raise InvalidInput(f"unknown parameter {name[:40]!r}; known: {', '.join(QUERY)}", where="query")
 
 
 def first_frame(given: str | None) -> int:

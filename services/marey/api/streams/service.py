@@ -41,7 +41,7 @@ def hub_of(shared: Context) -> Hub:
     """
     if shared.streams is None:
         raise Unreachable(
-            "live streams need Redis, and none is named",
+            "live streams need Redis, and none is configured",
             where="MAREY_QUEUE_URL",
             hint="Set it, or MAREY_STREAMS_URL.",
             public="this server has no live streams",
@@ -105,7 +105,7 @@ def command(shared: Context, key: ApiKey, stream: UUID, control: Control) -> Non
     with transaction(shared.engine) as conn:
         row = get_stream(conn, key.tenant, stream)
         if is_over(row):
-            raise Conflict(f"the stream is over: {row.reason}", where=f"stream {stream}")
+            raise Conflict(f"the stream has ended: {row.reason}", where=f"stream {stream}")
         if control.kind in ("pause", "resume"):
             note(conn, key, f"stream.{control.kind}", stream)
     if control.kind == "stop":

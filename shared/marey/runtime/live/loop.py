@@ -140,7 +140,7 @@ class LiveLoop:
             problem = as_problem(error)
             if problem is not error:
                 log.exception("stream_failed", stream=str(leased.row.id))
-            self._close(leased, "it could not go on", problem)
+            self._close(leased, "the stream failed", problem)
 
     def _in_turn(self, leased: LeasedStream, message: Callable[[], None]) -> None:
         """Apply a message after replayed frames: frames that another worker showed under one prompt are not recorded
@@ -197,7 +197,7 @@ class LiveLoop:
                 if frame.frame.number >= leased.lease.next_frame:
                     leased.unwritten.append(frame.frame)
             if leased.ending is None and len(leased.tokens) >= leased.row.max_frames:
-                leased.ending = "its time is over"
+                leased.ending = "its maximum length is reached"
             if leased.ending is not None and leased.unwritten:
                 leased.unwritten[-1] = replace(leased.unwritten[-1], last=True)
             self._write(leased)
@@ -263,7 +263,7 @@ class LiveLoop:
             encode_frame(pool.catch_up(session, 1)[0].frame)
             pool.stop(session)
         except Exception as error:
-            self._close(leased, "it could not go on", as_problem(error))
+            self._close(leased, "the stream failed", as_problem(error))
             return False
         return True
 

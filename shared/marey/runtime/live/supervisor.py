@@ -195,7 +195,7 @@ class StreamSupervisor(threading.Thread):
         try:
             features = opening.reading.features()
         except MareyError as error:
-            self._end(row, lease, "its prompt cannot be read", error)
+            self._end(row, lease, "its prompt cannot be parsed", error)
             frames.release(lease)
             return
         tokens = np.frombuffer(past.tokens, "<i2").reshape(-1, self._pool.levels)
@@ -278,7 +278,7 @@ class StreamSupervisor(threading.Thread):
         if leased.state is not StreamState.PAUSED:
             leased.moved = now
         if now - leased.seen > self._idle_seconds:
-            return f"nobody watched for {self._idle_seconds:g} seconds"
+            return f"no viewer for {self._idle_seconds:g} seconds"
         if now - leased.moved > self._paused_seconds:
             return f"paused for {self._paused_seconds:g} seconds"
         return ""
