@@ -125,7 +125,7 @@ def current_map(root: Path, folder: Path, processes: int) -> LineMap:
 
 
 def record_map(root: Path, folder: Path, processes: int, tests: Sequence[str]) -> LineMap:
-    """Run tests with their lines traced, each process a file of tests at a time."""
+    """Run tests with their lines traced, each process a file of tests at a time (0: all in one, for small runs)."""
     part = folder / "part"
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutants.__main__ import Slot, _Baseline, _judge
+from tests.mutants.__main__ import Slot, _Baseline, _judge, _Results
 from tests.mutants.drawing import Mutant
 from tests.mutants.mapping import LineMap, current_map, record_map
 from tests.mutants.operators import mutations
@@ -18,6 +18,8 @@ from tests.mutants.selection import Selector
 
 PRODUCT = "shared/marey/toy.py"
 SOURCE = """\
+import time
+
 LIMIT = 10
 
 
@@ -31,6 +33,7 @@ def capped(x):
 
 def waits(x):
     while not x:
+        time.sleep(0.01)
         x = True
     return x
 
@@ -81,7 +84,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def known(root: Path) -> LineMap:
-    return record_map(root, root / "out", 1, ["tests/unit"])
+    return record_map(root, root / "out", 0, ["tests/unit"])
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +100,7 @@ def slot(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Slot]
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
-        yield Slot(process, limit=6)
+        yield Slot(process, limit=12)
         assert process.stdin
         process.stdin.close()
 
@@ -106,7 +109,7 @@ def mutant(root: Path, after: str) -> Mutant:
     """The mutant whose changed line reads so."""
     source = (root / PRODUCT).read_bytes()
     mutants = [Mutant("jobs", one, source, one.apply(source)) for one in mutations(PRODUCT, source)]
-    return next(one for one in mutants if one.diff[1] == after)
+    return next(one for one in mutants if one.diff[1] == after and one.diff[0] != "time.sleep(0.01)")
 
 
 def names(*tests: str) -> set[str]:
@@ -152,9 +155,21 @@ def test_a_new_file_of_tests_is_recorded_on_its_own(root: Path, known: LineMap) 
     new = root / "tests/unit/test_new.py"
     new.write_text("import shared.marey.toy as toy\n\ndef test_unused():\n    assert toy.unused(1) == 2\n")
     try:
-        updated = current_map(root, root / "out", 1)
+        updated = current_map(root, root / "out", 0)
     finally:
         new.unlink()
-    assert updated.covering(PRODUCT, [19]) == {"tests/unit/test_new.py::test_unused"}
-    assert updated.covering(PRODUCT, [9]) == names("test_capped")
+    assert updated.covering(PRODUCT, [22]) == {"tests/unit/test_new.py::test_unused"}
+    assert updated.covering(PRODUCT, [11]) == names("test_capped")
     assert len(updated.tests) == len(known.tests) + 1
+
+
+def test_a_run_goes_on_where_it_stopped_and_survivors_meet_new_tests(root: Path, tmp_path: Path) -> None:
+    killed, survived = mutant(root, "LIMIT = 11"), mutant(root, "return x - 1")
+    results = _Results(tmp_path / "results.jsonl")
+    assert not results.holds(killed, ["a"])
+    results.add(killed, ["a"], {"verdict": "killed", "by": "a", "seconds": 1.0})
+    results.add(survived, ["a"], {"verdict": "survived", "by": None, "seconds": 1.0})
+    again = _Results(tmp_path / "results.jsonl")
+    assert again.holds(killed, ["b"])
+    assert again.holds(survived, ["a"])
+    assert not again.holds(survived, ["a", "b"])
