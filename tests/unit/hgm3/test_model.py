@@ -15,6 +15,7 @@ from marey.models.hgm3.model import LossPredictor, MaskedTransformer, ResidualTr
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.motion.features import HUMANML3D_263
 from marey.nn.motion_tokenizer import biased_std
+from marey.nn.ragged import pad_length
 from marey.nn.sampling import guide
 from marey.training.joints import heading_joints, world_joints
 from marey.training.tokenizing import tokenizer_loss
@@ -126,6 +127,22 @@ def test_absent_slots_and_tokens_beyond_the_clip_are_never_read() -> None:
     assert torch.equal(model(tokens, valid, condition, visible, valid, trim=False)[0, :5], first)
     condition[0, 9] = torch.randn(32)
     assert not torch.equal(model(tokens, valid, condition, visible, valid)[0, :5], first)
+
+
+@torch.inference_mode()
+def test_padding_is_computed_only_without_trim() -> None:
+    masked, residual = MaskedTransformer(TINY).eval(), ResidualTransformer(TINY).eval()
+    valid, visible = torch.zeros(1, 40, dtype=torch.bool), torch.zeros(1, 25, dtype=torch.bool)
+    valid[0, :5], visible[0, :3] = True, True
+    lengths: list[int] = []
+    for model in (masked, residual):
+        transformer = model.sequence.transformer
+        transformer.register_forward_pre_hook(lambda _, given: lengths.append(given[0].shape[1]))
+    for trim in (True, False):
+        masked(torch.zeros(1, 40, dtype=torch.long), valid, torch.randn(1, 25, 32), visible, valid, trim=trim)
+        residual(torch.randn(1, 40, 16), valid, torch.tensor([1]), residual.sentence(torch.randn(1, 384)), trim=trim)
+    multiple = masked.sequence.transformer.multiple
+    assert lengths == [pad_length(size, multiple) for size in (5 + 3, 5 + 2, 40 + 25, 40 + 2)]
 
 
 @torch.inference_mode()
