@@ -17,6 +17,9 @@ from tests.mutants.recording import SOURCES
 BUDGET_S = 20.0
 """Seconds that a mutant's tests took when they were recorded: a third of the limit, so that only a hang reaches it."""
 
+WHOLE = {"tables.py": "tests/integration/test_migrations.py"}
+"""Tests that hold a whole kind of file, by its name, to something else, without a use of any name in it."""
+
 
 class Selector:
     """Choose tests for mutations of a checkout."""
@@ -37,10 +40,13 @@ class Selector:
         # The line runs once, when its module is imported: tests that run what uses it stand in.
         if isinstance(chain_of_nodes[0] if chain_of_nodes else None, ast.arguments):
             return self.map.covering(mutation.path, _runtime_lines(chain_of_nodes[1]))
+        whole = {
+            name for name, test in self.map.tests.items() if test.passed and test.file == WHOLE.get(_name(mutation))
+        }
         for names in self._stand_ins(tree, mutation, chain_of_nodes):
             if names:
-                return names
-        return set()
+                return names | whole
+        return whole
 
     def _stand_ins(self, tree: ast.Module, mutation: Mutation, around: list[ast.AST]) -> Iterator[set[str]]:
         for name in _bound_names(tree, mutation.line):
@@ -71,8 +77,8 @@ class Selector:
         by_file: dict[str, list[str]] = defaultdict(list)
         for name in sorted(names, key=lambda name: (self.map.tests[name].seconds, name)):
             by_file[self.map.tests[name].file].append(name)
-        near = sorted(by_file, key=lambda file: (-_nearness(file, path), file))
-        close = [by_file[file] for file in near if _nearness(file, path)]
+        near = sorted(by_file, key=lambda file: (file not in WHOLE.values(), -_nearness(file, path), file))
+        close = [by_file[file] for file in near if file in WHOLE.values() or _nearness(file, path)]
         chosen = self._take(_in_turn(close), [], BUDGET_S / 2)
         chosen = self._take(_in_turn(by_file[file] for file in near), chosen, BUDGET_S)
         return sorted(chosen, key=lambda name: (near.index(self.map.tests[name].file), self.map.tests[name].seconds))
@@ -83,6 +89,10 @@ class Selector:
             if name not in chosen and (not chosen or self.map.cost([*chosen, name]) <= budget):
                 chosen.append(name)
         return chosen
+
+
+def _name(mutation: Mutation) -> str:
+    return Path(mutation.path).name
 
 
 def _in_turn(files: Iterable[list[str]]) -> list[str]:

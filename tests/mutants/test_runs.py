@@ -12,7 +12,7 @@ import pytest
 
 from tests.mutants.__main__ import Slot, _Baseline, _judge, _Results
 from tests.mutants.drawing import Mutant
-from tests.mutants.mapping import LineMap, current_map, record_map
+from tests.mutants.mapping import LineMap, RecordedTest, current_map, record_map
 from tests.mutants.operators import mutations
 from tests.mutants.selection import Selector
 
@@ -126,6 +126,15 @@ def test_a_line_that_runs_on_import_gets_the_tests_of_its_users(root: Path, know
     select = Selector(root, known).select
     assert set(select(mutant(root, "LIMIT = 11").mutation)) == names("test_capped")
     assert set(select(mutant(root, "def double(x, times=3):").mutation)) == names("test_wide", "test_only_elsewhere")
+
+
+def test_a_table_is_held_to_the_migrated_schema(tmp_path: Path) -> None:
+    path, file = "shared/marey/toy/tables.py", "tests/integration/test_migrations.py"
+    (tmp_path / path).parent.mkdir(parents=True)
+    (tmp_path / path).write_text("table = Table(Column(Id, primary_key=True))\n")
+    known = LineMap("", {f"{file}::test_same": RecordedTest(file, 1.0, (), passed=True)}, {}, {})
+    for mutation in mutations(path, (tmp_path / path).read_bytes()):
+        assert Selector(tmp_path, known).select(mutation) == [f"{file}::test_same"]
 
 
 def test_the_map_is_read_as_it_was_written(tmp_path: Path, known: LineMap) -> None:
