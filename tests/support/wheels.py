@@ -86,10 +86,10 @@ class Environment:
 
 
 def install_from_index(folder: Path, requirements: Iterable[str], *, seconds: float) -> Environment:
-    """Make an environment into which pip installs these and what they require, from the package index."""
-    _run([sys.executable, "-m", "venv", "--without-pip", str(folder)])
+    """Make an environment whose pip installs these and what they require, from the package index."""
+    _run([sys.executable, "-m", "venv", str(folder)])
     made = Environment(folder)
-    _run([sys.executable, "-m", "pip", "--python", made.python, "install", "-q", *requirements], seconds)
+    _run([made.python, "-m", "pip", "install", "-q", *requirements], seconds)
     _close_checkout(made, made.folder)
     return made
 
