@@ -47,7 +47,7 @@ class RequestedFile:
     if_range: Annotated[str | None, Header(alias="If-Range")] = None
     if_none_match: Annotated[str | None, Header(alias="If-None-Match")] = None
     redirect: Annotated[
-        bool, Query(description="False = this server sends the content, also where it could redirect to a bucket.")
+        bool, Query(description="False = this server sends the content, even if it could redirect to a bucket.")
     ] = True
 
 

@@ -44,7 +44,7 @@ class FieldProblem(BaseModel):
     """One problem of a request."""
 
     line: int | None = Field(default=None, description="Line of the body, from 1; for `items`, the element's number.")
-    field: str | None = Field(default=None, description="The field it is about.")
+    field: str | None = Field(default=None, description="Name of the field.")
     message: str
 
 
@@ -69,11 +69,11 @@ class ProblemBody(BaseModel):
     type: str = Field(description=f"Stable: `{TYPE_PREFIX}` and a name such as `invalid-input`.")
     title: str
     status: int
-    detail: str = Field(description="What was wrong.")
-    where: str | None = Field(default=None, description="What it is about.")
-    hint: str | None = Field(default=None, description="What to do about it.")
-    problems: list[FieldProblem] | None = Field(default=None, description="The first 1,000 of them.")
-    total: int | None = Field(default=None, description="How many there are in all.")
+    detail: str = Field(description="What is wrong.")
+    where: str | None = Field(default=None, description="Field, file or object that the problem concerns.")
+    hint: str | None = Field(default=None, description="How to resolve it.")
+    problems: list[FieldProblem] | None = Field(default=None, description="The first 1,000 problems.")
+    total: int | None = Field(default=None, description="Total number of problems.")
     quota: QuotaBody | None = Field(default=None, description="Of `quota`: which one, and what is left.")
 
 

@@ -55,7 +55,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         pattern=r"^[\x21-\x7e]+$",
-        description="The same key and body within 24 hours give what the first one made; another body is refused.",
+        description="The same key and body within 24 hours return the first result; another body is refused.",
     ),
 ]
 

@@ -39,21 +39,23 @@ EVENT_STREAMS = Gauge("marey_open_event_streams", "Clients that follow a job.", 
 # --- the API: database figures, read at each scrape ---
 
 QUEUE = ("queue", "tenant")
-WAITING = Gauge("marey_waiting_items", "Ready items of jobs that run.", QUEUE, registry=API)
+WAITING = Gauge("marey_waiting_items", "Ready items of running jobs.", QUEUE, registry=API)
 RUNNING = Gauge("marey_running_items", "Items under a lease.", QUEUE, registry=API)
 OLDEST = Gauge("marey_oldest_waiting_seconds", "Age of the oldest ready item.", QUEUE, registry=API)
 UNSERVED = Gauge("marey_unserved_seconds", "Longest time that ready items waited for any claim.", QUEUE, registry=API)
-WORKERS = Gauge("marey_live_workers", "Workers seen lately, by queue.", ("queue",), registry=API)
+WORKERS = Gauge("marey_live_workers", "Live workers, by queue.", ("queue",), registry=API)
 SCHEDULERS = Gauge(
     "marey_scheduler_silent_seconds",
-    "Time since a scheduler last made progress in all its parts, by host.",
+    "Time since the last progress of all parts of a scheduler, by host.",
     ("host",),
     registry=API,
 )
 STREAMS = Gauge("marey_streams", "Open live streams, by state.", ("state",), registry=API)
-WEBHOOKS_PENDING = Gauge("marey_webhooks_pending", "Deliveries still to be made.", registry=API)
-WEBHOOKS_OVERDUE = Gauge("marey_webhooks_overdue_seconds", "How late the next delivery is.", registry=API)
-CANCELLED = Counter("marey_cancelled_items", "Items that operators cancelled.", registry=API)
+WEBHOOKS_PENDING = Gauge("marey_webhooks_pending", "Pending webhook deliveries.", registry=API)
+WEBHOOKS_OVERDUE = Gauge(
+    "marey_webhooks_overdue_seconds", "Seconds by which the next delivery is overdue.", registry=API
+)
+CANCELLED = Counter("marey_cancelled_items", "Items cancelled by operators.", registry=API)
 
 # --- workers ---
 
@@ -69,14 +71,14 @@ STAGE_SECONDS = Histogram(
 )
 ITEMS = Counter(
     "marey_items",
-    "Items that came out of a worker, by the state they went to: ready are tried again.",
+    "Items processed by workers, by new state: ready ones are retried.",
     ("queue", "state"),
     registry=WORKER,
 )
 THROWN_AWAY = Counter(
-    "marey_results_thrown_away", "Results that nobody wanted: lease lost or cancelled.", ("queue",), registry=WORKER
+    "marey_results_thrown_away", "Discarded results: lease lost or cancelled.", ("queue",), registry=WORKER
 )
-OUTAGES = Counter("marey_outages", "Times a worker gave items back uncounted.", ("queue",), registry=WORKER)
+OUTAGES = Counter("marey_outages", "Times a worker released items uncounted.", ("queue",), registry=WORKER)
 GPU_MEMORY = Gauge(
     "marey_gpu_memory_bytes",
     "Memory of the device: allocated and reserved by this worker, free and total of all.",
@@ -87,16 +89,16 @@ LIVE.register(GPU_MEMORY)
 
 # --- live workers ---
 
-LIVE_STREAMS = Gauge("marey_live_streams", "Streams that this worker shows.", registry=LIVE)
-LIVE_FRAMES = Counter("marey_live_frames", "Frames that Redis has got.", registry=LIVE)
+LIVE_STREAMS = Gauge("marey_live_streams", "Streams of this worker.", registry=LIVE)
+LIVE_FRAMES = Counter("marey_live_frames", "Frames written to Redis.", registry=LIVE)
 LIVE_TICK_SECONDS = Histogram(
     "marey_live_tick_seconds",
     "Time to make one frame of every stream.",
     buckets=(0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.075, 0.1, 0.2, 0.5, 1.0),
     registry=LIVE,
 )
-LIVE_LATE = Counter("marey_live_late", "Times the clock of the frames was set anew: too slow.", registry=LIVE)
-LIVE_LOST = Counter("marey_live_leases_lost", "Streams that went to another worker.", registry=LIVE)
+LIVE_LATE = Counter("marey_live_late", "Times the frame clock was reset: too slow.", registry=LIVE)
+LIVE_LOST = Counter("marey_live_leases_lost", "Streams lost to another worker.", registry=LIVE)
 
 # --- the scheduler ---
 
@@ -106,18 +108,18 @@ ROUNDS = Counter(
     ("part", "outcome"),
     registry=SCHEDULER,
 )
-HINTS = Counter("marey_hints", "Hints that the relay sent, by queue.", ("queue",), registry=SCHEDULER)
-LEASES_LOST = Counter("marey_leases_lost", "Leases of workers that fell silent, taken back.", registry=SCHEDULER)
+HINTS = Counter("marey_hints", "Hints sent by the relay, by queue.", ("queue",), registry=SCHEDULER)
+LEASES_LOST = Counter("marey_leases_lost", "Expired leases reclaimed from silent workers.", registry=SCHEDULER)
 SWEPT = Counter(
     "marey_swept_items",
-    "Items of lost leases, by the state they went to: ready or dead.",
+    "Items of lost leases, by new state: ready or dead.",
     ("state",),
     registry=SCHEDULER,
 )
 WEBHOOKS = Counter(
-    "marey_webhook_tries", "Tries to tell a webhook: delivered, retried or failed.", ("outcome",), registry=SCHEDULER
+    "marey_webhook_tries", "Webhook delivery attempts: delivered, retried or failed.", ("outcome",), registry=SCHEDULER
 )
-WEBHOOK_SECONDS = Histogram("marey_webhook_seconds", "Time of a try.", registry=SCHEDULER)
+WEBHOOK_SECONDS = Histogram("marey_webhook_seconds", "Duration of an attempt.", registry=SCHEDULER)
 
 # --- all processes ---
 

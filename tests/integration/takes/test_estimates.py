@@ -113,7 +113,7 @@ def test_the_command_line_says_where_the_number_comes_from(api: LiveApi, marey: 
     ran = marey("submit", "a person waves", "--variants", 100, "--dry-run", "--json").ok()
     assert "about 50 s, behind 300 that wait now" in ran.err
     assert "0.5 s a motion, measured on the last 4 of hgm3-paperclip@" in ran.err
-    assert "no hgm3 worker lives: one reckoned" in ran.err
+    assert "no live hgm3 worker: one assumed" in ran.err
     assert (ran.lines[0]["estimate"]["seconds"], ran.lines[0]["waiting"]) == (50.0, 300)
     shown = marey("jobs", "show", job).ok().out
     assert "0 items of 0 jobs come first" in shown

@@ -30,7 +30,9 @@ class MetricChangeView(View):
     metric: str
     before: float
     after: float
-    low: float = Field(description="Of the 95 % interval of after - before, by paired bootstrap over the prompts.")
+    low: float = Field(
+        description="Lower end of the 95 % interval of after - before, by paired bootstrap over the prompts."
+    )
     high: float
     prompts: int
     motions: int

@@ -41,20 +41,20 @@ class EvaluationFields(BaseModel):
 
     bundle: str = Field(pattern=BUNDLE, max_length=200, description="Model, bundle or exact bundle that generates.")
     evaluator: str | None = Field(
-        None, pattern=BUNDLE, max_length=200, description="Bundle that measures; none given = the one that is here."
+        None, pattern=BUNDLE, max_length=200, description="Bundle that measures; default: the only one on the server."
     )
     split: Literal["test", "compositional", "test+compositional"] | None = Field(
         None, description="Captions that the evaluator's bundle carries, of a split or of both. Else give `prompts`."
     )
     source: Annotated[str, Field(min_length=1, max_length=MAX_NAME), FreeText()] | None = Field(
-        None, description="What the prompts are called in reports."
+        None, description="Name of the prompts in reports."
     )
     settings: dict[str, Any] | None = Field(
         None, description="Sampling settings, such as `guidance`.", json_schema_extra=SAMPLING
     )
     repeats: int = Field(1, ge=1, le=MAX_VARIANTS, description="Motions of each prompt.")
     seed: int = Field(
-        0, ge=0, le=MAX_SEED, description="Of the first motion; motion k uses seed + k: equal runs are comparable."
+        0, ge=0, le=MAX_SEED, description="Seed of the first motion; motion k uses seed + k: equal runs are comparable."
     )
     baseline: UUID | None = Field(None, description="An evaluation of the same prompts to compare with.")
 
@@ -92,10 +92,10 @@ class EvaluationJobView(View):
 class RequestView(View):
     """Subject and parameters of an evaluation."""
 
-    bundle: str = Field(description="Exact since its motions were asked for; in a schedule, the name that was given.")
+    bundle: str = Field(description="Exact since generation started; in a schedule, the given name.")
     model: str | None
     evaluator: str | None
-    source: str = Field(description="A split of the evaluator's bundle, or what its prompts are called.")
+    source: str = Field(description="A split of the evaluator's bundle, or the name of its prompts.")
     settings: dict[str, float]
     repeats: int
     seed: int
@@ -113,18 +113,18 @@ class EvaluationView(View):
 
     id: UUID
     schedule: UUID | None
-    due: datetime | None = Field(description="The time of its schedule that it stands for; null = it was asked for.")
+    due: datetime | None = Field(description="Due time of its schedule; null = requested directly.")
     name: str | None
     comment: str | None
     state: EvaluationState
-    reason: str = Field(description="Why it came to this state.")
+    reason: str = Field(description="Reason of the current state.")
     request: RequestView
-    prompts: int | None = Field(description="How many; null while they were not looked up.")
+    prompts: int | None = Field(description="Number of prompts; null until they are resolved.")
     prompts_sha256: str | None
     generation: EvaluationJobView | None
     scoring: EvaluationJobView | None
     summary: dict[str, float | None] | None
-    regressed: bool | None = Field(description="Worse than what it was compared with; null = nothing to compare with.")
+    regressed: bool | None = Field(description="True if worse than the baseline; null = no baseline.")
     reports: list[FileView] = Field(description="`GET /v1/evaluations/{id}/report/{format}` gives each.")
     created: datetime
     started: datetime | None
@@ -148,7 +148,7 @@ class EvaluationDetailView(EvaluationView):
     """An evaluation with its history."""
 
     events: list[EvaluationEventView]
-    waits_for: str | None = Field(description="What it cannot go on without: a queue that no living worker serves.")
+    waits_for: str | None = Field(description="The queue that it waits for, because no live worker serves it.")
 
     @classmethod
     def detail(

@@ -14,8 +14,10 @@ class SpeedView(View):
     """Measured speed of a bundle on this platform."""
 
     bundle: str
-    motions: int = Field(description="How many it was measured on, of the last 2,000 that were made.")
-    seconds: float = Field(description="Of a worker for one motion, without reading the prompt and writing the files.")
+    motions: int = Field(description="Number of measured motions, of the last 2,000.")
+    seconds: float = Field(
+        description="Seconds of a worker per motion, without parsing the prompt and writing the files."
+    )
     since: datetime
     until: datetime
 
@@ -29,11 +31,11 @@ class EstimateView(View):
     """Expected duration of motions, excluding time in the queue."""
 
     items: int
-    seconds: float | None = Field(description="Null = there is no measure of some bundle.")
-    workers: dict[str, int] = Field(description="Those that live, by model; where none does, one is reckoned with.")
+    seconds: float | None = Field(description="Null = some bundle was not measured.")
+    workers: dict[str, int] = Field(description="Live workers, by model; at least one is assumed.")
     speeds: list[SpeedView]
-    unmeasured: list[str] = Field(description="Bundles with which none of the last motions was made.")
-    basis: str = Field(description="Where the number comes from, or why there is none, for a person.")
+    unmeasured: list[str] = Field(description="Bundles without a recent motion.")
+    basis: str = Field(description="Basis of the estimate, or why there is none, for people.")
 
     @classmethod
     def of(cls, row: Estimate) -> EstimateView:
@@ -52,11 +54,11 @@ class QueueView(View):
     """Position of a job in the queue."""
 
     state: JobState
-    jobs_ahead: int = Field(description="Of the same tenant, with items that wait: of higher priority, or older.")
+    jobs_ahead: int = Field(description="Jobs of the same tenant with waiting items: of higher priority, or older.")
     items_ahead: int
-    tenants: int = Field(description="Who wait for the same workers, this one too: they take turns.")
-    seconds: float | None = Field(description="Until it is done; null = ended, paused or not measured.")
-    estimate: EstimateView = Field(description="Of its own open items.")
+    tenants: int = Field(description="Tenants that wait for the same workers, including this one: they take turns.")
+    seconds: float | None = Field(description="Seconds until it is done; null = ended, paused or not measured.")
+    estimate: EstimateView = Field(description="Estimate for its own open items.")
 
     @classmethod
     def of(cls, row: QueuePlace) -> QueueView:
@@ -78,7 +80,7 @@ def basis_of(row: Estimate) -> str:
         for speed in row.speeds
     ]
     workers = [
-        f"{count} {name} workers" if count else f"no {name} worker lives: one reckoned"
+        f"{count} {name} workers" if count else f"no live {name} worker: one assumed"
         for name, count in row.workers.items()
     ]
     return "; ".join((*parts, *workers))

@@ -47,7 +47,7 @@ JSON = "application/json"
 SSE = "text/event-stream"
 
 
-Reason = Annotated[schemas.Reason | None, Query(description="Why; it stands in the job's events.")]
+Reason = Annotated[schemas.Reason | None, Query(description="Reason, recorded in the job's events.")]
 
 
 @router.post(
@@ -274,7 +274,9 @@ def list_items(
     conn: Connection,
     key: Reader,
     state: Annotated[list[jobs.ItemState] | None, Query()] = None,
-    review: Annotated[list[jobs.Review] | None, Query(description="Those of whose motion it was said.")] = None,
+    review: Annotated[
+        list[jobs.Review] | None, Query(description="Only items whose motion has one of these review states.")
+    ] = None,
     cursor: Cursor = None,
     limit: Limit = 100,
 ) -> PageView[ItemView]:
@@ -298,7 +300,7 @@ def list_job_motions(
     response_model=EventsView,
     responses={
         200: {"content": {SSE: {"schema": {"type": "string"}}}, "description": "Events, as a page or as a stream"},
-        204: {"description": "The job has ended and every event was sent: do not come back"},
+        204: {"description": "The job has ended and every event was sent: do not reconnect"},
     },
 )
 def list_events(
@@ -309,7 +311,7 @@ def list_events(
     key: Reader,
     after: Annotated[int, Query(ge=0, le=MAX_SEQ, description="Events with a greater `seq`.")] = 0,
     limit: Limit = 500,
-    last: Annotated[str | None, Header(alias="Last-Event-ID", description="Wins over `after`; for streams.")] = None,
+    last: Annotated[str | None, Header(alias="Last-Event-ID", description="Overrides `after`; for streams.")] = None,
 ) -> Response:
     """List events after a `seq`: a page of JSON, or a stream where `Accept` asks for `text/event-stream`.
 

@@ -27,11 +27,11 @@ class NewItemBody(BaseModel):
     prompt: str = Field(description="What the person does, in English, at most 200 words.", json_schema_extra=PROMPT)
     name: str | None = Field(
         None,
-        description="Of the motion, in any script; clients derive its file name from it.",
+        description="Name of the motion, in any script; clients derive its file name from it.",
         json_schema_extra=ITEM_NAME,
     )
     seconds: float | None = Field(None, ge=MIN_SECONDS, le=MAX_SECONDS, description="None = the model decides.")
-    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Of variant 0; variant k uses seed + k.")
+    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Seed of variant 0; variant k uses seed + k.")
     variants: int | None = Field(None, ge=1, le=MAX_VARIANTS)
     model: str | None = Field(None, description="Model, bundle or exact bundle.", json_schema_extra=ITEM_MODEL)
     tags: list[str] | None = Field(None, max_length=MAX_TAGS, json_schema_extra=TAGS)
@@ -49,7 +49,7 @@ class JobFields(BaseModel):
     comment: Comment | None = None
     priority: int = Field(0, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
     fail_early: float | None = Field(
-        None, ge=0, le=1, description="Share of failed items above which the rest is cancelled."
+        None, ge=0, le=1, description="Ratio of failed items above which open items are cancelled."
     )
     keep_days: int | None = Field(
         None, ge=1, le=MAX_KEEP_DAYS, description="Days after its end when the job is deleted, with motions and files."
@@ -70,7 +70,7 @@ class JobPatch(BaseModel):
     priority: int | None = Field(None, ge=-MAX_PRIORITY, le=MAX_PRIORITY)
     comment: Comment | None = None
     fail_early: float | None = Field(
-        None, ge=0, le=1, description="Share of failed items above which the rest is cancelled; null = none."
+        None, ge=0, le=1, description="Ratio of failed items above which open items are cancelled; null = off."
     )
 
 
@@ -82,8 +82,10 @@ class CheckedView(View):
     """Number of motions."""
     bundles: list[str]
     estimate: EstimateView
-    quotas: list[QuotaBody] = Field(description="Those the tenant has, of queued items and of bytes; with room for it.")
-    waiting: int = Field(description="Items that wait for the same models now, or to be read, whoever's.")
+    quotas: list[QuotaBody] = Field(
+        description="The tenant's quotas of queued items and of bytes, with the capacity left."
+    )
+    waiting: int = Field(description="Items of all tenants that wait for the same models, or to be parsed.")
 
 
 class CountersView(View):
@@ -114,8 +116,8 @@ class JobView(View):
     started: datetime | None
     finished: datetime | None
     keep_days: int | None
-    expires: datetime | None = Field(description="When it is deleted; null = never, or not before it ends.")
-    erased: datetime | None = Field(description="When its prompts were erased.")
+    expires: datetime | None = Field(description="Time of deletion; null = never, or not before it ends.")
+    erased: datetime | None = Field(description="Time when its prompts were erased.")
 
     @classmethod
     def of(cls, row: JobRow) -> JobView:
@@ -130,7 +132,7 @@ class ErasureView(View):
 
     job: UUID
     erased: datetime
-    files_left: int = Field(description="Files that are still to be written anew; nobody gets them before.")
+    files_left: int = Field(description="Files that still wait to be rewritten; they are not served before.")
 
 
 class ErrorView(View):
@@ -170,7 +172,7 @@ class ItemView(View):
     error: ErrorView | None
     created: datetime
     finished: datetime | None
-    replaces: UUID | None = Field(description="The motion that it is another take of.")
+    replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
     motion: MotionView | None
 
     @classmethod

@@ -44,14 +44,14 @@ class MatchView(View):
 class ResolutionView(View):
     """The match of a reference."""
 
-    matches: list[MatchView] = Field(description="Newest first. None: nothing; several: it is ambiguous. At most 10.")
+    matches: list[MatchView] = Field(description="Newest first. None: not found; several: ambiguous. At most 10.")
 
 
 @router.get("")
 def resolve(
     conn: Connection,
     key: Reader,
-    kind: Annotated[AskedKind, Query(description="What it refers to. A delivery needs `webhook`.")],
+    kind: Annotated[AskedKind, Query(description="Kind of the object. A delivery needs `webhook`.")],
     reference: Annotated[
         str,
         Query(

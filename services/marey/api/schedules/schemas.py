@@ -34,13 +34,13 @@ class ScheduleFields(BaseModel):
     name: Name | None = None
     cron: CronLine | None = Field(None, description=CRON)
     time_zone: Zone | None = Field(None, description=ZONE)
-    paused: bool | None = Field(None, description="What it misses while it is paused is not made up for.")
+    paused: bool | None = Field(None, description="Runs missed while it is paused are skipped.")
 
 
 class SchedulePatch(ScheduleFields):
     """Changes to a schedule; omitted fields stay as they are."""
 
-    request: AskedFields | None = Field(None, description="What is measured, all of it.")
+    request: AskedFields | None = Field(None, description="The complete evaluation request.")
 
 
 class ScheduleView(View):
@@ -51,9 +51,9 @@ class ScheduleView(View):
     cron: str
     time_zone: str
     paused: bool
-    next: datetime | None = Field(description="When it is due; null while it is paused.")
+    next: datetime | None = Field(description="Next due time; null while paused.")
     request: RequestView
-    prompts: int | None = Field(description="How many; null = those that the evaluator's bundle then carries.")
+    prompts: int | None = Field(description="Number of prompts; null = those of the evaluator's bundle at that time.")
     prompts_sha256: str | None
     last: UUID | None = Field(description="Its newest evaluation.")
     last_state: EvaluationState | None

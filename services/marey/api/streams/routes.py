@@ -35,7 +35,7 @@ def list_streams(
     shared: Shared,
     conn: Connection,
     key: Reader,
-    is_open: Annotated[bool, Query(alias="open", description="Those alone that are not over.")] = False,
+    is_open: Annotated[bool, Query(alias="open", description="Only open streams.")] = False,
     cursor: Cursor = None,
     limit: Limit = 50,
 ) -> PageView[StreamView]:

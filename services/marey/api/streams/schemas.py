@@ -25,7 +25,7 @@ from marey.streams import StreamPrompt, StreamRow, StreamState
 MIN_SECONDS, MAX_SECONDS = 1.0, 600.0
 DIGITS = 6
 """Digits of offsets: a thousandth of a millimetre."""
-GONE = "null when the bundle is no longer here."
+GONE = "null if the bundle no longer exists on the server."
 
 
 class NewStreamBody(BaseModel):
@@ -39,15 +39,15 @@ class NewStreamBody(BaseModel):
         json_schema_extra=PROMPT,
     )
     name: str | None = Field(
-        None, description="File name of the clip, without its ending.", json_schema_extra=ITEM_NAME
+        None, description="File name of the clip, without its extension.", json_schema_extra=ITEM_NAME
     )
     model: str = Field(
         defaults.LIVE_MODEL,
         description="Model, bundle or exact bundle that can make motion frame by frame.",
         json_schema_extra=ITEM_MODEL,
     )
-    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Drawn when not given.")
-    seconds: float = Field(MAX_SECONDS, ge=MIN_SECONDS, le=MAX_SECONDS, description="After which it ends by itself.")
+    seed: int | None = Field(None, ge=0, le=MAX_SEED, description="Random by default.")
+    seconds: float = Field(MAX_SECONDS, ge=MIN_SECONDS, le=MAX_SECONDS, description="Seconds after which it ends.")
 
 
 class SkeletonView(View):
@@ -86,11 +86,11 @@ class Made:
 class PromptView(View):
     """A prompt, and the frame from which it is in force."""
 
-    number: int = Field(description="As in frames: from 0; each steer counts one on.")
+    number: int = Field(description="Number as in frames, from 0; each steer adds one.")
     frame: int
     prompt: str
-    rewritten: str | None = Field(description="As it was read; null where that is not on record.")
-    not_rewritten: str | None = Field(description="Why what the rewriter made of it was not used.")
+    rewritten: str | None = Field(description="Text that the model received; null if not recorded.")
+    not_rewritten: str | None = Field(description="Reason why a rewrite was not used.")
 
     @classmethod
     def of(cls, number: int, told: StreamPrompt) -> PromptView:
@@ -110,13 +110,13 @@ class StreamView(View):
     licence: str | None = Field(description=f"Terms of the weights; {GONE}")
     seed: int
     state: StreamState
-    position: int | None = Field(description="How many wait before it; null when it does not wait.")
-    reason: str | None = Field(description="Why it is over.")
+    position: int | None = Field(description="Number of streams before it; null if it does not wait.")
+    reason: str | None = Field(description="Reason of its end.")
     error: ErrorView | None
     fps: float | None = Field(description=f"Frames a second; {GONE}")
-    frames: int = Field(description="How many are on record: a second less than were shown, at most.")
+    frames: int = Field(description="Recorded frames: at most a second less than shown.")
     max_frames: int
-    job: UUID | None = Field(description="Makes the clip.")
+    job: UUID | None = Field(description="Job of the clip.")
     created: datetime
     started: datetime | None
     ended: datetime | None
@@ -131,7 +131,7 @@ class StreamDetailView(StreamView):
     """A live stream with its recorded prompts and its skeleton."""
 
     prompts: list[PromptView]
-    skeleton: SkeletonView | None = Field(description=f"What the frames drive; {GONE}")
+    skeleton: SkeletonView | None = Field(description=f"Skeleton of the frames; {GONE}")
 
     @classmethod
     def detail(cls, row: StreamRow, made: Made, prompts: Sequence[StreamPrompt]) -> StreamDetailView:

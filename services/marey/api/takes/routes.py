@@ -42,13 +42,13 @@ def motion_filter(
     ] = None,
     name: Annotated[
         Annotated[str, Field(min_length=1, max_length=MAX_NAME), FreeText()] | None,
-        Query(description="How the name begins."),
+        Query(description="Prefix of the name."),
     ] = None,
     text: Annotated[
         Annotated[str, Field(min_length=1, max_length=500), FreeText(lines=True)] | None,
         Query(description='Words of the prompt in any form; `"a phrase"`, `or`, `-not`.'),
     ] = None,
-    review: Annotated[list[ReviewFilter] | None, Query(description="One of these was said of it.")] = None,
+    review: Annotated[list[ReviewFilter] | None, Query(description="One of these review states.")] = None,
 ) -> takes_store.MotionFilter:
     """Filters of a motion listing; all given ones must match."""
     said = review or []

@@ -40,7 +40,7 @@ class NewReviewBody(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     motions: Motions
-    verdict: Verdict | None = Field(description="Null takes back what was said.")
+    verdict: Verdict | None = Field(description="Null removes the verdict.")
     comment: Comment | None = None
 
 
@@ -61,7 +61,7 @@ class RerollView(View):
     job: UUID
     seed: int
     state: ItemState
-    made: bool = Field(description="False: it was asked for before.")
+    made: bool = Field(description="False if it existed before.")
 
     @classmethod
     def of(cls, row: Reroll) -> RerollView:
@@ -105,8 +105,8 @@ class MotionView(View):
     files: list[FileView]
     created: datetime
     review: ReviewView | None
-    replaces: UUID | None = Field(description="The motion that it is another take of.")
-    replaced_by: UUID | None = Field(description="The item that is another take of it.")
+    replaces: UUID | None = Field(description="Replaced motion of a re-roll.")
+    replaced_by: UUID | None = Field(description="Item of its re-roll.")
 
     @classmethod
     def of(cls, row: MotionRow) -> MotionView:

@@ -72,7 +72,7 @@ def rotate_webhook(
     conn: Connection,
     key: Operator,
     overlap_hours: Annotated[
-        float, Query(ge=0, le=720, description="The secret in force now signs as well for so long; 0 = no more.")
+        float, Query(ge=0, le=720, description="The current secret also signs for this long; 0 = not at all.")
     ] = 24,
 ) -> MadeWebhookView:
     """Sign with a new secret. The answer has it, and only this one; until the overlap ends messages carry two

@@ -13,7 +13,7 @@ from marey.webhooks import AttemptRow, DeliveryRow, DeliveryState, EventKind, We
 from marey.webhooks.addresses import MAX_URL
 
 URL = "Where messages are sent: https, at an address that MAREY_WEBHOOK_ALLOW permits."
-PAUSED = "While it is paused its messages wait."
+PAUSED = "Its messages wait while it is paused."
 Url = Annotated[str, Field(min_length=1, max_length=MAX_URL), FreeText()]
 
 
@@ -24,7 +24,7 @@ class NewWebhookBody(BaseModel):
 
     url: Url = Field(description=URL)
     events: list[EventKind] = Field(
-        default_factory=lambda: list(EventKind), min_length=1, description="What it is told of; none given = all."
+        default_factory=lambda: list(EventKind), min_length=1, description="Subscribed events; default: all."
     )
     name: Name | None = None
 
@@ -48,8 +48,8 @@ class WebhookView(View):
     url: str
     events: list[EventKind]
     paused: bool = Field(description=PAUSED)
-    pending: int = Field(description="Deliveries that wait for their next try.")
-    failed: int = Field(description="Deliveries of the last 30 days whose tries are used up.")
+    pending: int = Field(description="Deliveries that wait for their next attempt.")
+    failed: int = Field(description="Deliveries of the last 30 days without attempts left.")
     created: datetime
 
     @classmethod
@@ -78,11 +78,11 @@ class DeliveryView(View):
     data: dict[str, Any] = Field(description="Of the event: ids, states, counters.")
     state: DeliveryState
     attempts: int
-    next: datetime | None = Field(description="When it is tried; null once it has ended.")
+    next: datetime | None = Field(description="Time of the next attempt; null once it has ended.")
     created: datetime
     ended: datetime | None
-    status: int | None = Field(description="Of the last try; null = there was no answer.")
-    error: str | None = Field(description="Of the last try; null = none.")
+    status: int | None = Field(description="Status of the last attempt; null = no answer.")
+    error: str | None = Field(description="Error of the last attempt; null = none.")
 
     @classmethod
     def of(cls, row: DeliveryRow) -> DeliveryView:
