@@ -34,7 +34,7 @@ from tests.support.marey import REPOSITORY, Marey, Serving, serving, socket_of
 STREAMS = 20
 KILLS = 5
 WARM_SECONDS = 20.0
-"""What a live worker takes to load, on a slow machine."""
+"""Seconds that a live worker takes to load on a slow machine."""
 PATIENCE = 120.0
 PROMPT = {"prompt": "a person walks forward"}
 

@@ -23,7 +23,7 @@ from marey.tenants import Quotas, create_tenant, usage
 MANY, FEW = 50_000, 5
 WORKERS, BATCH = 4, 32
 BATCH_SECONDS = 0.25
-"""What a worker of this benchmark needs for a batch."""
+"""Seconds per batch of a worker of this benchmark."""
 ROUNDS = 15
 FILES = 200_000
 

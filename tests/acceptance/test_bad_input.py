@@ -152,7 +152,7 @@ def test_a_home_that_cannot_be_written(offline: Marey, tmp_path: Path) -> None:
 
 
 def test_no_prompt_both_kinds_of_prompt_and_a_missing_file(marey: Marey, tmp_path: Path) -> None:
-    marey("submit").refused(2, "there is no prompt", "-f")
+    marey("submit").refused(2, "no prompt is given", "-f")
     marey("submit", "a person waves", "-f", "p.csv").refused(2, "both PROMPT and -f")
     marey("submit", "-f", tmp_path / "none.csv").refused(3, "none.csv", "no such file")
     marey("submit", "-f", "-", stdin="").refused(2, "no prompt")

@@ -162,7 +162,7 @@ class Breaker:
         self._start[name]()
 
     def _freeze(self, fault: Fault) -> None:
-        """SIGSTOP for longer than a lease lasts: it wakes up, and what it holds is somebody else's."""
+        """SIGSTOP for longer than a lease lasts: after it wakes up, its items belong to another worker."""
         name = self._some_worker()
         status = read_status(self._cluster.home, name)
         if status is None or not self._cluster.child(name):

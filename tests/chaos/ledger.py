@@ -127,7 +127,7 @@ def _items_wrong(conn: sa.Connection) -> Iterator[str]:
 
 
 def _harmless_wrong(conn: sa.Connection) -> Iterator[str]:
-    """Outages cost nobody a motion: what is harmless fails never, and dies only by workers lost under it alone."""
+    """Outages cost no motion: harmless items never fail, and die only by workers lost under them alone."""
     query = """
         SELECT id, state, problem FROM item WHERE prompt LIKE 'walk%'
         AND (state = 'failed' OR state = 'dead' AND problem ->> 'type' <> 'worker-lost')

@@ -73,7 +73,7 @@ class Plan:
     operator_pause: float = 2.0
 
 
-class Watch(threading.Thread):
+class TenantMonitor(threading.Thread):
     """Looks four times a second whether any tenant has more than it may, and starts again what ended by itself, as a
     supervisor does.
 
@@ -143,7 +143,7 @@ class Run:
                 for n in range(plan.workers)
             },
         }
-        self.watch = Watch(cluster, self._start, self._hands)
+        self.watch = TenantMonitor(cluster, self._start, self._hands)
         # No worker serves its queue: it stays open, for events that a fault must not hold up.
         self._probed = submit_toys(cluster.engine, ["probe"])
         with transaction(cluster.engine) as conn:
@@ -374,7 +374,7 @@ def environment(place: Place, home: Path, port: int, plan: Plan) -> dict[str, st
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports that nobody listens at, outside of those that connections are given: they must be free after each kill."""
+    """Unused ports outside the range of connections: they must be free after each kill."""
     found: list[int] = []
     while len(found) < count:
         port = random.randrange(20_000, 32_000)

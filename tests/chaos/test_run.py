@@ -60,7 +60,7 @@ def long_plan(seed: int) -> Plan:
         tenants={
             "north": (0.4, Quota(queued=max(400, round(2000 * scale)), running=64)),
             "south": (0.3, Quota(queued=max(400, round(1000 * scale)), files=max(600, round(2800 * scale)))),
-            "east": (0.33, Quota()),  # more than is left: what south may not have for its bytes, somebody submits
+            "east": (0.33, Quota()),  # more than is left: what south may not have for its bytes, another tenant submits
         },
         toxic=("kill", "hang") * 3,
         workers=4,

@@ -34,42 +34,45 @@ def http(
     write_generator(config.models)
     with running_api(config, module_database_url) as api, api.http() as http:
         missing = http.post("/v1/evaluations", json={"bundle": GENERATOR, "prompts": PROMPTS})
-        assert told(missing) == (422, "evaluator")  # there is none yet
+        assert refusal(missing) == (422, "evaluator")  # there is none yet
         write_evaluator(config.models)
         yield http
 
 
-def told(response: httpx2.Response) -> tuple[int, str]:
+def refusal(response: httpx2.Response) -> tuple[int, str]:
     """The status, and what the problem is about."""
-    assert "/" not in response.json().get("where", ""), response.text  # nobody is told where the server has its files
+    assert "/" not in response.json().get("where", ""), response.text  # paths of the server are not revealed
     return response.status_code, response.json()["where"]
 
 
 @pytest.mark.parametrize("path", WITH_BODY)
 @pytest.mark.parametrize("broken", BROKEN)
 def test_of_a_body_that_cannot_be_read_the_body_is_named(http: httpx2.Client, path: str, broken: str) -> None:
-    assert told(http.post(path, content=BROKEN[broken], headers=JSON)) == (422, "body")
+    assert refusal(http.post(path, content=BROKEN[broken], headers=JSON)) == (422, "body")
 
 
 def test_of_lines_without_a_prompt_the_body_is_named(http: httpx2.Client) -> None:
-    assert told(http.post("/v1/jobs", content=b"\n \n", headers={"Content-Type": "application/x-ndjson"})) == (
+    assert refusal(http.post("/v1/jobs", content=b"\n \n", headers={"Content-Type": "application/x-ndjson"})) == (
         422, "body",
     )  # fmt: skip
 
 
 def test_of_too_many_items_the_first_that_is_one_too_many_is_named(http: httpx2.Client) -> None:
-    assert told(http.post("/v1/jobs", json={"items": [{}] * 100_001})) == (413, "line 100001")
+    assert refusal(http.post("/v1/jobs", json={"items": [{}] * 100_001})) == (413, "line 100001")
 
 
 def test_a_bundle_of_the_wrong_kind_or_of_nobody_is_told_by_the_field_that_names_it(http: httpx2.Client) -> None:
-    assert told(http.get(f"/v1/models/{JUDGE}")) == (422, "name")
-    assert told(http.post("/v1/texts/parse", json={"prompts": ["walk"], "model": "nobody"})) == (404, "model")
+    assert refusal(http.get(f"/v1/models/{JUDGE}")) == (422, "name")
+    assert refusal(http.post("/v1/texts/parse", json={"prompts": ["walk"], "model": "nobody"})) == (
+        404,
+        "model",
+    )
     for model in (JUDGE, "nobody", GENERATOR):
-        assert told(http.post("/v1/streams", json={"prompt": "walk", "model": model})) == (422, "model")
+        assert refusal(http.post("/v1/streams", json={"prompt": "walk", "model": model})) == (422, "model")
     for path, more in (("/v1/evaluations", {}), ("/v1/schedules", {"cron": "0 3 * * 1"})):
         for field, name in (("bundle", JUDGE), ("bundle", "nobody"), ("evaluator", GENERATOR), ("evaluator", "nobody")):
             body = {"bundle": GENERATOR, "prompts": PROMPTS, **more, field: name}
-            assert told(http.post(path, json=body)) == (422, field)
+            assert refusal(http.post(path, json=body)) == (422, field)
 
 
 def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: httpx2.Client) -> None:
@@ -78,11 +81,14 @@ def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: h
     for template, operations in paths.items():
         path = re.sub(r"{\w+}", lambda _: str(uuid4()), template)
         for method in operations:
-            assert told(http.request(method, path, params={"nonsense": "1"})) == (422, "nonsense"), (method, template)
+            assert refusal(http.request(method, path, params={"nonsense": "1"})) == (422, "nonsense"), (
+                method,
+                template,
+            )
 
 
 def test_a_misspelt_filter_is_told_with_those_there_are(http: httpx2.Client) -> None:
     response = http.get("/v1/motions", params={"tags": "show=zzz"})
-    assert told(response) == (422, "tags")
+    assert refusal(response) == (422, "tags")
     assert "tag, text" in response.json()["hint"]
     assert http.get("/v1/motions", params={"tag": "show=zzz"}).json()["items"] == []

@@ -37,7 +37,7 @@ ENDS = {"DELETE", "POST /v1/jobs/{job}/erase"}
 
 @dataclass
 class Place:
-    """A server, what a tenant has on it, and the keys with which nobody may see that."""
+    """A server, what a tenant has on it, and keys without access to it."""
 
     api: LiveApi
     ids: dict[str, str]
@@ -53,7 +53,7 @@ class Place:
 
     @property
     def owner(self) -> dict[str, str]:
-        """Headers of whoever may do everything."""
+        """Headers with all scopes."""
         return {"Authorization": f"Bearer {self.api.key}"}
 
     def knock(self, case: schemathesis.Case, *, again: bool) -> Knock | None:

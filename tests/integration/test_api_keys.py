@@ -18,9 +18,9 @@ from tests.support.live_api import LiveApi
 
 PAGES = {"GET /", "GET /live", "GET /docs", "GET /openapi.json", *(f"GET /docs/{name}" for name in FILES)}
 NOBODYS = {"GET /livez", "GET /readyz", *PAGES}
-"""What wants no key: another one is put here on purpose, or the tests fail."""
+"""Routes without a key: a further one is added here on purpose, or the tests fail."""
 SCOPES = {"GET": "read", "PATCH": "operate", "DELETE": "operate", "POST": "operate"}
-"""What a method wants, but for these."""
+"""Scope that a method requires, except for these."""
 OTHERS = {
     "GET /metrics": "metrics",
     "POST /v1/texts/parse": "read",

@@ -292,7 +292,7 @@ def test_an_item_that_kills_its_worker_dies_and_its_neighbours_succeed(engine: s
         assert (row.succeeded, row.dead, row.state) == (7, 1, JobState.PARTIAL)
         dead = conn.execute(sa.text("SELECT id, attempts, problem FROM item WHERE state = 'dead'")).one()
         assert audit(conn) == []
-    assert losses == 4  # once in company, then as often as there are attempts
+    assert losses == 4  # once in a batch, then as often as there are attempts
     assert (dead.id, dead.attempts) == (toxic, 3)
     assert dead.problem["type"] == "worker-lost"
 

@@ -90,7 +90,7 @@ READ = "0" * 64
 
 def made(engine: sa.Engine, state: JobState) -> UUID:
     """A job in a state, by the steps that lead there."""
-    with transaction(engine) as conn:  # read already, by whoever asked for the same prompts before
+    with transaction(engine) as conn:  # read already, for an earlier request of the same prompts
         read = tables.text_features.insert().values(key=READ, blob=b"toy")
         if conn.execute(sa.select(tables.text_features.c.key)).first() is None:
             conn.execute(read)

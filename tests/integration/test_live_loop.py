@@ -142,7 +142,7 @@ def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, st
     def refusing(prompt: str) -> TextFeatures:
         return replace(parse(prompt), rewritten=prompt, not_rewritten="it changes the verbs")
 
-    def told() -> list[StreamPrompt]:
+    def stream_prompts() -> list[StreamPrompt]:
         with transaction(engine) as conn:
             return prompts_with_rewrites(conn, stream)
 
@@ -150,12 +150,12 @@ def test_how_prompts_were_read_is_on_record_also_after_a_kill(studio: Studio, st
     first = start(parse=rewriting)
     studio.until(lambda: studio.row(stream).frames > 0, "a record")
     studio.send(stream, Control("steer", "a person runs"))
-    studio.until(lambda: len(told()) == 2, "the second prompt's record")
+    studio.until(lambda: len(stream_prompts()) == 2, "the second prompt's record")
     first.kill()
     start(parse=refusing)
     studio.send(stream, Control("steer", "a person bows"))
-    studio.until(lambda: len(told()) == 3, "the third prompt's record")
-    assert [each.read for each in told()] == [
+    studio.until(lambda: len(stream_prompts()) == 3, "the third prompt's record")
+    assert [each.read for each in stream_prompts()] == [
         PromptRewrite("a person walks ahead"),
         PromptRewrite("a person runs ahead"),
         PromptRewrite("a person bows", "it changes the verbs"),

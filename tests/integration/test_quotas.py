@@ -74,7 +74,7 @@ def all_at_once(count: int, act: Callable[[int], object]) -> list[BaseException]
 
 
 def ready_items(count: int, **more: object) -> list[NewItem]:
-    """Items that nobody has to read."""
+    """Items that need no parsing."""
     return [new_item(n, text_key="", **more) for n in range(count)]
 
 

@@ -1,4 +1,4 @@
-"""`/readyz`: answered at once from checks that run in the background; and what nobody without a key is told."""
+"""`/readyz`: answered at once from checks that run in the background; and the details that need a key."""
 
 from __future__ import annotations
 

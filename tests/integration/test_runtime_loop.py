@@ -248,7 +248,7 @@ def test_a_stop_releases_what_is_not_done_and_counts_nothing(
 DRAIN_SECONDS = 0.5
 
 
-class Held(ToyHandler):
+class LeasedBatch(ToyHandler):
     """Hangs, without progress or a look around, until it is let go."""
 
     def __init__(self) -> None:
@@ -264,7 +264,7 @@ def test_results_of_a_lost_lease_are_thrown_away(
     engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
 ) -> None:
     """A worker that slept through its lease (a suspended laptop) must not write over who took over."""
-    toy = Held()
+    toy = LeasedBatch()
     sleeper = make_loop(folder_store, toy, interval=3600.0)
     job = submit_toys(engine, ["walk"] * 3)
     thread = threading.Thread(target=sleeper.run, args=(DRAIN_SECONDS,))
@@ -289,7 +289,7 @@ def test_results_of_a_lost_lease_are_thrown_away(
 def test_a_hung_decode_loop_loses_its_lease(
     engine: sa.Engine, make_loop: Callable[..., Loop], folder_store: FolderStore
 ) -> None:
-    toy = Held()
+    toy = LeasedBatch()
     loop = make_loop(folder_store, toy, rules=Policy(lease=0.4, stall=0.4))
     toy.go_on.set()
     submit_toys(engine, ["walk"])

@@ -44,7 +44,7 @@ def client(url: str, key: str) -> httpx2.Client:
     return httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {key}"}, timeout=30)
 
 
-class Held:
+class LeasedText:
     """Stands for the labeller: requests wait in it until `go`."""
 
     def __init__(self) -> None:
@@ -57,15 +57,15 @@ class Held:
 
 
 @pytest.fixture
-def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[Held]:
-    labeller = Held()
+def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[LeasedText]:
+    labeller = LeasedText()
     monkeypatch.setattr(routes, "parse_prompts", labeller)
     yield labeller
     labeller.go.set()
 
 
 def test_too_much_at_once_is_429_and_everything_else_is_answered_meanwhile(
-    config: Settings, key: str, held: Held
+    config: Settings, key: str, held: LeasedText
 ) -> None:
     patient = config.model_copy(update={"text_seconds": 30.0})
     long = {"prompts": ["a person walks " * 60] * 16}
@@ -93,7 +93,7 @@ def _ends(answer) -> bool:
 
 
 def test_what_is_not_parsed_in_time_is_503_and_holds_its_share_until_it_ends(
-    config: Settings, key: str, held: Held
+    config: Settings, key: str, held: LeasedText
 ) -> None:
     with with_text_service(config) as named, ApiThread(named) as url, client(url, key) as http:
         late = http.post(PATH, json=BODY)
@@ -121,7 +121,9 @@ def test_an_api_without_a_text_service_says_so(config: Settings, key: str) -> No
     assert (answer.status_code, answer.json()["detail"]) == (503, "this server does not parse texts")
 
 
-def test_the_secret_is_wanted_by_the_service_and_checked_by_the_api(config: Settings, key: str, held: Held) -> None:
+def test_the_secret_is_wanted_by_the_service_and_checked_by_the_api(
+    config: Settings, key: str, held: LeasedText
+) -> None:
     held.go.set()
     port = free_ports(1)[0]
     update = {"text_url": f"http://127.0.0.1:{port}", "text_key": SecretStr("right")}

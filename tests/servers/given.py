@@ -1,4 +1,4 @@
-"""Servers that somebody else runs, for tests against another version: what they hold is erased.
+"""External servers, for tests against another version: their content is erased.
 
 `MAREY_TEST_POSTGRES=postgresql+psycopg://superuser@127.0.0.1:5432/postgres` and
 `MAREY_TEST_REDIS=redis://127.0.0.1:6379` take the place of the embedded ones; run with `-n 0`.

@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 LOOPBACK = ["127.0.0.0/8"]
-"""What MAREY_WEBHOOK_ALLOW must name for it."""
+"""Value of MAREY_WEBHOOK_ALLOW for it."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def drip(receiver: Receiver, handler: BaseHTTPRequestHandler, _request: Received
 
 
 def endless(receiver: Receiver, handler: BaseHTTPRequestHandler, _request: Received) -> None:
-    """200, and a body that goes on for as long as somebody reads; a few gigabytes at most."""
+    """200, and a body that goes on for as long as the client reads; a few gigabytes at most."""
     handler.send_response(200)
     handler.end_headers()
     for _ in range(2**12):
@@ -184,7 +184,7 @@ class Authority:
         return self.folder / "ca.pem"
 
     def trusting(self) -> ssl.SSLContext:
-        """A client that trusts it and nobody else."""
+        """A client that trusts it alone."""
         return ssl.create_default_context(cafile=self.file)
 
     def files(self, host: str) -> tuple[Path, Path]:

@@ -34,7 +34,7 @@ class Knock:
         return {} if self.header is None else {"Authorization": self.header}
 
     def check(self, status: int, problem: dict[str, Any]) -> None:
-        """Fail unless the answer says this, and nothing more than may be told to somebody unknown."""
+        """Fail unless the answer says this, and nothing more than an unknown client may learn."""
         assert (status, problem["type"]) == (self.status, f"urn:marey:problem:{self.kind}"), problem
         assert problem["status"] == status
         assert self.says in problem["detail"], problem

@@ -59,7 +59,7 @@ STATES = {
     ("evaluation", "state"): {"planned", "generating", "scoring", "done", "failed", "cancelled"},
     ("webhook_delivery", "state"): {"pending", "delivered", "failed"},
 }
-"""What a fill must hold, by column."""
+"""Required values of a fill, by column."""
 
 
 def fill(engine: sa.Engine) -> None:

@@ -22,7 +22,7 @@ def drift(seed: int, frames: int, columns: int, scale: float, fps: float = 20.0)
 def dancer(
     seed: int = 0, frames: int = 80, skeleton: Skeleton = HUMANML3D
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotations (T, J, 4) and root (T, 3) of somebody who turns, sways and bends knees and elbows."""
+    """Rotations (T, J, 4) and root (T, 3) of a person that turns, sways and bends knees and elbows."""
     vectors = np.zeros((frames, len(skeleton), 3))
     for k, (name, scale) in enumerate(BALL.items()):
         vectors[:, skeleton.index(name)] = drift(10 * seed + k, frames, 3, scale)

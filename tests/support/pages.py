@@ -34,7 +34,7 @@ class Block:
 
     @property
     def script(self) -> str:
-        """What a shell reads: lines with a prompt and their continuations, without the prompt and without output.
+        """Input of a shell: lines with a prompt and their continuations, without the prompt and without output.
 
         A block in which no line has the prompt `$` is typed as root, with the prompt `#`.
         """

@@ -14,7 +14,7 @@ HIPS, KNEES, ANKLES, TOES = [1, 2], [4, 5], [7, 8], [10, 11]
 
 
 def stepping(fps: float = 20.0, seconds: float = 6.0) -> NDArray[np.float64]:
-    """Joints of somebody who walks straight on, whose feet stand still on the floor while they stand, knees bent.
+    """Joints of a person that walks straight on, whose feet stand still on the floor while they stand, knees bent.
 
     Feet are laid down first; the legs follow by two-bone inverse kinematics.
     """

@@ -46,7 +46,7 @@ class Plan:
         waiting: how many go before it; one does each twentieth of a second.
         drops: the socket breaks, without a word, where it would send these frames.
         gaps: how many frames are not sent, told by a `gap`, by the number of the first.
-        silent: the same, told by nobody.
+        silent: the same without a message.
         again: frames that every socket begins before the one that was asked for.
         closes: codes and reasons that the first sockets are closed with.
         fails: the stream fails after so many frames.

@@ -81,7 +81,7 @@ class Walk:
 
 
 class WalkingServer:
-    """Streams walk as long as somebody looks at them.
+    """Streams walk as long as they have a viewer.
 
     Attributes:
         opened: the `from` of every socket that was opened.

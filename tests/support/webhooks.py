@@ -42,7 +42,7 @@ def deliveries(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -
         return list(reversed(list_deliveries(conn, tenant, webhook, limit=1000).rows))
 
 
-def told(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -> list[tuple[str, Any]]:
+def messages_of(engine: sa.Engine, webhook: UUID, tenant: str = DEFAULT_TENANT) -> list[tuple[str, Any]]:
     """Kinds and states of the events for it, the oldest first."""
     return [(row.kind, row.data.get("state")) for row in deliveries(engine, webhook, tenant)]
 

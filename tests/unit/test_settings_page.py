@@ -17,7 +17,7 @@ ROW = re.compile(r"^\| `(MAREY_[A-Z0-9_]+)`( ¹)? \| (.*?) \| .* \|$", re.MULTIL
 ROWS = {name: (bool(by_file), default) for name, by_file, default in ROW.findall(PAGE)}
 READ = re.compile(r"environ(?:\.get\(|\[)\s*\"(MAREY_[A-Z0-9_]+)\"")
 OURS = {ROLE_VARIABLE, NAME_VARIABLE}
-"""What a worker tells its own child."""
+"""Variables that a worker sets for its own child."""
 
 
 def read_by_hand() -> set[str]:
@@ -26,7 +26,7 @@ def read_by_hand() -> set[str]:
     return {name for path in sources for name in READ.findall(path.read_text(encoding="utf-8"))}
 
 
-def told(value: object) -> str:
+def written(value: object) -> str:
     """A default as the page writes it."""
     return value if isinstance(value, str) else json.dumps(value)
 
@@ -46,7 +46,7 @@ def test_the_defaults_are_those_of_the_code() -> None:
         default = field.default
         if default is None or name in ("home", "models"):
             continue
-        shown = f"{default:g}" if isinstance(default, float) else told(default)
+        shown = f"{default:g}" if isinstance(default, float) else written(default)
         assert ROWS[f"MAREY_{name.upper()}"][1].startswith(f"`{shown}`"), name
 
 

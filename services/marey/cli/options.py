@@ -27,7 +27,7 @@ class ExtraColumns(StrEnum):
     IGNORE = "ignore"
 
 
-Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="What the person does.")]
+Prompts = Annotated[list[str] | None, typer.Argument(metavar="PROMPT…", help="The motion in words.")]
 PromptFile = Annotated[
     str | None,
     typer.Option(
@@ -35,13 +35,11 @@ PromptFile = Annotated[
     ),
 ]
 PromptFormat = Annotated[
-    InputFormat | None, typer.Option("--input-format", help="Format of -f where its ending does not tell.")
+    InputFormat | None, typer.Option("--input-format", help="Format of -f; default: by its extension.")
 ]
 Extra = Annotated[
     ExtraColumns,
-    typer.Option(
-        "--extra-columns", help="CSV columns that are not known: an error, a tag column=value of the row, or ignored."
-    ),
+    typer.Option("--extra-columns", help="Unknown CSV columns: an error, a tag column=value of the row, or ignored."),
 ]
 Formats = Annotated[
     list[str] | None,
@@ -49,7 +47,7 @@ Formats = Annotated[
         "--format", metavar="FORMAT", help="File format, such as bvh or npz; may be repeated. None given = all."
     ),
 ]
-Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; made if it is not there.")]
+Folder = Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; created if missing.")]
 Template = Annotated[
     str,
     typer.Option(
@@ -58,16 +56,14 @@ Template = Annotated[
         "for shot=…; / makes folders.",
     ),
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that hold something else.")]
-Seconds = Annotated[float | None, typer.Option("--seconds", help="Length; none given = the model decides.")]
-Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first variant; none given = drawn.")]
-Variants = Annotated[
-    int | None, typer.Option("--variants", help="Motions of each prompt; a row's own number comes first.")
-]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files with other content.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", help="Length in seconds; default: the model's estimate.")]
+Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the first variant; default: random.")]
+Variants = Annotated[int | None, typer.Option("--variants", help="Motions per prompt; a row's own value overrides it.")]
 Tags = Annotated[
-    list[str] | None, typer.Option("--tag", help="A tag of every motion, beside a row's own; may be repeated.")
+    list[str] | None, typer.Option("--tag", help="A tag of every motion, in addition to a row's own; may be repeated.")
 ]
-Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; none given = the model's.")]
+Fps = Annotated[float | None, typer.Option("--fps", help="Frame rate of the files; default: the model's.")]
 Sampling = Annotated[
     list[str] | None,
     typer.Option(

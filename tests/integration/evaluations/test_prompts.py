@@ -1,4 +1,4 @@
-"""Prompts that schedules and evaluations share: kept while somebody needs them, and what runs goes with its request."""
+"""Prompts that schedules and evaluations share: kept while they are needed; runs are deleted with their request."""
 
 from __future__ import annotations
 

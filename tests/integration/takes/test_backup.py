@@ -70,7 +70,7 @@ def studio(engine: sa.Engine, store: FolderStore) -> list[UUID]:
     return [rich, gone]
 
 
-def told(engine: sa.Engine, jobs: Sequence[UUID]) -> list[tuple[JobRow, Sequence[ItemRow], list[EventRow]]]:
+def snapshot(engine: sa.Engine, jobs: Sequence[UUID]) -> list[tuple[JobRow, Sequence[ItemRow], list[EventRow]]]:
     with transaction(engine) as conn:
         return [
             (get_job(conn, "default", job), list_items(conn, "default", job).rows, events_after(conn, "default", job))
@@ -92,12 +92,12 @@ def lose_everything(engine: sa.Engine, store: FolderStore) -> None:
 def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: FolderStore, tmp_path: Path) -> None:
     jobs = studio(engine, folder_store)
     running = submit_items(engine, 1)
-    before, files = told(engine, jobs), contents(folder_store)
+    before, files = snapshot(engine, jobs), contents(folder_store)
     manifest, left = export_tenant(engine, folder_store, "default", tmp_path / "b")
     assert (list(manifest.jobs), manifest.items, manifest.files, left) == (jobs, 6, 4, 1)
     lose_everything(engine, folder_store)
     assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 2
-    after = told(engine, jobs)
+    after = snapshot(engine, jobs)
     assert after[0] == before[0]
     assert (after[1][0].keep_days, before[1][0].keep_days) == (None, 1)  # its days are over, or would soon be
     assert after[1][1:] == before[1][1:]
@@ -110,7 +110,7 @@ def test_what_was_lost_comes_back_as_it_was(engine: sa.Engine, folder_store: Fol
             retry(conn, "default", jobs[0])
     assert collect_garbage(engine, folder_store) == GarbageReport(0, 0, ())
     assert import_tenant(engine, folder_store, "default", tmp_path / "b")[1] == 0  # again: nothing to do
-    assert told(engine, jobs) == after
+    assert snapshot(engine, jobs) == after
 
 
 def test_another_tenants_job_is_not_overwritten_and_a_folder_with_something_in_it_is_not_used(

@@ -113,7 +113,7 @@ def test_an_erased_prompt_is_in_no_table_and_no_file(engine: sa.Engine, folder_s
             file.format for item in list_items(conn, "default", job).rows if item.motion for file in item.motion.files
         ]
     assert left.files_left == 2
-    assert files == ["bvh", "bvh"]  # nobody gets the others meanwhile
+    assert files == ["bvh", "bvh"]  # the others cannot be fetched meanwhile
     assert SECRET not in dump(engine)
     assert rewrite_files(engine, folder_store) == 2
     assert not any(SECRET.encode(coding) in data for data in objects(folder_store) for coding in ("utf-8", "utf-32-le"))

@@ -66,7 +66,7 @@ def check_same(older: Tables, newer: Tables, columns: dict[str, set[str]], step:
 
 @pytest.fixture(scope="module")
 def template(module_database_url: str) -> str:
-    """URL of a filled database that nobody is connected to."""
+    """URL of a filled database without connections."""
     engine = create_engine(module_database_url)
     fill(engine)
     engine.dispose()

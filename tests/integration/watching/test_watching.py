@@ -43,7 +43,7 @@ class Numbers:
         """One number; KeyError where it is not told."""
         return self._samples[name, frozenset(labels.items())]
 
-    def told(self, name: str, **labels: str) -> bool:
+    def has_number(self, name: str, **labels: str) -> bool:
         """Return True if the number exists."""
         return (name, frozenset(labels.items())) in self._samples
 
@@ -155,7 +155,8 @@ def test_every_line_about_work_names_its_job_lease_and_trace_and_no_line_a_promp
 def test_a_worker_counts_each_item_once_with_its_batches_and_stages(seen: Seen) -> None:
     committed = {"queue": "hgm3", "stage": "commit"}  # counted behind the commit that the command has seen
     seen.cluster.wait(
-        lambda: seen.numbers(WORKER).told("marey_stage_seconds_count", **committed), "the worker counts its commit"
+        lambda: seen.numbers(WORKER).has_number("marey_stage_seconds_count", **committed),
+        "the worker counts its commit",
     )
     numbers = seen.numbers(WORKER)
     assert numbers("marey_items_total", queue="text", state="parsed") == 4
@@ -173,7 +174,7 @@ def test_the_scheduler_counts_its_rounds_and_hints(seen: Seen) -> None:
 
     def all_went_round() -> bool:
         numbers = seen.numbers(SCHEDULER)
-        return all(numbers.told("marey_scheduler_rounds_total", part=part, outcome="done") for part in parts)
+        return all(numbers.has_number("marey_scheduler_rounds_total", part=part, outcome="done") for part in parts)
 
     seen.cluster.wait(all_went_round, "every part goes round once")
     numbers = seen.numbers(SCHEDULER)

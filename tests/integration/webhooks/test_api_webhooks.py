@@ -215,8 +215,8 @@ def test_an_evaluation_that_is_worse_reaches_the_receiver_signed(
     with delivering(place):
         received = receiver.wait(3)
     documents = [Webhook(made["secret"]).verify(each.body, each.headers) for each in received]
-    told = sorted((each["data"]["evaluation"], each["type"], each["data"]["regressed"]) for each in documents)
-    assert told == [(first, "evaluation.ended", None), (second, "evaluation.ended", True),
+    messages_of = sorted((each["data"]["evaluation"], each["type"], each["data"]["regressed"]) for each in documents)
+    assert messages_of == [(first, "evaluation.ended", None), (second, "evaluation.ended", True),
                     (second, "evaluation.regressed", True)]  # fmt: skip
     url = documents[0]["data"]["urls"]["evaluation"]
     assert http.get(url).json()["id"] == documents[0]["data"]["evaluation"]
@@ -242,7 +242,7 @@ def test_a_webhook_is_added_tried_out_paused_and_removed(
         assert (said.out.strip(), "it arrived: 200" in said.err) == (receiver.received[0].id, True)
         receiver.answer = status(500)
         marey("test", webhook, "--wait").refused(6, "it did not arrive: answered 500")
-    marey("test", webhook, "--wait", "--timeout", 0).refused(7, "not tried in the time allowed")
+    marey("test", webhook, "--wait", "--timeout", 0).refused(7, "no attempt was made in time")
     assert "is paused" in marey("pause", webhook).ok().err
     assert "paused    paused" in marey("show", webhook).ok().out
     marey("test", webhook).refused(2, "the webhook is paused", f"marey webhooks resume {webhook}")

@@ -1,4 +1,4 @@
-"""The loop that tells webhooks, with real receivers: who hangs holds up nobody, and what dies is told again."""
+"""The delivery loop with real receivers: a hanging receiver delays no other, and lost deliveries are repeated."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def test_who_stops_gives_back_what_is_under_way(
         receiver.wait(1)
     assert [(row.state, row.attempts) for row in deliveries(engine, webhook)] == [(DeliveryState.PENDING, 0)]
     receiver.answer = status(200)
-    with delivering(engine):  # at once: nobody waits for a claim to run out
+    with delivering(engine):  # at once: no wait for a claim to expire
         wait(lambda: all_delivered(engine, webhook))
     first, second = receiver.received
     assert first.id == second.id

@@ -1,4 +1,4 @@
-"""Deliveries in the database: claimed by one, written down by whoever holds the claim, tried eight times, replayed."""
+"""Deliveries in the database: claimed by one, written by the holder of the claim, tried eight times, replayed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from marey.webhooks import (
 from marey.webhooks.deliveries import DELAYS, JITTER, MAX_WAIT
 from marey.webhooks.repository import MAX_WEBHOOKS
 from tests.servers.jobs import submit_items
-from tests.support.webhooks import deliveries, errors, events_written, new_webhook, time_passes, told
+from tests.support.webhooks import deliveries, errors, events_written, messages_of, new_webhook, time_passes
 
 REFUSED = Attempt(500, 0.1, "answered 500")
 ARRIVED = Attempt(204, 0.1, None)
@@ -243,7 +243,7 @@ def test_a_test_message_goes_to_one_webhook_and_is_tried_once(engine: sa.Engine)
     (due,) = claim(engine)
     assert (due.event, due.kind, due.data) == (sent.event, "webhook.test", {"webhook": str(webhook)})
     assert record(engine, due, REFUSED) is DeliveryState.FAILED
-    assert told(engine, other) == []
+    assert messages_of(engine, other) == []
 
 
 def test_a_removed_webhook_takes_its_deliveries_along_also_those_under_way(engine: sa.Engine) -> None:

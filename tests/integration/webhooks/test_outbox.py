@@ -17,7 +17,7 @@ from marey.tenants import DEFAULT_TENANT, create_key, tables
 from marey.webhooks import EventKind, delete_webhook
 from tests.servers.jobs import PROBLEM, claim_some, commit_all, let_expire, new_item, parse_texts, submit_items
 from tests.support.evaluations import new_evaluation, wait
-from tests.support.webhooks import deliveries, events_written, new_webhook, told
+from tests.support.webhooks import deliveries, events_written, messages_of, new_webhook
 
 
 def locks_waited_for(engine: sa.Engine) -> int:
@@ -36,7 +36,7 @@ def test_a_job_that_ended_is_told_once_with_its_counters_and_without_its_prompts
     parse_texts(engine)
     claimed = claim_some(engine)
     commit_all(engine, claimed, [item.id for item in claimed.items[:2]])
-    assert told(engine, webhook) == []
+    assert messages_of(engine, webhook) == []
     with transaction(engine) as conn:
         fail_items(conn, claimed.lease_token, [ItemFailure(claimed.items[2].id, Problem("x", "secret"), False)])
     (row,) = deliveries(engine, webhook)
@@ -56,17 +56,21 @@ def test_every_end_of_a_job_is_an_event_of_its_own(engine: sa.Engine) -> None:
         pause(conn, DEFAULT_TENANT, job)  # changes nothing
         resume(conn, DEFAULT_TENANT, job)
     finish(engine, job)
-    assert told(engine, webhook) == [("job.ended", "cancelled"), ("job.paused", "paused"), ("job.ended", "succeeded")]
+    assert messages_of(engine, webhook) == [
+        ("job.ended", "cancelled"),
+        ("job.paused", "paused"),
+        ("job.ended", "succeeded"),
+    ]
 
 
 def test_a_job_that_the_sweeper_ends_is_told_of_too(engine: sa.Engine) -> None:
     webhook = new_webhook(engine)
     submit_items(engine, 1)
     parse_texts(engine)
-    for _ in range(2):  # a lost lease in company, then one alone
+    for _ in range(2):  # a lost lease in a batch, then one alone
         let_expire(engine, claim_some(engine).lease_token)
         sweep(engine, rules=Policy(max_attempts=1))
-    assert told(engine, webhook) == [("job.ended", "failed")]
+    assert messages_of(engine, webhook) == [("job.ended", "failed")]
 
 
 def test_what_is_rolled_back_is_not_told(engine: sa.Engine) -> None:
@@ -76,26 +80,26 @@ def test_what_is_rolled_back_is_not_told(engine: sa.Engine) -> None:
         cancel(conn, DEFAULT_TENANT, job)
         assert conn.execute(sa.text("SELECT count(*) FROM webhook_event")).scalar_one() == 1
         raise ZeroDivisionError
-    assert (told(engine, webhook), events_written(engine)) == ([], 0)
+    assert (messages_of(engine, webhook), events_written(engine)) == ([], 0)
 
 
 def test_one_event_serves_every_webhook_that_wants_it_and_nobody_else(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
         conn.execute(sa.insert(tables.tenant).values(id="other"))
     finish(engine, submit_items(engine, 1))
-    assert events_written(engine) == 0  # nobody wants to know
+    assert events_written(engine) == 0  # no webhook subscribes
     both = [new_webhook(engine), new_webhook(engine, "https://b.example/", EventKind.JOB_ENDED)]
     deaf = [
         new_webhook(engine, "https://c.example/", EventKind.JOB_PAUSED, EventKind.STREAM_ENDED),
         new_webhook(engine, "https://d.example/", tenant="other"),
     ]
     finish(engine, submit_items(engine, 1))
-    assert [told(engine, each) for each in both] == [[("job.ended", "succeeded")]] * 2
-    assert told(engine, deaf[0]) == told(engine, deaf[1], "other") == []
+    assert [messages_of(engine, each) for each in both] == [[("job.ended", "succeeded")]] * 2
+    assert messages_of(engine, deaf[0]) == messages_of(engine, deaf[1], "other") == []
     assert events_written(engine) == 1
     assert len({deliveries(engine, each)[0].event for each in both}) == 1
     finish(engine, submit_items(engine, 1, tenant="other"))
-    assert told(engine, deaf[1], "other") == [("job.ended", "succeeded")]
+    assert messages_of(engine, deaf[1], "other") == [("job.ended", "succeeded")]
     assert events_written(engine) == 2
 
 
@@ -139,7 +143,7 @@ def test_an_evaluation_that_is_cancelled_is_told_of(engine: sa.Engine) -> None:
     with transaction(engine) as conn:
         cancel_evaluation(conn, DEFAULT_TENANT, evaluation)
         cancel_evaluation(conn, DEFAULT_TENANT, evaluation)
-    assert told(engine, webhook) == [("evaluation.ended", "cancelled")]
+    assert messages_of(engine, webhook) == [("evaluation.ended", "cancelled")]
 
 
 def test_a_webhook_that_is_being_removed_costs_a_job_that_ends_a_wait_and_nothing_else(engine: sa.Engine) -> None:
@@ -164,7 +168,7 @@ def test_a_webhook_that_is_being_removed_costs_a_job_that_ends_a_wait_and_nothin
 
 
 def test_events_hold_ids_states_and_counters_alone(engine: sa.Engine) -> None:
-    """No field of an event can carry what somebody wrote."""
+    """No field of an event can carry user text."""
     new_webhook(engine)
     job = submit_items(engine, [new_item(0, "a secret choreography", name="secret", tags=("secret",))], name="secret")
     with transaction(engine) as conn:

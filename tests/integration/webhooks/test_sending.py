@@ -1,4 +1,4 @@
-"""One request to a receiver that answers, refuses, hangs, redirects, talks for ever, or is somebody else."""
+"""One request to a receiver that answers, refuses, hangs, redirects, talks for ever, or has another identity."""
 
 from __future__ import annotations
 
@@ -77,7 +77,9 @@ def test_the_status_counts_and_a_body_is_left_that_is_long_or_does_not_come(rece
     receiver.answer = answer  # type: ignore[assignment]
     attempt = send(receiver.url(), seconds=30)
     assert (attempt.status, attempt.error) == (200, None)
-    assert receiver.written <= 32 * 2**20  # what sockets hold; `endless` writes gigabytes for as long as somebody reads
+    assert (
+        receiver.written <= 32 * 2**20
+    )  # what sockets hold; `endless` writes gigabytes for as long as the client reads
 
 
 def test_an_answer_that_is_no_http_is_told_as_such(receiver: Receiver) -> None:
@@ -129,7 +131,7 @@ def test_over_tls_the_name_is_asked_for_and_its_certificate_checked(authority: A
         assert receiver.received[0].headers["host"] == f"localhost:{receiver.port}"
         for url, tls in (
             (receiver.url("127.0.0.1"), authority.trusting()),  # the certificate is for the name alone
-            (receiver.url("localhost"), None),  # nobody here knows that authority
+            (receiver.url("localhost"), None),  # that authority is unknown here
         ):
             attempt = send(url, tls=tls)
             assert attempt.status is None

@@ -37,7 +37,7 @@ def test_a_format_that_a_server_names_leads_out_of_no_folder(tmp_path: Path, end
 
 
 class Endless(BaseHTTPRequestHandler):
-    """Sends more and more, until nobody reads it."""
+    """Sends more and more, until the client stops reading."""
 
     sent = 0
 

@@ -19,7 +19,7 @@ def items(path: Path, extra: ExtraColumns = "refuse", **options: Any) -> list[It
     return list(right_items(read_file(str(path), extra_columns=extra, **options)))
 
 
-def told(path: Path, extra: ExtraColumns = "refuse") -> list[str]:
+def read_lines(path: Path, extra: ExtraColumns = "refuse") -> list[str]:
     with pytest.raises(InvalidItems) as caught:
         items(path, extra)
     assert caught.value.where == str(path)
@@ -63,7 +63,7 @@ def test_stdin_tells_a_table_by_any_delimiter(monkeypatch: pytest.MonkeyPatch) -
 
 def test_extra_columns_are_refused_become_tags_or_are_ignored(table: Path) -> None:
     table.write_text("prompt,Szene,tags,who\na person walks,3/4,day,Zoe\u0308\na person bows,,, \n")
-    assert told(table) == [
+    assert read_lines(table) == [
         f"line 1: {name!r} is not a known column; known columns are {', '.join(COLUMNS)}" for name in ("Szene", "who")
     ]
     assert [item.tags for item in items(table, "tag")] == [("day", "Szene=3/4", "who=Zoe\u0308"), ()]
@@ -75,11 +75,11 @@ def test_extra_columns_are_refused_become_tags_or_are_ignored(table: Path) -> No
 def test_tags_of_extra_columns_keep_the_limits_of_tags(table: Path) -> None:
     many = [f"c{n}" for n in range(21)]
     table.write_text(f"prompt,{','.join(many)}\na person walks{',x' * 21}\na person bows,{'y' * 70}\n")
-    found = told(table, "tag")
+    found = read_lines(table, "tag")
     assert found[0] == "line 2: tags: 21 tags are over the limit of 20"
     assert found[1].startswith("line 3: tags: 'c0=yyy")
     table.write_text("prompt,a=b,\na person walks,1,2\n")
-    assert told(table, "tag") == [
+    assert read_lines(table, "tag") == [
         f"line 1: {name!r} cannot be the key of a tag: give the column a name without =" for name in ("a=b", "")
     ]
 
@@ -108,12 +108,12 @@ def test_everything_is_told_in_one_pass_with_the_line_an_editor_shows(table: Pat
     for content in (text.encode(), b"\xef\xbb\xbf" + text.encode()):
         for path, packed in ((table, content), (table.with_suffix(".csv.gz"), gzip.compress(content))):
             path.write_bytes(packed)
-            assert [line[: len(start)] for line, start in zip(told(path), expected, strict=True)] == expected
+            assert [line[: len(start)] for line, start in zip(read_lines(path), expected, strict=True)] == expected
 
 
 def test_a_byte_that_is_no_utf8_is_told_beside_what_came_before_it(table: Path) -> None:
     table.write_bytes(b"prompt\n\n\x1c\n" + b"a person walks\n" * 3 + b"a person b\xf6ws\n")
-    found = told(table)
+    found = read_lines(table)
     assert found[0].startswith("line 3: prompt: the prompt holds the control character U+001C")
     assert found[1].startswith("line 7: is not UTF-8 (byte 0xf6); the lines below it were not read")
 

@@ -21,7 +21,7 @@ PACKED = gzip.compress(CSV, mtime=0)
 """Without the time it is made at: two processes that collect the tests must find the same ones."""
 ITEMS = [Item("a person walks", seed=1), Item("a person bows", seed=2)]
 MEMORY_MIB = 64
-"""What reading may add. The text limit alone is that, decoded it would be up to four times as much."""
+"""Memory that reading may add. The text limit alone is that, decoded it would be up to four times as much."""
 MEASURED = """
 import re, sys
 from pathlib import Path

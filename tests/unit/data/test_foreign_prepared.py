@@ -33,7 +33,7 @@ def folder(whole: dict[str, bytes], tmp_path: Path) -> Path:
 
 
 def replace(folder: Path, name: str, content: bytes) -> None:
-    """Write a file and its hash, as whoever means it so would."""
+    """Write a file with a matching hash."""
     (folder / name).write_bytes(content)
     manifest = json.loads((folder / names.MANIFEST).read_text())
     manifest["files"][name] = {"sha256": sha256_of(folder / name), "bytes": len(content)}

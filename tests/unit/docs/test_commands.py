@@ -48,7 +48,7 @@ def module_exists(name: str) -> bool:
 
 
 def check(words: list[str]) -> str | None:
-    """What is wrong with a command; None if nothing is."""
+    """The error of a command; None if it is right."""
     while ENVIRONMENT.match(words[0]) and len(words) > 1:
         words = words[1:]
     program = words[0].removeprefix(".venv/bin/")

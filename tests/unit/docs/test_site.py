@@ -62,7 +62,7 @@ def pages_of(nav: object) -> set[str]:
 
 
 class Loads(HTMLParser):
-    """What a page loads by itself: sources, and links of its head."""
+    """Resources that a page loads by itself: sources, and links of its head."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -138,4 +138,4 @@ def test_what_the_joints_of_a_real_clip_say_is_what_the_checker_says(prepared: P
     found = check(prepared.layout.decode(prepared.features(clip)), 20.0, None)
     assert kept.quality is not None
     assert kept.quality.jerk == pytest.approx(found.quality.jerk, rel=1e-3)
-    assert kept.obeyed is None  # nobody checks "walks here"
+    assert kept.obeyed is None  # "walks here" has no check

@@ -53,7 +53,7 @@ def another_tokenizer() -> Tokenizer:
 
 
 @pytest.fixture(scope="module")
-def several(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
+def joined_data(tmp_path_factory: pytest.TempPathFactory) -> PreparedData:
     folder = tmp_path_factory.mktemp("several") / "prepared"
     return PreparedData.open(write_prepared(folder, 40, ("walk", "bow", "idle", "run")))
 
@@ -77,31 +77,31 @@ def obeying(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 
 def test_what_obeys_is_kept_and_what_does_not_is_tried_three_times(
-    several: PreparedData, bundle: Bundle, obeying: Callable[[str], None]
+    joined_data: PreparedData, bundle: Bundle, obeying: Callable[[str], None]
 ) -> None:
     obeying("walk")
     reader = Reader()
-    drawn = practise(Generator.load(bundle, device="cpu"), reader, several, 24)
-    acts = [several.clips[clip].acts for clip in drawn.clips]
+    drawn = practise(Generator.load(bundle, device="cpu"), reader, joined_data, 24)
+    acts = [joined_data.clips[clip].acts for clip in drawn.clips]
     assert acts
     assert set(acts) == {("walk",)}
     assert not [prompt for prompt in reader.asked if "idle" in prompt]  # no check exists for it
     assert len(reader.asked) == len(acts) + 3 * (24 - len(acts))
     assert len(drawn.tokens) == int(drawn.lengths.sum())
     assert drawn.tokens.shape[1] == TINY.tokenizer.levels
-    assert all(several.clips[clip].split == "train" for clip in drawn.clips)
+    assert all(joined_data.clips[clip].split == "train" for clip in drawn.clips)
 
 
-def test_what_was_drawn_is_further_clips_with_the_captions_of_those_it_was_drawn_for(several: PreparedData) -> None:
+def test_what_was_drawn_is_further_clips_with_the_captions_of_those_it_was_drawn_for(joined_data: PreparedData) -> None:
     levels = TINY.tokenizer.levels
     drawn = Drawn.of([(7, torch.full((9, levels), 1)), (2, torch.full((7, levels), 2))])
-    data = MotionData.load(several.path, CPU)
+    data = MotionData.load(joined_data.path, CPU)
     tokenizer = another_tokenizer()
     tokens = TokenData.encode(tokenizer, data)
-    captions = CaptionData.of(CaptionTexts.load(several), several.caption_counts, TINY.condition, CPU)
-    clips, more, said = drawn.extend(several.clips, tokens, captions)
-    assert clips[-2:] == [several.clips[7], several.clips[2]]
-    for row, (clip, code, length) in enumerate([(7, 1, 9), (2, 2, 7)], start=len(several.clips)):
+    captions = CaptionData.of(CaptionTexts.load(joined_data), joined_data.caption_counts, TINY.condition, CPU)
+    clips, more, said = drawn.extend(joined_data.clips, tokens, captions)
+    assert clips[-2:] == [joined_data.clips[7], joined_data.clips[2]]
+    for row, (clip, code, length) in enumerate([(7, 1, 9), (2, 2, 7)], start=len(joined_data.clips)):
         for phase in range(tokens.phases):
             found, lengths = more.batch(torch.tensor([row]), torch.tensor([phase]), 12)
             assert lengths.tolist() == [length]
@@ -110,11 +110,11 @@ def test_what_was_drawn_is_further_clips_with_the_captions_of_those_it_was_drawn
     before, after = (t.batch(torch.tensor([3]), torch.tensor([0]), 12)[0] for t in (tokens, more))
     assert torch.equal(before, after)
     stage = MaskedStage(TINY, clips, more, said)
-    assert {len(several.clips), len(several.clips) + 1} <= set(stage.pairs.train.tolist())
+    assert {len(joined_data.clips), len(joined_data.clips) + 1} <= set(stage.pairs.train.tolist())
 
 
 def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_another_tokenizer(
-    several: PreparedData,
+    joined_data: PreparedData,
     bundle: Bundle,
     tmp_path: Path,
     obeying: Callable[[str], None],
@@ -123,9 +123,9 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
     obeying("bow")
     take_apart(bundle, tmp_path)
     generator = Generator.load(bundle, device="cpu")
-    drawn = practise(generator, Reader(), several, 12)
-    drawn.write(tmp_path, generator.networks.tokenizer, several)
-    read = load_drawn(tmp_path, generator.networks.tokenizer, several)
+    drawn = practise(generator, Reader(), joined_data, 12)
+    drawn.write(tmp_path, generator.networks.tokenizer, joined_data)
+    read = load_drawn(tmp_path, generator.networks.tokenizer, joined_data)
     assert read is not None
     assert np.array_equal(read.clips, drawn.clips)
     assert torch.equal(read.tokens, drawn.tokens)
@@ -140,13 +140,13 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
 
     monkeypatch.setattr(MaskedStage, "__init__", watched)
     options = TrainOptions(
-        several.path, tmp_path, TINY, Budget(steps=1), warm=True, device="cpu", bf16=False, quiet=True
+        joined_data.path, tmp_path, TINY, Budget(steps=1), warm=True, device="cpu", bf16=False, quiet=True
     )
     train_stage("masked", options)
-    assert seen == [len(several.clips) + len(drawn.clips)]
-    drawn.write(tmp_path, another_tokenizer(), several)
+    assert seen == [len(joined_data.clips) + len(drawn.clips)]
+    drawn.write(tmp_path, another_tokenizer(), joined_data)
     with pytest.raises(InvalidFile, match="another tokenizer"):
         train_stage("masked", options)
     (tmp_path / FILE).unlink()
     train_stage("masked", options)
-    assert seen[-1] == len(several.clips)
+    assert seen[-1] == len(joined_data.clips)

@@ -94,7 +94,7 @@ def test_what_is_asked_ahead_lies_so_far_ahead_and_never_behind_a_steer() -> Non
     knows = torch.eye(TINY.transformer.width)[3:14].view(1, 11, 1, -1)  # state k: code k + 3
     assert float(ahead_loss(model, knows, targets, None, 1.0).detach()) < 1e-3
     assert float(ahead_loss(model, knows.roll(1, 1), targets, None, 1.0).detach()) > 10
-    targets[:, :, 5:10] = 30  # behind the seam comes what nobody can know before it
+    targets[:, :, 5:10] = 30  # behind the seam: unpredictable from before it
     assert float(ahead_loss(model, knows, targets, None, 1.0).detach()) > 10
     before = targets.clone()
     before[:, :, 8:] = NOT_ASKED  # what states behind the seam are asked

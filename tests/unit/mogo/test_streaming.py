@@ -34,7 +34,7 @@ def run(streams: Streams, frames: int) -> dict[int, torch.Tensor]:
 
 
 def alone(seed: int, frames: int, model: RQHCTransformer | None = None) -> torch.Tensor:
-    """The columns (frames, V) of a session with nobody beside it."""
+    """The columns (frames, V) of a session that runs alone."""
     streams = opened(model or transformer(), 1)
     session = streams.start(said(seed), seed)
     return run(streams, frames)[session]
@@ -313,7 +313,7 @@ def test_what_cannot_be_is_refused() -> None:
 
 
 def steered(model: RQHCTransformer, at: int, frames: int) -> torch.Tensor:
-    """The columns (frames, V) of a session that somebody steers from prompt 1 to prompt 2."""
+    """The columns (frames, V) of a session that is steered from prompt 1 to prompt 2."""
     streams = opened(model, 1)
     session = streams.start(said(1), 9)
     before = run(streams, at)[session]

@@ -18,7 +18,7 @@ from tests.support.stepping import TOES, sliding
 
 
 def features_of(seed=0):
-    """Features of somebody who walks with feet that slide, and a decoder's noise on the joints."""
+    """Features of a person that walks with feet that slide, and a decoder's noise on the joints."""
     layout = HUMANML3D_263.with_facing(sigma=10.0)
     features = layout.encode(sliding(0.02, seed)).astype(float)
     noise = drift(seed, len(features), 63, 0.002)

@@ -70,11 +70,11 @@ def test_a_process_without_children_tells_of_itself_until_it_stops(tmp_path: Pat
     stopping, silence = threading.Event(), [0.0]
     asked = threading.Event()
 
-    def told() -> float:
+    def last_progress() -> float:
         asked.set()
         return silence[0]
 
-    reporter = StatusReporter(tmp_path, "scheduler", told, stopping)
+    reporter = StatusReporter(tmp_path, "scheduler", last_progress, stopping)
     reporter.start()
     assert asked.wait(60)
     while not (tmp_path / "run" / "worker-scheduler.json").exists():

@@ -57,7 +57,7 @@ def batch(claimed: tuple[ClaimedItem, ...]) -> Batch:
 
 
 class Control:
-    """Says which items nobody wants any more, and counts progress."""
+    """Says which items were cancelled, and counts progress."""
 
     def __init__(self) -> None:
         self.gone: set[UUID] = set()

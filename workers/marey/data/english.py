@@ -84,7 +84,7 @@ def mentioned_again(owner: str) -> str:
 
 
 def with_adjective(subject: str, adjective: str) -> str:
-    """`a person`, `old` to `an old person`; pronouns and `somebody` take none."""
+    """`a person`, `old` to `an old person`; pronouns and indefinite subjects take none."""
     match = re.fullmatch(r"(a|an|the) (.+)", subject)
     if not match or not adjective:
         return subject

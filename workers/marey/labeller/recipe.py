@@ -76,7 +76,7 @@ class Recipe:
     seed: int
     propbank: Sequence[Example] = ()
     first: Weights | None = None
-    """What PropBank left; None = captions alone."""
+    """Weights after PropBank; None = captions alone."""
 
     def make(self, gold: Sequence[Example]) -> Weights:
         """Weights from annotated sentences."""

@@ -1,1 +1,1 @@
-"""One module a group of commands."""
+"""Commands of the CLI: one module per group."""

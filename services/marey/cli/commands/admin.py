@@ -31,7 +31,7 @@ AUDIT_COLUMNS = ("at", "tenant", "actor", "key", "verb", "target", "data")
 
 @app.command()
 def migrate() -> None:
-    """Bring the database to the newest revision, and make the bucket of an S3 store where there is none."""
+    """Bring the database to the newest revision, and create the bucket of an S3 store if it is missing."""
     config = settings_here()
     from marey.db import upgrade
     from marey.storage import open_store
@@ -46,7 +46,7 @@ def migrate() -> None:
 
 @app.command()
 def gc(as_json: console.Json = False) -> None:
-    """Remove stored files that nothing refers to."""
+    """Remove stored files that are no longer referenced."""
     config = settings_here()
     from marey.db import transaction
     from marey.storage import open_store
@@ -71,15 +71,17 @@ def gc(as_json: console.Json = False) -> None:
 
 @app.command()
 def audit(
-    tenant: Annotated[str | None, typer.Option("--tenant", help="In this tenant alone.")] = None,
-    key: Annotated[str | None, typer.Option("--key", help=f"By one key alone: {FORMS}.")] = None,
-    verb: Annotated[str | None, typer.Option("--verb", help="As job.cancel; or a noun, as job.")] = None,
-    days: Annotated[float | None, typer.Option("--days", min=0, help="In the last so many days.")] = None,
+    tenant: Annotated[str | None, typer.Option("--tenant", help="Only entries of this tenant.")] = None,
+    key: Annotated[str | None, typer.Option("--key", help=f"Only entries of this key: {FORMS}.")] = None,
+    verb: Annotated[
+        str | None, typer.Option("--verb", help="Only this action, such as job.cancel, or a noun, such as job.")
+    ] = None,
+    days: Annotated[float | None, typer.Option("--days", min=0, help="Only entries of the last so many days.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
-    """Show who did what, newest first: by name of the key, or of whoever ran `marey admin`."""
+    """Show the audit log, newest first: by name of the key, or by the operating-system user of `marey admin`."""
     since = None if days is None else datetime.now(UTC) - timedelta(days=days)
     with connection() as conn:
         wanted = None if key is None else find_key(conn, tenant, key)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from marey.cli.backup import Manifest
 
 Folder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of the backup.")]
-Tenant = Annotated[str, typer.Option("--tenant", help="Whose jobs.")]
+Tenant = Annotated[str, typer.Option("--tenant", help="Tenant of the jobs.")]
 
 
 def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
@@ -34,7 +34,7 @@ def export(folder: Folder, tenant: Tenant = "default", as_json: console.Json = F
 
 
 def import_(folder: Folder, tenant: Tenant = "default", as_json: console.Json = False) -> None:
-    """Check a backup, every hash of it, then bring back the jobs that are not there."""
+    """Verify a backup with all its hashes, then restore the jobs that do not exist."""
     config = settings_here()
     from marey.cli.backup import import_tenant
     from marey.storage import open_store

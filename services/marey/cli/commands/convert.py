@@ -40,7 +40,7 @@ FromUp = Annotated[Up, typer.Option("--from-up", help="Axis of a BVH source that
 def convert(
     source: Source,
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="A motion file, such as .bvh or .npz.")],
-    fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result.")] = None,
+    fps: Annotated[float | None, typer.Option("--fps", help="Frame rate of the result; default: unchanged.")] = None,
     unit: Annotated[Unit, typer.Option("--unit", help="Unit of a BVH result.")] = Unit.CENTIMETRE,
     up: Annotated[Up, typer.Option("--up", help="Axis of a BVH result that points up.")] = Up.Y,
     from_unit: FromUnit = Unit.CENTIMETRE,
@@ -72,9 +72,9 @@ def convert(
 def render(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE…", help="Motion files, such as .bvh or .npz.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .png (contact sheet) or .html (3D player).")],
-    columns: Annotated[int, typer.Option("--columns", help="Poses a motion on a contact sheet.")] = 8,
+    columns: Annotated[int, typer.Option("--columns", help="Poses per motion on a contact sheet.")] = 8,
     title: Annotated[str | None, typer.Option("--title", help="A line at the top.")] = None,
-    theme: Annotated[str, typer.Option("--theme", help="light or dark; a player takes auto, too.")] = "light",
+    theme: Annotated[str, typer.Option("--theme", help="light or dark; auto is possible for a player.")] = "light",
     from_unit: FromUnit = Unit.CENTIMETRE,
     from_up: FromUp = Up.Y,
 ) -> None:
@@ -94,7 +94,7 @@ def render(
     elif ending in (".html", ".htm"):
         html_player(clips, output, title=title, captions=captions, theme=theme)
     else:
-        raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="The ending says what to draw.")
+        raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .png or .html.")
     console.result(console.home_relative(output))
 
 

@@ -20,14 +20,14 @@ Prepared = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `ma
 Sources = Annotated[
     list[str],
     typer.Argument(
-        metavar="SOURCE PATH …", help="bandai-namco or cmu and its archive or folder; pack and what `pack` wrote."
+        metavar="SOURCE PATH …", help="bandai-namco or cmu with its archive or folder; pack with a file of `pack`."
     ),
 ]
 Splits = Annotated[
     Path | None, typer.Option("--splits", help="Of bandai-namco; else bandai-namco-splits.json beside it.")
 ]
 Captions = Annotated[Path | None, typer.Option("--captions", help="Of cmu; else cmu-captions.json beside it.")]
-Processes = Annotated[int, typer.Option("--processes", min=1, help="How many retarget at once.")]
+Processes = Annotated[int, typer.Option("--processes", min=1, help="Number of processes that retarget.")]
 
 
 @app.command()
@@ -38,7 +38,7 @@ def pack(
     captions: Captions = None,
     processes: Processes = 2,
 ) -> None:
-    """Only retarget archives: small files to carry to the machine that prepares and trains."""
+    """Retarget archives only: small files to carry to the machine that prepares and trains."""
     from marey.cli.roles import data
 
     sources = data.CaptureSources(_named(pairs), splits, captions, processes)
@@ -51,7 +51,7 @@ def pack(
 @app.command()
 def prepare(
     pairs: Sources,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write; must be empty or new.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],
     splits: Splits = None,
     captions: Captions = None,
     processes: Processes = 2,
@@ -85,7 +85,7 @@ def inspect(
     clip: Annotated[str | None, typer.Option("--clip", help="Show one clip with its captions.")] = None,
     as_json: console.Json = False,
 ) -> None:
-    """Check a prepared folder's hashes and show what it holds."""
+    """Verify a prepared folder's hashes and summarise its content."""
     from marey.cli.roles import data
 
     found = data.inspect_data(folder, clip)

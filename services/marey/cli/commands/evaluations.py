@@ -45,8 +45,8 @@ def run(
     seed: evaluating.Seed = None,
     baseline: evaluating.Baseline = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the run.")] = None,
-    comment: Annotated[str | None, typer.Option("--comment", help="A note for people.")] = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Show progress until it is over; exit 6 if it failed.")] = False,
+    comment: Annotated[str | None, typer.Option("--comment", help="A comment.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Show progress until it ends; exit 6 if it failed.")] = False,
     fail_on_regression: evaluating.FailOnRegression = False,
     timeout: evaluating.Timeout = None,
     as_json: console.Json = False,
@@ -81,7 +81,7 @@ def wait_for(
     timeout: evaluating.Timeout = None,
     as_json: console.Json = False,
 ) -> None:
-    """Wait until a run is over; exits 6 if it failed or was cancelled."""
+    """Wait until a run ends; exit 6 if it failed or was cancelled."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -97,13 +97,13 @@ def list_runs(
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
-    """List runs, newest first: their states, and which regressed."""
+    """List runs, newest first, with state and regressions."""
     evaluating.show_runs("/v1/evaluations", limit, as_json, full_ids=full_ids, state=state.value if state else None)
 
 
 @app.command()
 def show(run: Run, as_json: console.Json = False) -> None:
-    """Show a run: what is measured, how it stands and why, and its numbers."""
+    """Show a run: its data, state, reason and numbers."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -137,19 +137,19 @@ def report(
     ] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Fetch the report of a run that is done."""
+    """Fetch the report of a finished run."""
     from marey.client.transport import Transport
 
     kind = "md" if output is None else output.suffix.lower().removeprefix(".")
     if kind not in FORMATS:
-        raise InvalidInput("the file's ending is no report's", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
+        raise InvalidInput("unknown report format", where=str(output), hint=f"Use {', '.join(FORMATS)}.")
     with Transport.here() as client:
         run = find(client, "evaluation", run).id
         found = client.get(f"/v1/evaluations/{run}")
         file = next((file for file in found["reports"] if file["format"] == kind), None)
         if file is None:
             raise NotFound(
-                f"there is no such report: the evaluation is {found['state']}",
+                f"the report does not exist: the evaluation is {found['state']}",
                 where=f"evaluation {run}",
                 hint=found["reason"],
             )
@@ -175,7 +175,7 @@ def compare(
     ] = False,
     as_json: console.Json = False,
 ) -> None:
-    """Compare two runs of the same prompts and evaluator, motion against motion, by paired bootstrap."""
+    """Compare two runs of the same prompts and evaluator, motion by motion, by paired bootstrap."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -190,7 +190,7 @@ def compare(
 
 @app.command()
 def cancel(runs: Runs, as_json: console.Json = False) -> None:
-    """Cancel runs and the jobs that work for them; what was made stays."""
+    """Cancel runs and their jobs; finished motions stay."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Review(StrEnum):
-    """What was said of a motion."""
+    """Reviews of a motion."""
 
     KEPT = "kept"
     REJECTED = "rejected"
@@ -33,14 +33,15 @@ def fetch(
     output: options.Folder = Path(),
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
-    only: Annotated[Review | None, typer.Option("--only", help="Only motions of which this was said.")] = None,
+    only: Annotated[Review | None, typer.Option("--only", help="Only motions with this review.")] = None,
     prune: Annotated[
-        bool, typer.Option("--prune", help="Remove files of earlier fetches of a job that are not among these.")
+        bool,
+        typer.Option("--prune", help="Remove files of earlier fetches that are no longer part of the job's selection."),
     ] = False,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
-    """Fetch the motions of jobs: eight files at a time, resumed and checked, with a manifest.csv beside them.
+    """Fetch the motions of jobs: eight files at a time, resumed and verified, with a manifest.csv.
 
     Of several jobs, each has its folder.
     """

@@ -55,7 +55,7 @@ def generate(
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
-    """Make motions here and now, without a server or a queue."""
+    """Generate motions in this process, without a server or a queue."""
     from marey.cli.roles.oneshot import OneShot
     from marey.client.fetching import check_folder, make_folders
 
@@ -182,7 +182,7 @@ def _exporters(formats: list[str] | None) -> list[Exporter[Any]]:
 
 
 def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds: list[Exporter[Any]]) -> list[Planned]:
-    """What to make and where each motion goes.
+    """Plan the motions and their files.
 
     Raises:
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.

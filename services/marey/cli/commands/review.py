@@ -1,4 +1,4 @@
-"""`marey review`: all motions of a job on pages to look at."""
+"""`marey review`: pages with all motions of a job."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def review(
     ] = None,
     tags: Annotated[list[str] | None, typer.Option("--tag", help="Only motions with this tag.")] = None,
     per_page: Annotated[
-        int, typer.Option("--per-page", min=1, max=PER_PAGE, help="Motions on a page, at most.")
+        int, typer.Option("--per-page", min=1, max=PER_PAGE, help="Most motions on a page.")
     ] = PER_PAGE,
-    skip: Annotated[int, typer.Option("--skip", min=0, help="Leave out so many at the start.")] = 0,
-    limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many.")] = MOST,
+    skip: Annotated[int, typer.Option("--skip", min=0, help="Skip the first so many motions.")] = 0,
+    limit: Annotated[int, typer.Option("--limit", min=1, max=MOST, help="Show at most so many motions.")] = MOST,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing pages.")] = False,
 ) -> None:
     """Draw the motions of a job, in input order, on pages to choose from or on contact sheets.
@@ -64,7 +64,7 @@ def review(
     except ImportError as error:
         raise needs_extra("motion", error) from error
     if output.suffix.lower() not in ENDINGS:
-        raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="The ending says what to draw.")
+        raise InvalidInput("is neither a .png nor a .html", where=str(output), hint="Use the extension .html or .png.")
     with Transport.here() as client:
         job = find(client, "job", job).id
         found, more = _motions(client, job, reviews, tags, skip, limit)
@@ -158,7 +158,7 @@ def _motions(
         raise NotFound(
             "no motion of this job fits",
             where=f"job {job}",
-            hint=f"`marey motions list --job {job}` shows what is there.",
+            hint=f"`marey motions list --job {job}` lists its motions.",
         )
     return found[:limit], len(found) > limit
 

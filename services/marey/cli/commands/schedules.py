@@ -36,7 +36,10 @@ Ids = Annotated[list[str], typer.Argument(metavar="SCHEDULE…", help=f"Schedule
 @app.command()
 def add(
     cron: Annotated[
-        str, typer.Argument(metavar="CRON", help="Minute, hour, day of the month, month, day of the week: in quotes.")
+        str,
+        typer.Argument(
+            metavar="CRON", help="Cron expression in quotes: minute, hour, day of the month, month, day of the week."
+        ),
     ],
     bundle: evaluating.Bundle,
     split: evaluating.Split = evaluating.TEST,
@@ -48,10 +51,11 @@ def add(
     seed: evaluating.Seed = None,
     baseline: evaluating.Baseline = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the schedule and its runs.")] = None,
-    time_zone: Annotated[str, typer.Option("--time-zone", help="As Europe/Berlin.")] = "UTC",
+    time_zone: Annotated[str, typer.Option("--time-zone", help="Time zone, such as Europe/Berlin.")] = "UTC",
     as_json: console.Json = False,
 ) -> None:
-    """Measure a model again and again; prints the schedule's id. Each run looks up the bundles by the names given."""
+    """Evaluate a model on a schedule; prints the schedule's id. Each run looks up the bundles by the names given
+    here."""
     repeats = evaluating.repeats_of(repeats, regenerate=regenerate)
     asked = Asked(bundle, evaluator, split, settings, repeats, seed, baseline, extra_columns)
     body = {**asked.body(), "cron": cron, "time_zone": time_zone, **({"name": name} if name else {})}
@@ -70,7 +74,7 @@ def add(
 
 @app.command("list")
 def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = False) -> None:
-    """List schedules, newest first: when they are due, and how their last runs ended."""
+    """List schedules, newest first, with their next times and the results of their last runs."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -80,19 +84,19 @@ def list_schedules(full_ids: console.FullIds = False, as_json: console.Json = Fa
 
 @app.command()
 def pause(schedules: Ids, as_json: console.Json = False) -> None:
-    """Stop schedules; runs under way go on."""
+    """Pause schedules; current runs go on."""
     _change(schedules, as_json, paused=True)
 
 
 @app.command()
 def resume(schedules: Ids, as_json: console.Json = False) -> None:
-    """Go on with schedules, from their next time on; what they missed is not made up for."""
+    """Resume schedules from their next time on; missed times are not made up for."""
     _change(schedules, as_json, paused=False)
 
 
 @app.command()
 def run(schedule: Id, as_json: console.Json = False) -> None:
-    """Run a schedule's evaluation now, beside its times; prints the run's id."""
+    """Run a schedule's evaluation now, in addition to its times; prints the run's id."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:

@@ -26,7 +26,7 @@ def serve(
     ] = None,
     host: Annotated[str | None, typer.Option("--host", help="Address to listen on.")] = None,
 ) -> None:
-    """Run everything here, with its own database and queue, until Ctrl-C."""
+    """Run all services on this machine, with a database and queue of their own, until Ctrl-C."""
     os.umask(UMASK)
     from marey.cli.ports import try_port
     from marey.cli.roles.serving import default_roles, parse_roles
@@ -47,7 +47,7 @@ def serve(
 
 
 class Part(StrEnum):
-    """What a worker does."""
+    """The role of a worker."""
 
     QUEUE = "queue"
     LIVE = "live"
@@ -69,7 +69,7 @@ def worker(
         ),
     ] = None,
 ) -> None:
-    """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL say for whom."""
+    """Run one worker; MAREY_DATABASE_URL and MAREY_QUEUE_URL name the database and the queue."""
     os.umask(UMASK)
     from marey.cli.roles.serving import live_models, parse_roles, role_of
     from marey.core.extras import needs_extra
@@ -107,7 +107,7 @@ def worker(
 
 
 def scheduler() -> None:
-    """Run relay, sweeper, evaluations and schedules; a second one beside it is harmless."""
+    """Run relay, sweeper, evaluations and schedules; several schedulers can run at once."""
     os.umask(UMASK)
     from marey.core.extras import needs_extra
 
@@ -120,7 +120,7 @@ def scheduler() -> None:
 
 
 def api() -> None:
-    """Run the HTTP API alone; MAREY_HOST and MAREY_PORT say where."""
+    """Run the HTTP API alone; MAREY_HOST and MAREY_PORT set its address."""
     os.umask(UMASK)
     from marey.core.extras import needs_extra
 
@@ -132,7 +132,7 @@ def api() -> None:
 
 
 class Health(StrEnum):
-    """What a probe asks for."""
+    """The check of a probe."""
 
     LIVE = "live"
     READY = "ready"
@@ -140,10 +140,10 @@ class Health(StrEnum):
 
 def probe(
     health: Annotated[
-        Health, typer.Argument(help="live = none of them is stuck; ready = their models are loaded too.")
+        Health, typer.Argument(help="live = none is stuck; ready = their models are loaded as well.")
     ] = Health.LIVE,
 ) -> None:
-    """Check the workers and schedulers of this machine; exits 4 if one is not well. For health checks of containers."""
+    """Check the workers and schedulers of this machine; exit 4 if one is unhealthy. For health checks of containers."""
     from marey.core.extras import needs_extra
 
     try:

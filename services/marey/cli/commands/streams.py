@@ -21,7 +21,7 @@ COLUMNS = ("stream", "job", "state", "frames", "fps", "gaps", "file")
 
 
 class Slow(StrEnum):
-    """What becomes of a client that cannot keep up."""
+    """Policy for a client that cannot keep up."""
 
     SKIP = "skip"
     PAUSE = "pause"
@@ -30,24 +30,25 @@ class Slow(StrEnum):
 def stream(
     prompt: Annotated[str, typer.Argument(metavar="PROMPT", help="What the person does first.")],
     seconds: Annotated[
-        float | None, typer.Option("--seconds", help="Length at most; none given = the server decides: 10 minutes.")
+        float | None, typer.Option("--seconds", help="Maximum length in seconds; default: the server's, 10 minutes.")
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Seed; none given = drawn.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Seed; default: random.")] = None,
     model: Annotated[str | None, typer.Option("--model", help="Model, bundle or exact bundle; else mogo.")] = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for the stream and its clip.")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="A .bvh that grows while the stream runs.")
     ] = None,
     slow: Annotated[
-        Slow, typer.Option("--slow", help="Where this side cannot keep up: skip frames, or pause the stream.")
+        Slow, typer.Option("--slow", help="If this client cannot keep up: skip frames, or pause the stream.")
     ] = Slow.SKIP,
     fetch: Annotated[
-        Path | None, typer.Option("--fetch", help="Afterwards wait for the clip, and fetch its files into this folder.")
+        Path | None,
+        typer.Option("--fetch", help="Wait for the clip after the end, and fetch its files into this folder."),
     ] = None,
     overwrite: options.Overwrite = False,
     as_json: console.Json = False,
 ) -> None:
-    """Watch motion while it is made, and steer it.
+    """Watch motion while it is generated, and steer it.
 
     A line on stdin is what the person does next; /pause, /resume and /stop do what they say. The end of stdin ends
     nothing. Ctrl-C stops the stream, waits for its end and exits with 130; a second one leaves at once.
@@ -88,7 +89,7 @@ def _body(prompt: str, *, seconds: float | None, **given: Any) -> dict[str, Any]
     from marey.items.item import read_items
 
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-        raise InvalidInput(f"{seconds:g} seconds cannot be", where="--seconds")
+        raise InvalidInput(f"{seconds:g} seconds is out of range", where="--seconds")
     (item,) = read_items([(None, {"prompt": prompt, **given})])
     body = item.as_json()
     del body["variants"]
@@ -132,7 +133,7 @@ def _write_result(result: dict[str, Any], *, as_json: bool) -> None:
 
 
 def _filled(result: dict[str, Any]) -> str:
-    return "; in the file, those around them stand in." if result["file"] else "."
+    return "; in the file they are interpolated." if result["file"] else "."
 
 
 def _fetch(client: Transport, result: dict[str, Any], folder: Path, *, overwrite: bool, as_json: bool) -> None:
@@ -140,7 +141,7 @@ def _fetch(client: Transport, result: dict[str, Any], folder: Path, *, overwrite
     from marey.cli.watching import check_ended, watch_job
 
     if result["job"] is None:
-        raise NotFound("there is no clip to fetch: nothing of it was recorded", where=f"stream {result['stream']}")
+        raise NotFound("no clip to fetch: nothing was recorded", where=f"stream {result['stream']}")
     ended = watch_job(client, result["job"])
     write_job(client, result["job"], folder, None, overwrite=overwrite, as_json=as_json)
     check_ended(ended)

@@ -27,10 +27,12 @@ def submit(
     name: Annotated[str | None, typer.Option("--name", help="A name for the job.")] = None,
     priority: Annotated[int, typer.Option("--priority", help="-1000 to 1000; higher runs first.")] = 0,
     fail_early: Annotated[
-        float | None, typer.Option("--fail-early", help="Cancel the rest once this share (0 to 1) has failed.")
+        float | None,
+        typer.Option("--fail-early", help="Cancel open items once this share (0 to 1) has failed; default: never."),
     ] = None,
     keep_days: Annotated[
-        int | None, typer.Option("--keep-days", min=1, help="Delete the job, motions and all, this long after its end.")
+        int | None,
+        typer.Option("--keep-days", min=1, help="Delete the job with its motions this many days after its end."),
     ] = None,
     model: options.Model = None,
     bundle: options.Bundle = None,
@@ -46,8 +48,10 @@ def submit(
     ] = None,
     formats: options.Formats = None,
     name_template: options.Template = options.TEMPLATE,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Check everything, submit nothing.")] = False,
-    timeout: Annotated[float | None, typer.Option("--timeout", help="Seconds to wait at most; then exit 7.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Validate everything without submitting.")] = False,
+    timeout: Annotated[
+        float | None, typer.Option("--timeout", help="Timeout in seconds; exit 7 when it passes.")
+    ] = None,
     as_json: console.Json = False,
 ) -> None:
     """Put prompts into the queue of a server; prints the job's id."""
@@ -140,7 +144,7 @@ def read_prompts(
         InvalidInput: none or both are given, or what is there cannot be used.
     """
     if prompts and file:
-        raise InvalidInput("both PROMPT and -f are given", hint="Give the one or the other.")
+        raise InvalidInput("both PROMPT and -f are given", hint="Give either PROMPT or -f.")
     if file:
         file_format = None if input_format is None else input_format.value
         return rows.read_file(file, file_format, defaults, extra_columns.value)
@@ -148,7 +152,7 @@ def read_prompts(
         if prompt.lower().removesuffix(".gz").endswith((".csv", ".jsonl", ".txt")) and Path(prompt).is_file():
             raise InvalidInput("is a file, not a prompt", where=prompt, hint=f"Give it with -f: `-f {prompt}`.")
     if not prompts:
-        raise InvalidInput("there is no prompt", hint="Give one or more in quotes, or a file of them with -f.")
+        raise InvalidInput("no prompt is given", hint="Give one or more in quotes, or a file of them with -f.")
     return rows.read_arguments(prompts, defaults)
 
 

@@ -1,4 +1,4 @@
-"""`marey motions …`: find motions, and say which are good."""
+"""`marey motions …`: find and review motions."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ MOST = 1000
 COLUMNS = ("id", "index", "name", "tags", "seed", "review", "seconds", "prompt")
 
 Motions = Annotated[list[str], typer.Argument(metavar="ID…", help=f"Motions: of each {MOTION_FORMS}; - reads stdin.")]
-Comment = Annotated[str | None, typer.Option("--comment", help="Why; stands beside the verdict.")]
+Comment = Annotated[str | None, typer.Option("--comment", help="A comment on the review.")]
 
 
 class Review(StrEnum):
-    """What was said of a motion; new = nothing yet."""
+    """Reviews of motions; new = not reviewed."""
 
     NEW = "new"
     KEPT = "kept"
@@ -38,21 +38,22 @@ class Review(StrEnum):
 @app.command("list")
 def list_motions(
     tags: Annotated[
-        list[str] | None, typer.Option("--tag", help="A tag as it was given, such as shot=010; several: all of them.")
+        list[str] | None,
+        typer.Option("--tag", help="Only motions with this tag, such as shot=010; repeated: with all of them."),
     ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="How the name begins.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Only motions whose name begins like this.")] = None,
     text: Annotated[
         str | None, typer.Option("--text", help='Words of the prompt in any form; "a phrase", or, -not.')
     ] = None,
     reviews: Annotated[
-        list[Review] | None, typer.Option("--review", help="What was said of it; several: any of them.")
+        list[Review] | None, typer.Option("--review", help="Only motions with this review; repeated: any of them.")
     ] = None,
     job: Annotated[str | None, typer.Option("--job", help=f"Of a job ({FORMS}), in the order they were made.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
-    """List motions that fit everything given, newest first."""
+    """List motions that match all filters, newest first."""
     from marey.client.transport import Transport
 
     params: dict[str, Any] = {
@@ -71,25 +72,25 @@ def list_motions(
 
 @app.command()
 def keep(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
-    """Say that motions are good: `marey fetch --only kept` fetches them."""
+    """Mark motions as kept: `marey fetch --only kept` fetches them."""
     _say(motions, "kept", comment, as_json)
 
 
 @app.command()
 def reject(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
-    """Say that motions are no good; nothing is deleted."""
+    """Mark motions as rejected; nothing is deleted."""
     _say(motions, "rejected", comment, as_json)
 
 
 @app.command()
 def clear(motions: Motions, as_json: console.Json = False) -> None:
-    """Take back what was said of motions."""
+    """Remove the reviews of motions."""
     _say(motions, None, None, as_json)
 
 
 @app.command()
 def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = False) -> None:
-    """Make motions again with the next seed, everything else as it was: a new item in the same job, linked to the old.
+    """Generate motions again with the next seed, otherwise unchanged: a new item in the same job, linked to the old.
 
     Said twice, it is done once; to go on, re-roll the new motion.
     """
@@ -128,7 +129,7 @@ def _ids(client: Transport, motions: list[str]) -> Iterator[list[str]]:
     given = _lines(sys.stdin.read()) if motions == ["-"] else motions
     ids = [each.id for each in find_all(client, "motion", dict.fromkeys(given))]
     if not ids:
-        raise InvalidInput("there is no id of a motion", hint="`marey motions list` shows them.")
+        raise InvalidInput("no motion id is given", hint="`marey motions list` shows them.")
     for first in range(0, len(ids), MOST):
         yield ids[first : first + MOST]
 
@@ -147,5 +148,5 @@ def _cell(motion: dict[str, Any], column: str) -> object:
 
 
 def review_of(motion: dict[str, Any]) -> str | None:
-    """What was said of a motion of the API."""
+    """The review of a motion of the API."""
     return motion["review"] and motion["review"]["verdict"]

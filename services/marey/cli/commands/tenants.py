@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from marey.tenants import TenantRow
 
-app = typer.Typer(help="Who shares this server, and what each may have.", no_args_is_help=True)
+app = typer.Typer(help="Tenants of this server and their quotas.", no_args_is_help=True)
 
 NONE = "none"
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
@@ -24,12 +24,12 @@ COLUMNS = ("id", "suspended", "queued", "running", "bytes", "streams")
 
 Name = Annotated[str, typer.Argument(metavar="TENANT", help="Its name.")]
 Queued = Annotated[
-    str | None, typer.Option("--queued", help="Items that may be queued at once, being made or not; `none` = any.")
+    str | None, typer.Option("--queued", help="Quota of items in the queue, running ones included; `none` = unlimited.")
 ]
-Running = Annotated[str | None, typer.Option("--running", help="Items that may be made at once.")]
-Bytes = Annotated[str | None, typer.Option("--bytes", help="Of files in the asset store, as 500G.")]
+Running = Annotated[str | None, typer.Option("--running", help="Quota of items running at once.")]
+Bytes = Annotated[str | None, typer.Option("--bytes", help="Quota of bytes in the asset store, such as 500G.")]
 Streams = Annotated[
-    str | None, typer.Option("--streams", help="Open live streams of one key; `none` = MAREY_STREAMS_PER_KEY.")
+    str | None, typer.Option("--streams", help="Quota of open live streams per key; `none` = MAREY_STREAMS_PER_KEY.")
 ]
 
 
@@ -42,7 +42,7 @@ def create(
     streams: Streams = None,
     as_json: console.Json = False,
 ) -> None:
-    """Make a tenant. Quotas that are not given are none."""
+    """Create a tenant; quotas default to none."""
     chosen = _chosen(queued, running, size, streams)
     with connection() as conn:
         from marey.tenants import Quotas, audit, create_tenant
@@ -50,12 +50,12 @@ def create(
         row = create_tenant(conn, tenant, Quotas(**chosen))
         audit(conn, tenant, operator(), "tenant.create", tenant, **chosen)
         shown = _view(conn, row)
-    _tell(shown, f"{tenant} is there. A key: `marey admin keys create NAME --tenant {tenant}`.", as_json)
+    _tell(shown, f"{tenant} was created. A key: `marey admin keys create NAME --tenant {tenant}`.", as_json)
 
 
 @app.command("list")
 def list_them(as_json: console.Json = False) -> None:
-    """List tenants: what each has of what it may have."""
+    """List tenants with quotas and usage."""
     with connection() as conn:
         from marey.tenants import list_tenants
 
@@ -69,7 +69,7 @@ def list_them(as_json: console.Json = False) -> None:
 
 @app.command("show")
 def show(tenant: Name, as_json: console.Json = False) -> None:
-    """Show a tenant, its quotas and what is used of them."""
+    """Show a tenant with its quotas and usage."""
     with connection() as conn:
         from marey.tenants import get_tenant
 
@@ -92,7 +92,7 @@ def change(
     streams: Streams = None,
     as_json: console.Json = False,
 ) -> None:
-    """Change quotas: those that are given. What a tenant has beyond a new one stays."""
+    """Change the given quotas. Existing usage beyond a new quota stays."""
     chosen = _chosen(queued, running, size, streams)
     if not chosen:
         raise InvalidInput(
@@ -112,7 +112,7 @@ def suspend(
     tenant: Name,
     reason: Annotated[str | None, typer.Option("--reason", help="For the audit log.")] = None,
 ) -> None:
-    """Answer no request of a tenant and begin nothing more of it; what is being made is finished."""
+    """Refuse a tenant's requests and start none of its items; running items are finished."""
     with connection() as conn:
         from marey.tenants import audit, suspend_tenant
 
@@ -123,7 +123,7 @@ def suspend(
 
 @app.command("reinstate")
 def reinstate(tenant: Name) -> None:
-    """End a suspension; the tenant's jobs go on."""
+    """End a suspension; the tenant's jobs resume."""
     with connection() as conn:
         from marey.tenants import audit, reinstate_tenant
 
@@ -167,7 +167,7 @@ def _view(conn: sa.Connection, row: TenantRow) -> dict[str, Any]:
 
 
 def _used(view: dict[str, Any]) -> dict[str, str]:
-    """What is used of each quota, for people."""
+    """Usage of each quota, for people."""
     used, quotas = view["used"], view["quotas"]
     words = {
         "queued": f"{used['queued']}",

@@ -32,7 +32,7 @@ def parse(
     ] = defaults.MODEL,
     as_json: console.Json = False,
 ) -> None:
-    """Show the graph a prompt becomes. Needs no server."""
+    """Show the graph of a prompt. Needs no server."""
     from marey.core.extras import needs_extra
 
     texts = [item.prompt for item in right_items(read_prompts(prompts, file, input_format))]
@@ -49,10 +49,10 @@ def parse(
 @app.command()
 def serve(
     path: Annotated[
-        Path | None, typer.Option("--socket", help="Unix socket to listen on, in place of MAREY_HOST and MAREY_PORT.")
+        Path | None, typer.Option("--socket", help="Unix socket to listen on, instead of MAREY_HOST and MAREY_PORT.")
     ] = None,
 ) -> None:
-    """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is the secret that both share."""
+    """Run the text service, which parses prompts for the API; MAREY_TEXT_KEY is their shared secret."""
     os.umask(UMASK)
     from marey.core.extras import needs_extra
 

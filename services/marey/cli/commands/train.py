@@ -15,7 +15,7 @@ from marey.cli import console
 from marey.registry import Stage, Training
 
 EVALUATOR = Training(
-    help="What judges generated motions: the stage `tmr`, then `bundle`.",
+    help="Evaluator of generated motions: stage `tmr`, then `bundle`.",
     stages=(Stage("tmr", "Train the motion and the text encoder of the evaluator."),),
     config="marey.evaluator.config:named_config",
     train="marey.evaluator.train:train_stage",
@@ -52,19 +52,21 @@ Data = Annotated[Path, typer.Argument(metavar="DATA", help="A prepared folder, w
 Run = Annotated[Path, typer.Option("--run", help="Folder of all stages of one bundle.")]
 Config = Annotated[str, typer.Option("--config", help="starter, paper or tiny.")]
 Steps = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
-Minutes = Annotated[float | None, typer.Option("--max-minutes", help="Minutes; schedules follow whichever ends first.")]
-Seed = Annotated[int, typer.Option("--seed", help="Of weights and batches.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on from the last checkpoint.")]
-Warm = Annotated[bool, typer.Option("--warm", help="Start from the stage's finished part, not from nothing.")]
+Minutes = Annotated[
+    float | None, typer.Option("--max-minutes", help="Minutes; schedules follow the budget that ends first.")
+]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of weights and batches.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Resume from the last checkpoint.")]
+Warm = Annotated[bool, typer.Option("--warm", help="Start from the weights of the stage's finished part.")]
 Device = Annotated[str, typer.Option("--device", help="auto, cpu, cuda, cuda:1 …")]
 Threads = Annotated[int, typer.Option("--threads", help="0 = torch's own choice.")]
-Rate = Annotated[float | None, typer.Option("--learning-rate", help="None given = as the configuration says.")]
-Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Matrices in bfloat16 where that pays.")]
+Rate = Annotated[float | None, typer.Option("--learning-rate", help="Default: the configuration's.")]
+Bf16 = Annotated[bool, typer.Option("--bf16/--no-bf16", help="Use bfloat16 matrices where they are faster.")]
 
 
 Output = Annotated[Path, typer.Option("-o", "--output", help="The bundle's folder, such as models/hgm3-starter.")]
-Card = Annotated[Path | None, typer.Option("--card", help="The model card to put in.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a bundle that is there.")]
+Card = Annotated[Path | None, typer.Option("--card", help="A model card for the bundle; default: a generated one.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing bundle.")]
 Packed = Annotated[str, typer.Argument(metavar="BUNDLE", help="Name or path of a bundle.")]
 UNPACK = "Write the parts of a bundle into a run, to train on from them with `--warm`, on the same data or your own."
 
@@ -181,7 +183,7 @@ def evaluator_reference(
 
 @evaluator.command("reconstruct")
 def evaluator_reconstruct(
-    bundle: Annotated[str, typer.Argument(metavar="EVALUATOR", help="Name or path of the bundle that measures.")],
+    bundle: Annotated[str, typer.Argument(metavar="EVALUATOR", help="Name or path of the evaluator's bundle.")],
     generator: Annotated[str, typer.Argument(metavar="GENERATOR", help="A bundle, or a run's folder.")],
     data: Data,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="A report, .html, .json or .md.")] = None,

@@ -29,7 +29,7 @@ Ids = Annotated[list[str], typer.Argument(metavar="WEBHOOK…", help=f"Webhooks:
 
 
 class State(StrEnum):
-    """Where a delivery stands."""
+    """State of a delivery."""
 
     PENDING = "pending"
     DELIVERED = "delivered"
@@ -38,14 +38,15 @@ class State(StrEnum):
 
 @app.command()
 def add(
-    url: Annotated[str, typer.Argument(metavar="URL", help="Where messages are sent: https.")],
+    url: Annotated[str, typer.Argument(metavar="URL", help="The https address of your server.")],
     events: Annotated[
-        list[str] | None, typer.Option("--event", help="As job.ended; may be repeated. None given = all.")
+        list[str] | None,
+        typer.Option("--event", help="An event type, such as job.ended; may be repeated. Default: all."),
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="A name for it.")] = None,
     as_json: console.Json = False,
 ) -> None:
-    """Be told of what happens from now on; prints the webhook's id and its signing secret, this once."""
+    """Subscribe to events from now on; prints the webhook's id and, once, its signing secret."""
     body = {"url": url, **({"events": events} if events else {}), **({"name": name} if name else {})}
     from marey.client.transport import Transport
 
@@ -84,13 +85,13 @@ def show(webhook: Id, as_json: console.Json = False) -> None:
 
 @app.command()
 def pause(webhooks: Ids, as_json: console.Json = False) -> None:
-    """Stop telling; what happens meanwhile waits."""
+    """Pause deliveries; messages wait meanwhile."""
     _change(webhooks, as_json, paused=True)
 
 
 @app.command()
 def resume(webhooks: Ids, as_json: console.Json = False) -> None:
-    """Go on telling, with what waited first."""
+    """Resume deliveries, waiting messages first."""
     _change(webhooks, as_json, paused=False)
 
 
@@ -98,11 +99,11 @@ def resume(webhooks: Ids, as_json: console.Json = False) -> None:
 def rotate(
     webhook: Id,
     overlap_hours: Annotated[
-        float, typer.Option("--overlap-hours", min=0, max=720, help="The old secret signs as well for so long.")
+        float, typer.Option("--overlap-hours", min=0, max=720, help="Hours during which the old secret signs as well.")
     ] = 24,
     as_json: console.Json = False,
 ) -> None:
-    """Sign with another secret; prints it, this once. Until the overlap ends messages carry both signatures."""
+    """Replace the signing secret and print the new one once. Until the overlap ends messages carry both signatures."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -117,7 +118,7 @@ def rotate(
 
 @app.command()
 def remove(webhooks: Ids, yes: console.Yes = False) -> None:
-    """Remove webhooks, with their deliveries and log."""
+    """Remove webhooks with their deliveries and log."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -132,14 +133,14 @@ def remove(webhooks: Ids, yes: console.Yes = False) -> None:
 def deliveries(
     webhook: Id,
     event: Annotated[
-        str | None, typer.Argument(metavar="[EVENT]", help="Of one delivery: every try of it.", show_default=False)
+        str | None, typer.Argument(metavar="[EVENT]", help="Show every attempt of this delivery.", show_default=False)
     ] = None,
-    state: Annotated[State | None, typer.Option("--state", help="Only those.")] = None,
+    state: Annotated[State | None, typer.Option("--state", help="Only deliveries in this state.")] = None,
     limit: console.Limit = None,
     full_ids: console.FullIds = False,
     as_json: console.Json = False,
 ) -> None:
-    """List what a webhook was told in the last 30 days, newest first; or the tries of one delivery."""
+    """List a webhook's deliveries of the last 30 days, newest first; or the attempts of one delivery."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -160,10 +161,10 @@ def replay(
         list[str] | None,
         typer.Argument(metavar="EVENT…", help=DELIVERIES, show_default=False),
     ] = None,
-    failed: Annotated[bool, typer.Option("--failed", help="All whose tries are used up.")] = False,
+    failed: Annotated[bool, typer.Option("--failed", help="All deliveries without attempts left.")] = False,
     as_json: console.Json = False,
 ) -> None:
-    """Deliver once more, under the same ids and with all tries."""
+    """Deliver events again, under the same ids and with all attempts."""
     if bool(events) == failed:
         raise typer.BadParameter("give ids of events, or --failed")
     from marey.client.transport import Transport
@@ -184,11 +185,13 @@ def replay(
 @app.command("test")
 def send_test(
     webhook: Id,
-    wait: Annotated[bool, typer.Option("--wait", help="Until it was tried; exit code 6 if it did not arrive.")] = False,
-    timeout: Annotated[float, typer.Option("--timeout", min=0, help="Seconds to wait; then exit code 7.")] = 60.0,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for the attempt; exit 6 if it did not arrive.")] = False,
+    timeout: Annotated[
+        float, typer.Option("--timeout", min=0, help="Timeout in seconds; exit 7 when it passes.")
+    ] = 60.0,
     as_json: console.Json = False,
 ) -> None:
-    """Send a message of the type `webhook.test`, once; prints its id."""
+    """Send a message of type `webhook.test` once; prints its id."""
     from marey.client.transport import Transport
 
     with Transport.here() as client:
@@ -216,7 +219,7 @@ def _tried(client: Transport, found: dict[str, Any], timeout: float) -> dict[str
     while found["state"] == State.PENDING:
         if time.monotonic() > ends:
             raise TimedOut(
-                "it was not tried in the time allowed",
+                "no attempt was made in time",
                 where=f"webhook {found['webhook']}",
                 hint=f"Does a scheduler run? Later: `marey webhooks deliveries {found['webhook']}`.",
             )
