@@ -90,5 +90,5 @@ def test_a_query_parameter_that_is_not_known_is_named_by_every_operation(http: h
 def test_a_misspelt_filter_is_told_with_those_there_are(http: httpx2.Client) -> None:
     response = http.get("/v1/motions", params={"tags": "show=zzz"})
     assert refusal(response) == (422, "tags")
-    assert "tag, text" in response.json()["hint"]
+    assert "tag, text" in response.json()["detail"]
     assert http.get("/v1/motions", params={"tag": "show=zzz"}).json()["items"] == []
