@@ -90,7 +90,7 @@ class Asked:
         given = {
             "bundle": self.bundle,
             "evaluator": self.evaluator,
-            "settings": _settings(self.settings or ()) or None,
+            "settings": settings_of(self.settings or ()) or None,
             "repeats": self.repeats,
             "seed": self.seed,
             "baseline": self.baseline,
@@ -246,7 +246,8 @@ def check_comparison(found: dict[str, Any], *, fail_on_regression: bool) -> None
         )
 
 
-def _settings(given: Sequence[str]) -> dict[str, float]:
+def settings_of(given: Sequence[str]) -> dict[str, float]:
+    """Settings of `--set NAME=VALUE`; raises InvalidInput for something else."""
     try:
         return dict(map(read_setting, given))
     except InvalidInput as error:

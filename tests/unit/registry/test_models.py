@@ -51,6 +51,7 @@ def test_every_reference_of_every_model_is_there(name: str) -> None:
     spec = get_model(name)
     training = spec.training
     references = [spec.handler, spec.load, spec.live, spec.tokenizer, spec.random_bundle]
+    references += [spec.live_adherence, spec.self_train, *(each.run for each in spec.ablations)]
     if training is not None:
         references += [training.config, training.train, training.assemble, training.unpack]
     for reference in filter(None, references):

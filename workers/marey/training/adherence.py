@@ -1,7 +1,6 @@
 """Prompt adherence of a bundle: the 200 evaluation prompts, several seeds, judged on the exported joints.
 
-    python -m marey.models.hgm3.obedience models/hgm3-starter --seeds 3 -o report
-    python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 -o report
+    marey eval adherence hgm3-starter --seeds 3 -o report
 
 Choose settings (steps, guidance, temperature) with `--captions DATA`, the captions of a prepared folder's validation
 clips, or with `--prompts development`, never on the evaluation prompts. `--prompts blind` is a second held-out set
@@ -13,20 +12,18 @@ Motions are judged as exported: feet cleaned, rotations solved.
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from marey.checks.judge import judge, straightness
-from marey.checks.prompts import EvaluationPrompt, PromptSet, evaluation_prompts
+from marey.checks.prompts import EvaluationPrompt
 from marey.checks.quality import Quality, quality
 from marey.checks.rates import Rate, expectations, mean_quality, name_of
-from marey.core.errors import InvalidBundle, InvalidInput
+from marey.core.errors import InvalidBundle
 from marey.data.prepared import PreparedData
 from marey.generation.export import finish
 from marey.generation.port import Generator, Request, S
@@ -172,35 +169,6 @@ def _judged(generator: Generator[S], jobs: Sequence[tuple[EvaluationPrompt, Requ
         )
 
 
-def _settings(given: Sequence[str]) -> dict[str, Any]:
-    """`["guidance=3", "steps=8"]` by name."""
-    out: dict[str, Any] = {}
-    for text in given:
-        name, _, value = text.partition("=")
-        try:
-            out[name] = json.loads(value)
-        except ValueError as error:
-            raise InvalidInput("is not NAME=VALUE", where=f"--set {text}", hint="Such as guidance=3.") from error
-    return out
-
-
-def parser_of(program: str) -> argparse.ArgumentParser:
-    """The options that all models share."""
-    parser = argparse.ArgumentParser(prog=f"python -m {program}", description="Does a bundle do what the prompts say?")
-    parser.add_argument("bundle", help="name or path")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--seconds", type=float, help="length of every motion; else the model's own choice")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="one setting, guidance=3")
-    parser.add_argument("--captions", type=Path, metavar="DATA", help="a folder: its validation captions instead")
-    parser.add_argument(
-        "--prompts", choices=get_args(PromptSet), default="evaluation", help="the set that is asked for"
-    )  # fmt: skip
-    parser.add_argument("--every", type=int, default=1, help="only each K-th prompt, for a quick look")
-    parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, help="folder of report.json and report.md")
-    return parser
-
-
 def pipeline_of(generator: Generator[Any]) -> TextPipeline:
     """Text pipeline of a bundle. Raise InvalidBundle if the bundle declares none."""
     text = generator.bundle.manifest.text
@@ -209,33 +177,47 @@ def pipeline_of(generator: Generator[Any]) -> TextPipeline:
     return TextPipeline.load(text)
 
 
-def report_of(generator: Generator[Any], chosen: argparse.Namespace) -> Report:
-    """Measure a bundle as the command line requests, and print its failures."""
-    prompts = validation_prompts(chosen.captions) if chosen.captions else evaluation_prompts(chosen.prompts)
-    prompts = prompts[:: chosen.every]
-    report = measure(
+def judge_bundle(
+    generator: Generator[Any],
+    prompts: Sequence[EvaluationPrompt],
+    *,
+    seeds: int,
+    seconds: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Report:
+    """Judge a bundle on prompts, each with the seeds from 0 on; see `measure`.
+
+    Args:
+        seconds: length of every motion; None = the model's own choice.
+        settings: of sampling, by name.
+
+    Raises:
+        InvalidInput: the model has no such setting, or it is out of range.
+        InvalidBundle: the bundle declares no text pipeline.
+    """
+    return measure(
         generator,
         pipeline_of(generator).features([p.text for p in prompts]),
         prompts,
-        seeds=range(chosen.seeds),
-        settings=generator.settings(_settings(chosen.set)),
-        frames=None if chosen.seconds is None else round(chosen.seconds * generator.limits.fps),
-        progress=lambda done, total: print(f"\r{done}/{total}", end="", file=sys.stderr),  # noqa: T201
+        seeds=range(seeds),
+        settings=generator.settings(settings or {}),
+        frames=None if seconds is None else round(seconds * generator.limits.fps),
+        progress=progress,
     )
-    print(file=sys.stderr)  # noqa: T201
+
+
+def failures_of(report: Report) -> dict[str, list[str]]:
+    """Prompts that were not adhered to, with seed and reason, by group."""
     failures = defaultdict[str, list[str]](list)
     for trial in report.trials:
         if not trial.passed:
             failures[trial.group].append(f"{trial.prompt!r} (seed {trial.seed}): {trial.reason}")
-    for group, reasons in failures.items():
-        print(f"{group}:", *reasons[:6], sep="\n  ", file=sys.stderr)  # noqa: T201
-    return report
+    return dict(failures)
 
 
-def publish(found: Mapping[str, Any], markdown: str, folder: Path | None) -> None:
-    """Print the tables; JSON and Markdown into a folder where one is named."""
-    print(markdown)  # noqa: T201
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "report.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
-        (folder / "report.md").write_text(markdown, encoding="utf-8")
+def write_report(found: Mapping[str, Any], markdown: str, folder: Path) -> None:
+    """Write `report.json` and `report.md` into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "report.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    (folder / "report.md").write_text(markdown, encoding="utf-8")

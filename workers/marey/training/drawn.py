@@ -77,7 +77,7 @@ def load_drawn(run: Path, tokenizer: MotionTokenizer, prepared: PreparedData) ->
     except (SafetensorError, OSError) as error:
         raise InvalidFile(f"cannot be read: {error}", where=str(file), hint="Remove it.") from error
     if key != _key(tokenizer, prepared):
-        hint = "Remove it, or draw again (`python -m marey.models.hgm3.practice`)."
+        hint = "Remove it, or draw again (`marey train self-train`)."
         raise InvalidFile("was drawn with another tokenizer, or for other data", where=str(file), hint=hint)
     values = load_file(file)
     return Drawn(values["clips"].numpy(), values["lengths"], values["tokens"].long())

@@ -215,3 +215,42 @@ def _follow(client: Any, run: str, timeout: float | None, *, fail_on_regression:
     elif found["state"] == "done":
         console.say(f"done: {found['reason']}")
     evaluating.check_evaluation(found, fail_on_regression=fail_on_regression)
+
+
+@app.command()
+def adherence(
+    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Model or bundle, or its folder.")],
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Motions of each prompt.")] = 3,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="Length of every motion; none given = the model decides.")
+    ] = None,
+    settings: evaluating.Settings = None,
+    prompts: Annotated[
+        str, typer.Option("--prompts", help="Set of prompts: evaluation, blind, development or fresh.")
+    ] = "evaluation",
+    captions: Annotated[
+        Path | None, typer.Option("--captions", metavar="DATA", help="A prepared folder: its validation captions.")
+    ] = None,
+    every: Annotated[int, typer.Option("--every", min=1, help="Only each K-th prompt, for a quick look.")] = 1,
+    steers: Annotated[int, typer.Option("--steers", min=0, help="Live sessions that are steered.")] = 0,
+    walks: Annotated[int, typer.Option("--walks", min=0, help="Live sessions of 2,000 frames.")] = 0,
+    threads: Annotated[int, typer.Option("--threads", min=0, help="Of torch; 0 = its own choice.")] = 0,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for report.json and report.md.")] = None,
+    as_json: console.Json = False,
+) -> None:
+    """Check whether the motions of a bundle do what their prompts say. Needs no server and no evaluator."""
+    from marey.cli.roles.adherence import judge_adherence
+
+    with console.bar() as bar:
+        task = bar.add_task("judging", total=None)
+        judged = judge_adherence(
+            bundle, seeds=seeds, seconds=seconds, settings=evaluating.settings_of(settings or ()), captions=captions,
+            prompts=prompts, every=every, steers=steers, walks=walks, threads=threads, output=output,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )  # fmt: skip
+    for group, reasons in judged.failures.items():
+        console.say("\n  ".join([f"{group}:", *reasons[:6]]))
+    if as_json:
+        console.result_json(judged.document)
+    else:
+        console.result(judged.markdown.rstrip("\n"))

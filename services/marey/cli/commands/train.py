@@ -208,3 +208,51 @@ def evaluator_reconstruct(
         for metric, value in values.items():
             if value["mean"] is not None:
                 console.result(f"{source}/{metric} = {value['mean']:g}")
+
+
+@app.command("self-train")
+def self_train(
+    bundle: Packed,
+    data: Data,
+    run: Run,
+    captions: Annotated[int, typer.Option("--captions", help="Captions to draw motions for.")] = 3600,
+    seed: Seed = 0,
+    threads: Threads = 0,
+) -> None:
+    """Draw motions for training captions, and keep those that do what the caption says for the next training.
+
+    The run must have the bundle's tokenizer: `marey train MODEL unpack` puts it there. The stage that learns from the
+    kept motions finds them in the run.
+    """
+    from marey.cli.roles import training
+
+    with console.bar() as bar:
+        task = bar.add_task("drawing", total=None)
+        kept = training.self_train(
+            bundle, data, run, captions=captions, seed=seed, threads=threads,
+            progress=lambda line: bar.update(task, description=line),
+        )  # fmt: skip
+    console.result(f"{kept} motions kept")
+
+
+@app.command()
+def ablate(
+    data: Data,
+    bundle: Annotated[str, typer.Argument(metavar="BUNDLE", help="Gives the configuration and the other parts.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of runs, numbers and tables.")],
+    what: Annotated[
+        str | None, typer.Option("--what", help="Which ablation of the model; none given = the only one.")
+    ] = None,
+    steps: Annotated[int, typer.Option("--steps", help="Optimiser steps of each variant.")] = 1500,
+    batch: Annotated[int | None, typer.Option("--batch", help="Clips a step; none given = as configured.")] = None,
+    seeds: Annotated[int, typer.Option("--seeds", help="Training seeds of each variant.")] = 1,
+    threads: Threads = 0,
+) -> None:
+    """Train variants of a model, and measure what each of its parts is worth. Called again, it goes on."""
+    from marey.cli.roles import training
+
+    console.result(
+        training.ablate(
+            what, data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads
+        ).rstrip("\n")
+    )  # fmt: skip

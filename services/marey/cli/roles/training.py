@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
 from marey.registry import Training, find_model, model_names, resolve
 
@@ -88,3 +89,83 @@ def renew_reference(bundle: str, data: Path, output: Path, *, overwrite: bool) -
     except ImportError as error:
         raise needs_extra("train", error) from error
     return renew_reference(find_bundle(bundle), data, output, overwrite=overwrite).reference
+
+
+def self_train(
+    bundle: str,
+    data: Path,
+    run: Path,
+    *,
+    captions: int,
+    seed: int,
+    threads: int,
+    progress: Callable[[str], None],
+) -> int:
+    """Draw motions for training captions, and leave those that do what the caption says in a run; how many.
+
+    Raises:
+        InvalidInput: the bundle's model cannot be trained on its own motions.
+    """
+    try:
+        from marey.bundles import choose_bundle
+        from marey.data.prepared import PreparedData
+        from marey.training.adherence import pipeline_of
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    found = choose_bundle(bundle)
+    spec = find_model(found.manifest.model)
+    if spec is None or spec.self_train is None:
+        able = [name for name in model_names() if (each := find_model(name)) and each.self_train]
+        raise InvalidInput(
+            f"the model {found.manifest.model!r} has no self-training",
+            where=bundle,
+            hint=f"Models that have: {', '.join(able) or 'none'}.",
+        )
+    generator = resolve(spec.load)(found, threads=threads)
+    prepared = PreparedData.open(data)
+    return resolve(spec.self_train)(
+        generator, pipeline_of(generator), prepared, run, captions=captions, seed=seed, progress=progress
+    )
+
+
+def ablate(
+    name: str | None,
+    data: Path,
+    bundle: str,
+    output: Path,
+    *,
+    steps: int,
+    batch: int | None,
+    seeds: int,
+    threads: int,
+) -> str:
+    """Train and measure variants of a bundle's model; a Markdown table.
+
+    Args:
+        name: of the ablation; None = the only one of the model.
+
+    Raises:
+        InvalidInput: the model has no such ablation, or several and none is named.
+    """
+    try:
+        from marey.bundles import choose_bundle
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    found = choose_bundle(bundle)
+    spec = find_model(found.manifest.model)
+    known = {each.name: each for each in (spec.ablations if spec else ())}
+    if name is None and len(known) == 1:
+        (name,) = known
+    if name not in known:
+        raise InvalidInput(
+            f"the model {found.manifest.model!r} has no ablation {name!r}"
+            if name
+            else "the model has several ablations",
+            where="--what",
+            hint=f"Known: {'; '.join(f'{each.name} ({each.help})' for each in known.values()) or 'none'}.",
+        )
+    try:
+        run = resolve(known[name].run)
+    except ImportError as error:
+        raise needs_extra("train", error) from error
+    return run(data, bundle, output, steps=steps, batch=batch, seeds=seeds, threads=threads)

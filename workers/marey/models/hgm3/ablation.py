@@ -1,6 +1,6 @@
 """What hard token mining and the hierarchy of conditions are worth, on several training seeds.
 
-    python -m marey.models.hgm3.ablation data/prepared models/hgm3-starter --steps 1500 --seeds 3 -o report
+    marey train ablate data/prepared hgm3-starter --steps 1500 --seeds 3 -o report
 
 Everything but the masked transformer is the bundle's: it is trained from nothing, once with hard and once with random
 masks a seed, with as many steps each; every result is then decoded hierarchically, flat, and with at least one token a
@@ -9,18 +9,16 @@ pass, and judged on the evaluation prompts. What is finished is kept: called aga
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
-import sys
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 from marey.bundles import find_bundle
 from marey.checks.prompts import evaluation_prompts
-from marey.core.errors import InvalidBundle, MareyError
+from marey.core.errors import InvalidBundle
 from marey.models.hgm3.assembly import assemble, take_apart
 from marey.models.hgm3.config import HGM3Config
 from marey.models.hgm3.generate import Generator, Settings
@@ -53,50 +51,35 @@ def train_variant(
     return found
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Train, judge, and write `results.json` and `results.md`."""
-    parser = argparse.ArgumentParser(
-        prog="python -m marey.models.hgm3.ablation", description="Masks and decoding, by seeds."
-    )
-    parser.add_argument("data", type=Path, help="a prepared folder, with its texts")
-    parser.add_argument("bundle", help="name or path: gives every part but the masked transformer")
-    parser.add_argument("--steps", type=int, default=1500)
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    chosen = parser.parse_args(arguments)
-    given = find_bundle(chosen.bundle).manifest
+def ablate(data: Path, bundle: str, output: Path, *, steps: int, batch: int | None, seeds: int, threads: int) -> str:
+    """Train and judge; write `results.json` and `results.md`, and return the table.
+
+    Raises:
+        InvalidBundle: the bundle declares no text pipeline.
+    """
+    given = find_bundle(bundle).manifest
     config = HGM3Config.from_dict(given.parameters)
+    if batch is not None:
+        config = replace(config, train_masked=replace(config.train_masked, batch=batch))
     if given.text is None:
-        raise InvalidBundle("does not say how it reads prompts", where=chosen.bundle)
+        raise InvalidBundle("does not say how it reads prompts", where=bundle)
     texts = TextPipeline.load(given.text).features([p.text for p in evaluation_prompts()])
     results: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for seed in range(chosen.seeds):
-        for mask in ("hard", "random"):
-            folder = chosen.output / f"{mask}-{seed}"
-            file = folder / "numbers.json"
-            if not file.is_file():
-                own = replace(config, mining=replace(config.mining, mask=mask))
-                options = TrainOptions(
-                    chosen.data, folder, own, Budget(steps=chosen.steps), seed=seed, threads=chosen.threads
-                )
-                validation = train_variant(chosen.data, chosen.bundle, folder, own, options)
-                generator = Generator.load(str(folder / "bundle"), threads=chosen.threads)
-                numbers = {
-                    name: {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts, settings)
-                    for name, settings in DECODINGS.items()
-                }
-                file.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
-            for name, numbers in json.loads(file.read_text(encoding="utf-8")).items():
-                results[f"{mask} masks, {name}"].append(numbers)
-            (chosen.output / "results.md").write_text(table(results), encoding="utf-8")
-    (chosen.output / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
-    print(table(results))  # noqa: T201
-    return 0
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except MareyError as error:
-        sys.exit(f"{error}")
+    for seed, mask in product(range(seeds), ("hard", "random")):
+        folder = output / f"{mask}-{seed}"
+        file = folder / "numbers.json"
+        if not file.is_file():
+            own = replace(config, mining=replace(config.mining, mask=mask))
+            options = TrainOptions(data, folder, own, Budget(steps=steps), seed=seed, threads=threads)
+            validation = train_variant(data, bundle, folder, own, options)
+            generator = Generator.load(str(folder / "bundle"), threads=threads)
+            numbers = {
+                name: {"validation loss": validation["reconstruction/specific"]} | judge(generator, texts, settings)
+                for name, settings in DECODINGS.items()
+            }
+            file.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
+        for name, numbers in json.loads(file.read_text(encoding="utf-8")).items():
+            results[f"{mask} masks, {name}"].append(numbers)
+        (output / "results.md").write_text(table(results), encoding="utf-8")
+    (output / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
+    return table(results)

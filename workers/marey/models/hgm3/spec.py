@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import Choice, ModelSpec, Setting, Stage, Training
+from marey.registry import Ablation, Choice, ModelSpec, Setting, Stage, Training
 
 SPEC = ModelSpec(
     name="hgm3",
@@ -43,4 +43,8 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     tokenizer="marey.models.hgm3.tokenizer:build_tokenizer",
     random_bundle="marey.models.hgm3.bundle:random_bundle",
+    self_train="marey.models.hgm3.self_train:self_train_into",
+    ablations=(
+        Ablation("masks", "Hard and random masks, each decoded in three ways.", "marey.models.hgm3.ablation:ablate"),
+    ),
 )

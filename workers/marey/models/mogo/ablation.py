@@ -1,7 +1,7 @@
 """What MOGO's own parts are worth: learnable scaling, the level beside the prompt (PnQ), the depth head, one lane.
 
-    python -m marey.models.mogo.ablation tokenizer data/prepared models/mogo-starter --steps 1500 -o report
-    python -m marey.models.mogo.ablation transformer data/prepared models/mogo-starter --steps 600 --batch 8 -o report
+    marey train ablate data/prepared mogo-starter --what tokenizer --steps 1500 -o report
+    marey train ablate data/prepared mogo-starter --what transformer --steps 600 --batch 8 -o report
 
 Each variant is trained from nothing with as many steps as the others, on the same seeds; what it is not about is the
 bundle's. `tokenizer` compares the quantizer's scales (MOGO eq. 1-6) by the errors of captured test clips. `transformer`
@@ -11,22 +11,20 @@ product can draw from a variant. What is finished is kept: called again, it goes
 
 from __future__ import annotations
 
-import argparse
 import json
 import shutil
-import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from marey.bundles import find_bundle
 from marey.checks.prompts import evaluation_prompts
-from marey.core.errors import MareyError
 from marey.models.mogo.assembly import RECIPE, assemble, take_apart
 from marey.models.mogo.config import MOGOConfig
 from marey.models.mogo.generate import Generator
@@ -126,52 +124,50 @@ def train_transformer(bundle: str, variant: Variant, options: TrainOptions[MOGOC
     return found | judge(generator, texts, generator.settings({}))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Train, measure, and write `results.json` and `results.md`."""
-    parser = argparse.ArgumentParser(
-        prog="python -m marey.models.mogo.ablation", description="Scales; levels and depth."
-    )
-    parser.add_argument("about", choices=["tokenizer", "transformer"])
-    parser.add_argument("data", type=Path, help="a prepared folder, for transformers with its texts")
-    parser.add_argument("bundle", help="name or path: gives the configuration, and the tokenizer of all transformers")
-    parser.add_argument("--steps", type=int, default=1500)
-    parser.add_argument("--batch", type=int, default=0, help="clips a step; 0 = as configured")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    chosen = parser.parse_args(arguments)
-    use_threads(chosen.threads)
-    config = MOGOConfig.from_dict(find_bundle(chosen.bundle).manifest.parameters)
-    if chosen.batch:
+def ablate_tokenizer(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare the scales of MoSA; see `_ablate`."""
+    return _ablate("tokenizer", SCALES, data, bundle, output, **options)
+
+
+def ablate_transformer(data: Path, bundle: str, output: Path, **options: Any) -> str:
+    """Compare the ways of levels and depth; see `_ablate`."""
+    return _ablate("transformer", VARIANTS, data, bundle, output, **options)
+
+
+def _ablate(
+    about: str,
+    names: Iterable[str],
+    data: Path,
+    bundle: str,
+    output: Path,
+    *,
+    steps: int,
+    batch: int | None,
+    seeds: int,
+    threads: int,
+) -> str:
+    """Train and measure each variant with each seed; write the table as `<about>.md`, and return it."""
+    use_threads(threads)
+    config = MOGOConfig.from_dict(find_bundle(bundle).manifest.parameters)
+    if batch is not None:
         config = replace(
             config,
-            train_tokenizer=replace(config.train_tokenizer, batch=chosen.batch),
-            train_transformer=replace(config.train_transformer, batch=chosen.batch),
+            train_tokenizer=replace(config.train_tokenizer, batch=batch),
+            train_transformer=replace(config.train_transformer, batch=batch),
         )
     results: dict[str, list[dict[str, float]]] = defaultdict(list)
-    names = SCALES if chosen.about == "tokenizer" else VARIANTS
-    for seed, (number, name) in product(range(chosen.seeds), enumerate(names)):
-        run = chosen.output / f"{chosen.about}-{number}-{seed}"
+    for seed, (number, name) in product(range(seeds), enumerate(names)):
+        run = output / f"{about}-{number}-{seed}"
         file = run / "numbers.json"
         if not file.is_file():
             shutil.rmtree(run, ignore_errors=True)
             run.mkdir(parents=True)
-            options = TrainOptions(
-                chosen.data, run, config, Budget(steps=chosen.steps), seed=seed, threads=chosen.threads
-            )
+            options = TrainOptions(data, run, config, Budget(steps=steps), seed=seed, threads=threads)
             if name in SCALES:
                 numbers = train_tokenizer(SCALES[name], options)
             else:
-                numbers = train_transformer(chosen.bundle, VARIANTS[name], options)
+                numbers = train_transformer(bundle, VARIANTS[name], options)
             file.write_text(json.dumps(numbers, indent=1), encoding="utf-8")
         results[name].append(json.loads(file.read_text(encoding="utf-8")))
-        (chosen.output / f"{chosen.about}.md").write_text(table(results), encoding="utf-8")
-    print(table(results))  # noqa: T201
-    return 0
-
-
-if __name__ == "__main__":
-    try:
-        sys.exit(main())
-    except MareyError as error:
-        sys.exit(f"{error}")
+        (output / f"{about}.md").write_text(table(results), encoding="utf-8")
+    return table(results)

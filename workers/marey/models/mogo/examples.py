@@ -22,9 +22,9 @@ from marey.bundles import find_bundle
 from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
 from marey.core.checkout import checkout
 from marey.core.errors import MareyError
+from marey.models.mogo.adherence import AFTER, BEFORE, SESSIONS, played, steered
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
-from marey.models.mogo.obedience import AFTER, BEFORE, SESSIONS, played, steered
 from marey.text.features import TextFeatures
 from marey.training.adherence import pipeline_of
 

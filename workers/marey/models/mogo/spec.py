@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marey.registry import ModelSpec, Setting, Stage, Training
+from marey.registry import Ablation, ModelSpec, Setting, Stage, Training
 
 SPEC = ModelSpec(
     name="mogo",
@@ -39,4 +39,9 @@ The same prompt, seed, settings and bundle give the same motion.""",
     ),
     tokenizer="marey.models.mogo.tokenizer:build_tokenizer",
     random_bundle="marey.models.mogo.bundle:random_bundle",
+    live_adherence="marey.models.mogo.adherence:judge_streams",
+    ablations=(
+        Ablation("tokenizer", "Ways in which MoSA scales its levels.", "marey.models.mogo.ablation:ablate_tokenizer"),
+        Ablation("transformer", "How levels and depth are drawn.", "marey.models.mogo.ablation:ablate_transformer"),
+    ),
 )

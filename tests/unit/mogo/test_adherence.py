@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
-from marey.models.mogo import obedience
+from marey.cli.roles.adherence import judge_adherence
+from marey.models.mogo import adherence
+from marey.models.mogo.adherence import pairs_of, steered
 from marey.models.mogo.bundle import random_bundle
-from marey.models.mogo.obedience import main, pairs_of, steered
 from tests.support.bodies import bower, walker
 
 FPS = 20.0
@@ -41,14 +42,14 @@ def test_steers_go_between_different_acts_and_are_the_same_every_time() -> None:
         assert not second.separate
 
 
-def test_a_report_holds_whole_motions_and_live_sessions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(obedience, "LONG", 120)
+def test_a_report_holds_whole_motions_and_live_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adherence, "LONG", 120)
     bundle = random_bundle(tmp_path / "tiny")
-    options = ["--seeds", "1", "--every", "50", "--steers", "3", "--walks", "2", "-o", str(tmp_path / "report")]
-    main([str(bundle.path), *options])
+    judged = judge_adherence(
+        str(bundle.path), seeds=1, seconds=None, settings={}, captions=None, prompts="evaluation", every=50, steers=3,
+        walks=2, threads=0, output=tmp_path / "report", progress=lambda done, total: None,
+    )  # fmt: skip
     found = json.loads((tmp_path / "report" / "report.json").read_text())
     assert len(found["trials"]) == 4
     assert [len(sessions) for sessions in found["live"].values()] == [3, 2]
-    assert "obeyed within 2 s of a steer" in capsys.readouterr().out
+    assert "obeyed within 2 s of a steer" in judged.markdown

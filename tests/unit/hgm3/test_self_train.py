@@ -14,13 +14,13 @@ from marey.bundles import Bundle
 from marey.checks.judge import Expectation, Verdict
 from marey.core.errors import InvalidFile
 from marey.data.prepared import PreparedData
-from marey.models.hgm3 import practice
+from marey.models.hgm3 import self_train as module
 from marey.models.hgm3.assembly import take_apart
 from marey.models.hgm3.bundle import random_bundle
 from marey.models.hgm3.config import TINY, HGM3Config
 from marey.models.hgm3.data import CaptionData
 from marey.models.hgm3.generate import Generator
-from marey.models.hgm3.practice import practise
+from marey.models.hgm3.self_train import self_train
 from marey.models.hgm3.stage_masked import MaskedStage
 from marey.models.hgm3.tokenizer import Tokenizer
 from marey.models.hgm3.train import train_stage
@@ -71,7 +71,7 @@ def obeying(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
         def verdict(_joints: object, _fps: float, expected: Sequence[Expectation]) -> Verdict:
             return Verdict([each.act for each in expected] == [act])
 
-        monkeypatch.setattr(practice, "judge", verdict)
+        monkeypatch.setattr(module, "judge", verdict)
 
     return only
 
@@ -81,7 +81,7 @@ def test_what_obeys_is_kept_and_what_does_not_is_tried_three_times(
 ) -> None:
     obeying("walk")
     reader = Reader()
-    drawn = practise(Generator.load(bundle, device="cpu"), reader, joined_data, 24)
+    drawn = self_train(Generator.load(bundle, device="cpu"), reader, joined_data, 24)
     acts = [joined_data.clips[clip].acts for clip in drawn.clips]
     assert acts
     assert set(acts) == {("walk",)}
@@ -123,7 +123,7 @@ def test_the_masked_stage_trains_on_what_lies_in_its_run_and_refuses_what_is_of_
     obeying("bow")
     take_apart(bundle, tmp_path)
     generator = Generator.load(bundle, device="cpu")
-    drawn = practise(generator, Reader(), joined_data, 12)
+    drawn = self_train(generator, Reader(), joined_data, 12)
     drawn.write(tmp_path, generator.networks.tokenizer, joined_data)
     read = load_drawn(tmp_path, generator.networks.tokenizer, joined_data)
     assert read is not None

@@ -1,7 +1,6 @@
 """Does a bundle of MOGO do what the prompts say, in whole motions and while it streams?
 
-    python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 -o report
-    python -m marey.models.mogo.obedience models/mogo-starter --seeds 3 --steers 100 --walks 8 -o report
+    marey eval adherence mogo-starter --seeds 3 --steers 100 --walks 8 -o report
 
 Whole motions are judged as any model's (`marey.training.adherence`). `--steers` are live sessions: 4 s of one
 evaluation prompt, then another that asks for another act. It is obeyed within 2 s when a stretch that begins in these
@@ -12,23 +11,19 @@ evaluation prompt, then another that asks for another act. It is obeyed within 2
 from __future__ import annotations
 
 import random
-import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from marey.checks.judge import Verdict, judge
-from marey.checks.prompts import EvaluationPrompt, evaluation_prompts
-from marey.checks.rates import Rate
-from marey.core.errors import MareyError
+from marey.checks.prompts import EvaluationPrompt
 from marey.models.mogo.generate import Generator
 from marey.models.mogo.live import LiveSessionPool
 from marey.motion.kinematics import Array, forward_kinematics
 from marey.streams.frames import Frame
 from marey.text.features import TextFeatures
-from marey.training.adherence import parser_of, pipeline_of, publish, report_of
+from marey.training.adherence import pipeline_of
 
 SESSIONS = 16
 BEFORE, AFTER, WITHIN = 4.0, 6.0, 2.0  # seconds
@@ -72,7 +67,7 @@ def steered(joints: Array, fps: float, expected: EvaluationPrompt) -> Verdict:
     return next((v for v in verdicts if v.passed), verdicts[-1])
 
 
-def steers(
+def steered_sessions(
     generator: Generator, prompts: Sequence[EvaluationPrompt], texts: dict[str, TextFeatures], count: int
 ) -> list[Streamed]:
     """Steer so many sessions from one act of these prompts to another."""
@@ -93,7 +88,7 @@ def steers(
     return found
 
 
-def walks(
+def walking_sessions(
     generator: Generator, prompts: Sequence[EvaluationPrompt], texts: dict[str, TextFeatures], count: int
 ) -> list[Streamed]:
     """Walk for 2,000 frames, so many times."""
@@ -117,37 +112,13 @@ def _joints(room: LiveSessionPool, shown: Sequence[Frame]) -> Array:
     return forward_kinematics(room.skeleton, rotations, root)
 
 
-def _markdown(title: str, found: Sequence[Streamed]) -> str:
-    rate = Rate(len(found), sum(each.passed for each in found))
-    return f"| {title} | {rate.clips} | {rate.share:.1%} |\n"
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Judge one bundle."""
-    parser = parser_of("marey.models.mogo.obedience")
-    parser.add_argument("--steers", type=int, default=0, metavar="N", help="live sessions that are steered")
-    parser.add_argument("--walks", type=int, default=0, metavar="N", help="live sessions of 2,000 frames")
-    chosen = parser.parse_args(arguments)
-    generator = Generator.load(chosen.bundle, threads=chosen.threads)
-    report = report_of(generator, chosen)
-    found: dict[str, Any] = report.to_json()
-    markdown = report.markdown()
-    if chosen.steers or chosen.walks:
-        prompts = evaluation_prompts(chosen.prompts)
-        words = [p.text for p in prompts]
-        texts = dict(zip(words, pipeline_of(generator).features(words), strict=True))
-        live = {
-            "obeyed within 2 s of a steer": steers(generator, prompts, texts, chosen.steers),
-            "still walking at frame 2,000": walks(generator, prompts, texts, chosen.walks) if chosen.walks else [],
-        }
-        markdown += "\n| live sessions | sessions | obeyed |\n|---|---|---|\n"
-        markdown += "".join(_markdown(title, some) for title, some in live.items() if some)
-        found["live"] = {title: [asdict(each) for each in some] for title, some in live.items()}
-    publish(found, markdown, chosen.output)
-
-
-if __name__ == "__main__":
-    try:
-        main()
-    except MareyError as error:
-        sys.exit(f"{error}")
+def judge_streams(
+    generator: Generator, prompts: Sequence[EvaluationPrompt], *, steers: int, walks: int
+) -> dict[str, list[Streamed]]:
+    """Judge so many live sessions that are steered, and so many that walk for 2,000 frames; by title."""
+    words = [p.text for p in prompts]
+    texts = dict(zip(words, pipeline_of(generator).features(words), strict=True))
+    return {
+        "obeyed within 2 s of a steer": steered_sessions(generator, prompts, texts, steers),
+        "still walking at frame 2,000": walking_sessions(generator, prompts, texts, walks) if walks else [],
+    }

@@ -1,6 +1,6 @@
 """More to learn from: what a finished bundle makes of training captions, where the checker says that it obeyed (ours).
 
-    python -m marey.models.hgm3.practice models/hgm3-starter DATA --run RUN
+    marey train self-train hgm3-starter DATA --run RUN
 
 Asked for mostly are sequences, which captures show and the model obeys least; who fails may try again. What is kept
 lies in the run folder, where the masked stage finds it: one round of Gulcehre et al. 2023, "Reinforced Self-Training
@@ -9,8 +9,6 @@ lies in the run folder, where the masked stage finds it: one round of Gulcehre e
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,14 +19,12 @@ import torch
 
 from marey.checks.judge import Expectation, judge
 from marey.checks.rates import expectations
-from marey.core.errors import MareyError
 from marey.data.manifest import Clip
 from marey.data.prepared import PreparedData
 from marey.generation.export import finish
 from marey.generation.port import Request
 from marey.models.hgm3.generate import Generator
 from marey.text.pipeline import TextPipeline
-from marey.training.adherence import pipeline_of
 from marey.training.drawn import Drawn
 
 ACTS = {1: 0.2, 2: 0.6, 3: 0.2}
@@ -48,7 +44,7 @@ class _Try:
     failed: int = 0
 
 
-def practise(
+def self_train(
     generator: Generator,
     pipeline: TextPipeline,
     prepared: PreparedData,
@@ -107,29 +103,21 @@ def _chosen(clips: Sequence[Clip], count: int, rng: np.random.Generator) -> list
     return chosen
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Draw with a bundle, and leave what obeyed in a run folder."""
-    parser = argparse.ArgumentParser(prog="python -m marey.models.hgm3.practice", description=__doc__)
-    parser.add_argument("bundle", help="name or path; the run must have its tokenizer (`marey train hgm3 unpack`)")
-    parser.add_argument("data", type=Path, help="prepared folder")
-    parser.add_argument("--run", type=Path, required=True, help="run folder")
-    parser.add_argument("--captions", type=int, default=3600)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--threads", type=int, default=0)
-    chosen = parser.parse_args(arguments)
-    generator = Generator.load(chosen.bundle, threads=chosen.threads)
-    prepared = PreparedData.open(chosen.data)
-    drawn = practise(
-        generator, pipeline_of(generator), prepared, chosen.captions, chosen.seed,
-        lambda line: print(f"\r{line}", end="", file=sys.stderr),  # noqa: T201
-    )  # fmt: skip
-    print(file=sys.stderr)  # noqa: T201
-    drawn.write(chosen.run, generator.networks.tokenizer, prepared)
-    print(f"{len(drawn.clips)} motions kept")  # noqa: T201
+def self_train_into(
+    generator: Generator,
+    pipeline: TextPipeline,
+    prepared: PreparedData,
+    run: Path,
+    *,
+    captions: int,
+    seed: int,
+    progress: Callable[[str], None],
+) -> int:
+    """Self-train for so many captions, leave what is kept in a run folder, and return how many motions that are.
 
-
-if __name__ == "__main__":
-    try:
-        main()
-    except MareyError as error:
-        sys.exit(f"{error}")
+    Raises:
+        NotFound, InvalidInput: the run has no tokenizer, or another one than the bundle.
+    """
+    drawn = self_train(generator, pipeline, prepared, captions, seed, progress)
+    drawn.write(run, generator.networks.tokenizer, prepared)
+    return len(drawn.clips)

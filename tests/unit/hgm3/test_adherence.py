@@ -1,0 +1,54 @@
+"""`marey eval adherence` and `marey train ablate`: the report of a random bundle, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from marey.cli.main import app
+from marey.core.errors import InvalidInput
+from marey.models.hgm3.bundle import random_bundle
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(random_bundle(tmp_path_factory.mktemp("bundle") / "tiny", "tiny").path)
+
+
+def test_a_report_counts_each_prompt_and_seed(bundle: str, tmp_path: Path) -> None:
+    options = ["--seeds", "2", "--every", "50", "--set", "steps=2", "-o", str(tmp_path), "--json"]
+    done = CliRunner().invoke(app, ["eval", "adherence", bundle, *options])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "report.json").read_text())
+    assert json.loads(done.stdout) == found
+    assert len(found["trials"]) == 8
+    assert found["settings"]["steps"] == 2
+    assert found["summary"]["one action"]["clips"] > 0
+    assert "| one action |" in (tmp_path / "report.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--set", "steps"), "not a setting"),
+        (("--set", "steps=many"), "not a setting"),
+        (("--set", "wings=2"), "'wings' is not a setting of tiny"),
+        (("--set", "steps=101"), "steps: 101 is outside 1 to 100"),
+        (("--prompts", "own"), "there is no set 'own'"),
+        (("--steers", "2"), "has no live sessions"),
+    ],
+)
+def test_what_cannot_be_measured_is_told(bundle: str, arguments: tuple[str, ...], message: str) -> None:
+    done = CliRunner().invoke(app, ["eval", "adherence", bundle, "--every", "100", *arguments])
+    assert done.exit_code == InvalidInput.exit_code
+    assert message in done.stderr
+
+
+def test_an_ablation_that_a_model_has_not_is_told_with_those_it_has(bundle: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["train", "ablate", "data", bundle, "-o", str(tmp_path), "--what", "depth"])
+    assert done.exit_code == InvalidInput.exit_code
+    assert "has no ablation 'depth'" in done.stderr
+    assert "masks (Hard and random masks" in done.stderr
