@@ -101,7 +101,7 @@ def test_the_reference_has_every_command_and_route(out: Path) -> None:
     commands = (out / "pages" / "reference" / "cli.md").read_text(encoding="utf-8")
     for name in ("## marey submit", "### marey jobs list", "#### marey eval schedule add", "#### marey train hgm3 all"):
         assert f"\n{name}\n" in commands
-    assert "| `--dry-run` | Check everything, submit nothing. |" in commands
+    assert re.search(r"^\| `--dry-run` \| \w", commands, re.MULTILINE)
     routes = (out / "pages" / "reference" / "http-api.md").read_text(encoding="utf-8")
     assert "\n### POST /v1/jobs\n" in routes
     assert "\n### NewJobBody\n" in routes
