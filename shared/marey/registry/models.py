@@ -16,10 +16,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from marey.core.errors import InvalidInput, NotFound
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "marey.models"
 NAME = re.compile(r"[a-z][a-z0-9_-]{0,39}")
@@ -156,6 +158,8 @@ class ModelSpec:
 
 @cache
 def _registered() -> Mapping[str, EntryPoint]:
+    from importlib.metadata import entry_points  # 15 ms, which most commands need not spend
+
     found: dict[str, EntryPoint] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda each: each.name):
         other = found.setdefault(entry.name, entry)
