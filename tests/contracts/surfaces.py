@@ -219,7 +219,7 @@ def files() -> Any:
     from marey.client.manifest import COLUMNS
     from marey.data import manifest as prepared
     from marey.evaluator.report import Report
-    from marey.items.item import FIELDS
+    from marey.items.item import COLUMNS as ITEM_COLUMNS
     from marey.motion.clip import KEYS
     from marey.streams.frames import HEADER, MAGIC, VERSION
     from marey.training.checkpoint import TrainingState
@@ -231,7 +231,7 @@ def files() -> Any:
 
     return {
         "npz": sorted(KEYS),
-        "item": sorted(FIELDS),
+        "item": sorted(ITEM_COLUMNS),
         "manifest_csv": list(COLUMNS),
         "bundle_manifest": {"manifest": fields(BundleManifest), "text": fields(TextSpec)},
         "report": fields(Report),

@@ -11,7 +11,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar, cast
 
 from marey.core.characters import check_text, is_printable
@@ -33,8 +33,6 @@ MIN_SECONDS, MAX_SECONDS = 0.5, 60.0
 """Range over all models; a bundle's own range, which is narrower, is checked once the bundle is known."""
 MAX_TAGS, MAX_TAG_LENGTH = 20, 64
 
-COLUMNS = ("prompt", "name", "seconds", "seed", "variants", "model", "tags", "settings")
-FIELDS = COLUMNS
 OUTPUT_FPS = "fps"
 """The only setting of an item that is not the network's: the frame rate of its files."""
 MIN_OUTPUT_FPS, MAX_OUTPUT_FPS = 1.0, 240.0
@@ -56,25 +54,48 @@ MODEL = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}(@[0-9a-f]{6,64})?")
 
 
 @dataclass(frozen=True)
-class Item:
-    """One prompt with its options; None = the server or the model decides."""
+class ItemSpec:
+    """The fields of an item that stay as they are from the request to the worker.
+
+    Requests (`Item`), submitted items (`marey.jobs.NewItem`), rows (`ItemRow`) and claims (`ClaimedItem`) inherit them,
+    and the columns of SQL statements are made from them.
+
+    Attributes:
+        prompt: the user's text.
+        name: of the motion; clients derive its file name from it.
+        seconds: requested length; None = the model's estimate.
+        tags: labels of the motion.
+    """
 
     prompt: str
     name: str | None = None
     seconds: float | None = None
+    tags: tuple[str, ...] = ()
+
+    def spec(self) -> dict[str, Any]:
+        """Return the fields of `ItemSpec` alone."""
+        return {name: getattr(self, name) for name in SPEC_FIELDS}
+
+
+SPEC_FIELDS = tuple(each.name for each in fields(ItemSpec))
+
+
+@dataclass(frozen=True)
+class Item(ItemSpec):
+    """One prompt with its options; None = the server or the model decides."""
+
     seed: int | None = None
     """Seed of variant 0; variant k uses seed + k."""
     variants: int = 1
     model: str | None = None
     """A model (`hgm3`), a bundle (`hgm3-starter`) or an exact bundle (`hgm3-starter@0123456789ab`)."""
-    tags: tuple[str, ...] = ()
     settings: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def as_json(self) -> dict[str, Any]:
         """Return the item as a line of a request body, with the given fields only."""
-        fields = {name: getattr(self, name) for name in FIELDS}
-        fields["tags"] = list(self.tags)
-        return {name: value for name, value in fields.items() if value not in (None, [], {})}
+        values = {name: getattr(self, name) for name in CHECKS}
+        values["tags"] = list(self.tags)
+        return {name: value for name, value in values.items() if value not in (None, [], {})}
 
 
 @dataclass(frozen=True)
@@ -436,4 +457,6 @@ CHECKS: dict[str, Callable[[object], object]] = {
     "tags": _tags,
     "settings": _settings,
 }
-"""Check of each field's value."""
+"""Check of each field's value, in the order of columns."""
+COLUMNS = tuple(CHECKS)
+"""Of tables of prompts."""

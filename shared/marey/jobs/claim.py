@@ -10,6 +10,7 @@ from uuid import UUID, uuid4
 import sqlalchemy as sa
 
 from marey.db.sql import CLOCK, interval
+from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import LockedJob, lock_job, record
 from marey.jobs.leases import Claim, ClaimedItem, HeartbeatReply
@@ -53,7 +54,7 @@ LANES = sa.text(f"""
 """)  # noqa: S608 - of constants alone
 
 # One statement, since each costs a round trip while the job is locked. Without a free item it writes nothing.
-TAKE = sa.text("""
+TAKE = sa.text(f"""
     WITH picked AS MATERIALIZED (
         SELECT id FROM item
         WHERE job_id = :job AND queue = :queue AND batch_key = :batch_key
@@ -74,9 +75,9 @@ TAKE = sa.text("""
         WHERE job_id = :job AND queue = :queue AND batch_key = :batch_key AND taken.items > 0
     )
     UPDATE item SET state = 'leased', lease_token = :token FROM picked WHERE item.id = picked.id
-    RETURNING item.id, item.position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle,
-              item.text_key, item.seed, item.seconds, item.settings, item.tags, item.attempts, item.stage
-""")
+    RETURNING item.id, item.position, item.index, item.variant, item.model, item.bundle, item.text_key, item.seed,
+              item.settings, item.attempts, item.stage, {", ".join(f"item.{name}" for name in SPEC_FIELDS)}
+""")  # noqa: S608
 
 ALONE = sa.text("SELECT EXISTS (SELECT FROM lease WHERE job_id = :job AND queue = :queue AND solo)")
 

@@ -88,8 +88,8 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
         seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
         for variant in range(item.variants):
             yield NewItem(
+                **item.spec(),
                 index=index,
-                prompt=item.prompt,
                 model=offer.bundle.manifest.model,
                 bundle=reference,
                 batch_key=batch_key,
@@ -97,10 +97,7 @@ def new_items(items: Iterable[tuple[Item, GeneratorCapabilities]]) -> Iterator[N
                 text_batch_key=_sha256(offer.text.model_dump_json()),
                 seed=seed + variant,
                 variant=variant,
-                name=item.name,
-                seconds=item.seconds,
                 settings=dict(values),
-                tags=item.tags,
             )
 
 

@@ -7,27 +7,24 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from uuid import UUID
 
+from marey.items.item import ItemSpec
 from marey.jobs.states import ItemState, Stage
 from marey.jobs.types import JsonObject, Problem
 
 
-@dataclass(frozen=True)
-class ClaimedItem:
+@dataclass(frozen=True, kw_only=True)
+class ClaimedItem(ItemSpec):
     """An item as its worker receives it."""
 
     id: UUID
     position: int
     index: int
     variant: int
-    name: str | None
-    prompt: str
     model: str
     bundle: str
     text_key: str
     seed: int
-    seconds: float | None
     settings: JsonObject
-    tags: tuple[str, ...]
     attempts: int
 
 

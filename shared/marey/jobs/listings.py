@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from marey.db.pages import Order, Page, cut_page, mark_of, page_limit, read_cursor
 from marey.db.sql import among
+from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.journal import no_such_job
 from marey.jobs.motions import read_motions
@@ -132,8 +133,9 @@ def _job(row: sa.RowMapping) -> JobRow:
 def _items() -> sa.Select[*tuple[Any, ...]]:
     table = tables.item.c
     return sa.select(
-        *(table.id, table.job_id.label("job"), table.position, table.index, table.variant, table.name, table.prompt),
-        *(table.model, table.bundle, table.seed, table.seconds, table.settings, table.tags, table.stage, table.state),
+        *(table.id, table.job_id.label("job"), table.position, table.index, table.variant),
+        *(table.model, table.bundle, table.seed, table.settings, table.stage, table.state),
+        *(table[name] for name in SPEC_FIELDS),
         *(table.attempts, table.solo, table.run_after, table.reason, table.problem, table.replaces),
         table.created_at.label("created"),
         table.finished_at.label("finished"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from operator import attrgetter
 from typing import cast
 from uuid import UUID
 
@@ -16,6 +17,7 @@ from psycopg import sql
 from marey.core.errors import InvalidInput
 from marey.db.ids import new_id
 from marey.db.sql import among, check_text
+from marey.items.item import SPEC_FIELDS
 from marey.jobs import tables
 from marey.jobs.idempotency import take_key
 from marey.jobs.journal import Lane, LaneChange, NewEvent, change_lanes, lock_job, record
@@ -38,9 +40,11 @@ TEXTS_LOCK = 0x6D617265
 """Advisory lock: shared by transactions that rely on existing text features, exclusive for those that delete some."""
 
 COLUMNS = (
-    *("id", "job_id", "position", "index", "variant", "name", "prompt", "model", "bundle", "seed", "seconds"),
-    *("settings", "tags", "text_key", "generate_batch_key", "stage", "queue", "batch_key", "replaces"),
+    *("id", "job_id", "position", "index", "variant", "model", "bundle", "seed", "settings", "text_key"),
+    *("generate_batch_key", "stage", "queue", "batch_key", "replaces"),
+    *SPEC_FIELDS,
 )
+_spec: Callable[[NewItem], tuple[object, ...]] = attrgetter(*SPEC_FIELDS)
 COPY = sql.SQL("COPY item ({}) FROM STDIN").format(sql.SQL(", ").join(map(sql.Identifier, COLUMNS)))
 
 
@@ -132,11 +136,15 @@ def _chunks(items: Iterable[NewItem]) -> Iterator[list[NewItem]]:
         yield chunk
 
 
+def _as_column(value: object) -> object:
+    return list(cast("tuple[object, ...]", value)) if isinstance(value, tuple) else value
+
+
 def _row(item: NewItem, job: UUID, position: int, stage: Stage, lane: Lane) -> tuple[object, ...]:
     return (
-        *(new_id(), job, position, item.index, item.variant, item.name, item.prompt, item.model, item.bundle),
-        *(item.seed, item.seconds, json.dumps(dict(item.settings)), list(item.tags), item.text_key, item.batch_key),
-        *(str(stage), *lane, item.replaces),
+        *(new_id(), job, position, item.index, item.variant, item.model, item.bundle, item.seed),
+        *(json.dumps(dict(item.settings)), item.text_key, item.batch_key, str(stage), *lane, item.replaces),
+        *map(_as_column, _spec(item)),
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import TypeVar
 from uuid import UUID
 
 from marey.core.errors import MareyError
+from marey.items.item import ItemSpec
 from marey.jobs.states import ItemState, JobControl, JobState, Review, Stage
 from marey.tenants.types import DEFAULT_TENANT
 
@@ -46,26 +47,23 @@ class Problem:
 # --- submit ---
 
 
-@dataclass(frozen=True)
-class NewItem:
+@dataclass(frozen=True, kw_only=True)
+class NewItem(ItemSpec):
     """One motion to generate: a prompt in one variant. The caller expands variants and draws seeds.
 
     Args:
         index: place of the prompt in the input, from 0; variants share it.
-        prompt: the user's text, without NUL characters.
         model: the handler's queue, such as "hgm3".
         bundle: the exact bundle, name and weights hash.
         batch_key: hash of the bundle and the settings that are uniform in a batch.
         text_key: key of the text features (`TextPipeline.key`); `NO_TEXT` = none needed.
         text_batch_key: hash of the text specification; prompts of one claim of the text stage share it.
         seed: 0 … 2³¹ − 1.
-        seconds: requested length; None = the model's estimate.
         settings: the handler's settings (steps, guidance, fps, formats, …).
         replaces: replaced motion of a re-roll.
     """
 
     index: int
-    prompt: str
     model: str
     bundle: str
     batch_key: str
@@ -73,10 +71,7 @@ class NewItem:
     text_batch_key: str
     seed: int
     variant: int = 0
-    name: str | None = None
-    seconds: float | None = None
     settings: JsonObject = field(default_factory=dict[str, object])
-    tags: Sequence[str] = ()
     replaces: UUID | None = None
 
 
@@ -191,8 +186,8 @@ class MotionRow:
     """Item of its re-roll."""
 
 
-@dataclass(frozen=True)
-class ItemRow:
+@dataclass(frozen=True, kw_only=True)
+class ItemRow(ItemSpec):
     """An item with its motion, if it has one."""
 
     id: UUID
@@ -201,14 +196,10 @@ class ItemRow:
     """Position in the job: input order, variants within prompt."""
     index: int
     variant: int
-    name: str | None
-    prompt: str
     model: str
     bundle: str
     seed: int
-    seconds: float | None
     settings: JsonObject
-    tags: tuple[str, ...]
     stage: Stage
     state: ItemState
     attempts: int

@@ -31,7 +31,7 @@ def test_a_csv_gives_every_column_its_type(tmp_path: Path) -> None:
     header = "prompt,name,seconds,seed,variants,model,tags\n"
     text = header + '"walks, then runs",a,2.5,7,3,hgm3,walk; run\na person waves,,,,,,\n'
     assert list(items_from_file(write(tmp_path, "p.csv", text))) == [
-        Item("walks, then runs", "a", 2.5, 7, 3, "hgm3", ("walk", "run")),
+        Item("walks, then runs", "a", 2.5, ("walk", "run"), 7, 3, "hgm3"),
         Item("a person waves"),
     ]
 
@@ -141,9 +141,9 @@ def test_options_of_the_command_stand_in_where_a_line_says_nothing(tmp_path: Pat
         '{"prompt": "a person walks", "seconds": null, "settings": {"guidance": 3}}',
     ]
     assert list(items_from_file(write(tmp_path, "p.jsonl", "\n".join(lines)), defaults=defaults)) == [
-        Item("a person bows", None, 4.0, 1, 3, "hgm3-starter", (), {"fps": 30.0}),
-        Item("a person waves", None, 2.0, 0, 1, "mogo", (), {"fps": 60.0}),
-        Item("a person walks", None, 4.0, 1, 3, "hgm3-starter", (), {"fps": 30.0, "guidance": 3.0}),
+        Item("a person bows", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0}),
+        Item("a person waves", None, 2.0, (), 0, 1, "mogo", {"fps": 60.0}),
+        Item("a person walks", None, 4.0, (), 1, 3, "hgm3-starter", {"fps": 30.0, "guidance": 3.0}),
     ]
     table = write(tmp_path, "p.csv", "prompt,variants,seed\na person bows,1,\na person waves,,9\n")
     found = [(item.variants, item.seed) for item in items_from_file(table, defaults=defaults)]

@@ -29,12 +29,9 @@ def made_again(row: ItemRow, catalogue: Catalogue) -> NewItem:
         Conflict: this server no longer has the bundle, or the bundle no longer accepts the item's settings.
     """
     item = Item(
-        prompt=row.prompt,
-        name=row.name,
-        seconds=row.seconds,
+        **row.spec(),
         seed=row.seed,
         model=row.bundle,
-        tags=row.tags,
         settings={name: value for name, value in row.settings.items() if isinstance(value, int | float)},
     )
     try:
