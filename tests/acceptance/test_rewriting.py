@@ -10,15 +10,19 @@ from pathlib import Path
 import pytest
 
 from marey.motion.clip import load_npz
-from tests.support.language_model import Answer, Asked, LanguageModel
+from tests.support.language_model import Asked, CompletionReply, LanguageModel
 from tests.support.marey import Marey, serving
 
 STROLL, RUN, LOST = "he strolls to the left", "he is running", "he jumps"
 CAPTION = "A person strolls to the left."
 
 
-def answer(asked: Asked, before: int) -> Answer:
-    said = {STROLL: Answer(CAPTION), RUN: Answer("A person bows."), LOST: Answer("", status=404)}
+def answer(asked: Asked, before: int) -> CompletionReply:
+    said = {
+        STROLL: CompletionReply(CAPTION),
+        RUN: CompletionReply("A person bows."),
+        LOST: CompletionReply("", status=404),
+    }
     return said[asked.prompt]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from marey.embedded import EmbeddedServer
 from tests.support.live_api import LiveApi, running_api, settings_of
-from tests.support.raw_http import Answer, RawClient
+from tests.support.raw_http import RawClient, RawResponse
 
 SECONDS = 2.0
 """Every limit of these tests' server."""
@@ -54,10 +54,10 @@ SLOW: dict[str, Callable[[LiveApi], Iterator[bytes]]] = {
 
 
 @pytest.fixture(scope="module")
-def answers(api: LiveApi) -> Iterator[dict[str, Answer]]:
+def answers(api: LiveApi) -> Iterator[dict[str, RawResponse]]:
     """Final answers to all waiting clients, with a plain client beside them."""
 
-    def ask(parts: Iterator[bytes]) -> Answer:
+    def ask(parts: Iterator[bytes]) -> RawResponse:
         with RawClient(api.url) as client:
             return client.dribble(parts, SLOWLY)
 
@@ -69,7 +69,7 @@ def answers(api: LiveApi) -> Iterator[dict[str, Answer]]:
 
 
 @pytest.mark.parametrize("name", SLOW)
-def test_whoever_is_slow_is_told_so_and_let_go(answers: dict[str, Answer], name: str) -> None:
+def test_whoever_is_slow_is_told_so_and_let_go(answers: dict[str, RawResponse], name: str) -> None:
     answer = answers[name]
     assert answer.status == 408
     assert answer.headers["connection"] == "close"
@@ -78,7 +78,7 @@ def test_whoever_is_slow_is_told_so_and_let_go(answers: dict[str, Answer], name:
     assert "head" in name or answer.problem["where"] == "body"
 
 
-def test_a_slow_body_leaves_nothing_behind(api: LiveApi, answers: dict[str, Answer]) -> None:
+def test_a_slow_body_leaves_nothing_behind(api: LiveApi, answers: dict[str, RawResponse]) -> None:
     assert answers
     with api.http() as http:
         assert http.get("/v1/jobs").json()["items"] == []
@@ -86,7 +86,7 @@ def test_a_slow_body_leaves_nothing_behind(api: LiveApi, answers: dict[str, Answ
 
 def test_a_connection_that_asks_nothing_is_closed_without_a_word(api: LiveApi) -> None:
     with RawClient(api.url) as silent:
-        assert silent.answer() == Answer(0, {}, b"", True)
+        assert silent.answer() == RawResponse(0, {}, b"", True)
 
 
 def test_a_connection_that_asks_nothing_more_is_closed(api: LiveApi) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 
 @dataclass
-class Answer:
+class CompletionReply:
     """One response; `content` makes a proper completion of it, `body` anything else."""
 
     content: str | None = None
@@ -44,7 +44,7 @@ class Asked:
 class LanguageModel:
     """Use as a context; `answer` may be replaced at any time."""
 
-    def __init__(self, answer: Callable[[Asked, int], Answer]) -> None:
+    def __init__(self, answer: Callable[[Asked, int], CompletionReply]) -> None:
         """`answer` gets the request and how many came before it."""
         self.answer = answer
         self.asked: list[Asked] = []
@@ -63,7 +63,7 @@ class LanguageModel:
         self._http.shutdown()
         self._http.server_close()
 
-    def take(self, asked: Asked) -> Answer:
+    def take(self, asked: Asked) -> CompletionReply:
         with self._lock:
             self.asked.append(asked)
             return self.answer(asked, len(self.asked) - 1)

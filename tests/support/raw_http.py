@@ -16,7 +16,7 @@ GENEROUS = 60.0
 
 
 @dataclass(frozen=True)
-class Answer:
+class RawResponse:
     """Response; `status` 0 = the server closed the connection without an answer."""
 
     status: int
@@ -52,7 +52,7 @@ class RawClient:
         """All of it."""
         self._socket.sendall(data)
 
-    def dribble(self, parts: Iterable[bytes], every: float = 0.0) -> Answer:
+    def dribble(self, parts: Iterable[bytes], every: float = 0.0) -> RawResponse:
         """Send part after part, until the server answers or closes; what it answers."""
         stopped = threading.Event()
         sender = threading.Thread(target=self._send_all, args=(parts, every, stopped), daemon=True)
@@ -64,15 +64,15 @@ class RawClient:
             self._socket.close()
             sender.join(GENEROUS)
 
-    def answer(self) -> Answer:
+    def answer(self) -> RawResponse:
         """The next answer, whole."""
         response = http.client.HTTPResponse(self._socket)
         try:
             response.begin()
         except (http.client.BadStatusLine, ConnectionError):
-            return Answer(0, {}, b"", True)
+            return RawResponse(0, {}, b"", True)
         headers = {name.lower(): value for name, value in response.getheaders()}
-        return Answer(response.status, headers, response.read(), self._ended() if response.will_close else False)
+        return RawResponse(response.status, headers, response.read(), self._ended() if response.will_close else False)
 
     def _ended(self) -> bool:
         try:

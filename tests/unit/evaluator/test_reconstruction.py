@@ -81,7 +81,7 @@ def test_what_was_measured_is_found_for_exactly_these_two_bundles(
     file.write_text("{}")
     with pytest.raises(InvalidFile, match="is not a reconstruction"):
         find_reconstruction(judge, GENERATOR)
-    with pytest.raises(InvalidInput, match="no exact bundle"):
+    with pytest.raises(InvalidInput, match="not an exact bundle"):
         find_reconstruction(judge, "../x@0123456789ab")
 
 

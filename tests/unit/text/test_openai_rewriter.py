@@ -18,7 +18,7 @@ from marey.text.keys import as_served, feature_key
 from marey.text.openai_rewriter import AT_ONCE, MAX_ANSWER_BYTES, REST_AFTER, TRIES, Endpoint, OpenAIRewriter
 from marey.text.pipeline import TextPipeline
 from marey.text.rewriters import NotRewritten
-from tests.support.language_model import Answer, Asked, LanguageModel
+from tests.support.language_model import Asked, CompletionReply, LanguageModel
 
 PROMPT = "plz make him stroll to the left"
 CAPTION = "A person strolls to the left."
@@ -27,7 +27,7 @@ KEY = "sk-do-not-tell"
 
 @pytest.fixture
 def model() -> Iterator[LanguageModel]:
-    with LanguageModel(lambda asked, before: Answer(CAPTION)) as served:
+    with LanguageModel(lambda asked, before: CompletionReply(CAPTION)) as served:
         yield served
 
 
@@ -73,7 +73,7 @@ def test_the_oldest_answers_are_forgotten(model: LanguageModel, monkeypatch: pyt
 
 @pytest.mark.parametrize("status", [429, 500, 503])
 def test_a_busy_endpoint_is_asked_again(model: LanguageModel, status: int) -> None:
-    model.answer = lambda asked, before: Answer(CAPTION) if before else Answer("", status=status)
+    model.answer = lambda asked, before: CompletionReply(CAPTION) if before else CompletionReply("", status=status)
     assert rewriter_of(model).rewrite(PROMPT) == CAPTION
     assert len(model.asked) == 2
 
@@ -81,28 +81,28 @@ def test_a_busy_endpoint_is_asked_again(model: LanguageModel, status: int) -> No
 def test_as_long_as_the_endpoint_asks_for_is_waited(model: LanguageModel, monkeypatch: pytest.MonkeyPatch) -> None:
     slept: list[float] = []
     monkeypatch.setattr(openai_rewriter.time, "sleep", slept.append)
-    model.answer = lambda asked, before: Answer(CAPTION if before else "", status=200 if before else 429,
+    model.answer = lambda asked, before: CompletionReply(CAPTION if before else "", status=200 if before else 429,
                                                 headers={} if before else {"Retry-After": "7"})  # fmt: skip
     rewriter_of(model).rewrite(PROMPT)
     assert slept == [7.0]
 
 
 def test_nobody_waits_longer_than_a_prompt_may_take(model: LanguageModel) -> None:
-    model.answer = lambda asked, before: Answer("", status=429, headers={"Retry-After": "3600"})
+    model.answer = lambda asked, before: CompletionReply("", status=429, headers={"Retry-After": "3600"})
     assert "429" in reason_of(rewriter_of(model))
     assert len(model.asked) == 1
 
 
 @pytest.mark.parametrize(("status", "asked"), [(500, TRIES), (401, 1), (404, 1), (302, 1)])
 def test_a_status_that_stays_is_the_reason(model: LanguageModel, status: int, asked: int) -> None:
-    model.answer = lambda asked, before: Answer("", status=status, headers={"Location": "http://127.0.0.1:1/"})
+    model.answer = lambda asked, before: CompletionReply("", status=status, headers={"Location": "http://127.0.0.1:1/"})
     assert str(status) in reason_of(rewriter_of(model))
     assert len(model.asked) == asked
 
 
 @pytest.mark.parametrize("delay", [0.05, 60.0])
 def test_a_slow_answer_is_not_waited_for(model: LanguageModel, delay: float) -> None:
-    model.answer = lambda asked, before: Answer(CAPTION, delay=delay)
+    model.answer = lambda asked, before: CompletionReply(CAPTION, delay=delay)
     assert "within 0.3 s" in reason_of(rewriter_of(model, seconds=0.3))
 
 
@@ -116,34 +116,34 @@ def test_an_endpoint_that_is_not_there_is_the_reason() -> None:
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (Answer(body=b"<html>welcome</html>"), "no chat completion"),
-        (Answer(body=b"[" * 50_000), "no chat completion"),
-        (Answer(body=b"\xff\xfe\x00"), "no chat completion"),
-        (Answer(body=b'{"choices": []}'), "no chat completion"),
-        (Answer(body=b'{"choices": [{"message": {"content": null}}]}'), "no text"),
-        (Answer(body=b"x" * (MAX_ANSWER_BYTES + 1)), "too long"),
-        (Answer(""), "0 lines"),
-        (Answer("Sure!\n\nA person walks."), "2 lines"),
-        (Answer("走路的人"), "no English words"),
-        (Answer("a person \x00 walks"), "NUL"),
-        (Answer("walk " * 80), "more than 60 words"),
+        (CompletionReply(body=b"<html>welcome</html>"), "no chat completion"),
+        (CompletionReply(body=b"[" * 50_000), "no chat completion"),
+        (CompletionReply(body=b"\xff\xfe\x00"), "no chat completion"),
+        (CompletionReply(body=b'{"choices": []}'), "no chat completion"),
+        (CompletionReply(body=b'{"choices": [{"message": {"content": null}}]}'), "no text"),
+        (CompletionReply(body=b"x" * (MAX_ANSWER_BYTES + 1)), "too long"),
+        (CompletionReply(""), "0 lines"),
+        (CompletionReply("Sure!\n\nA person walks."), "2 lines"),
+        (CompletionReply("走路的人"), "no English words"),
+        (CompletionReply("a person \x00 walks"), "NUL"),
+        (CompletionReply("walk " * 80), "more than 60 words"),
     ],
 )
-def test_rubbish_is_no_caption(model: LanguageModel, answer: Answer, reason: str) -> None:
+def test_rubbish_is_no_caption(model: LanguageModel, answer: CompletionReply, reason: str) -> None:
     model.answer = lambda asked, before: answer
     assert reason in reason_of(rewriter_of(model))
 
 
 @pytest.mark.parametrize("said", [f'"{CAPTION}"', f"- {CAPTION}", f"\n  {CAPTION}\n"])
 def test_what_models_like_to_put_around_a_caption_is_taken_off(model: LanguageModel, said: str) -> None:
-    model.answer = lambda asked, before: Answer(said)
+    model.answer = lambda asked, before: CompletionReply(said)
     assert rewriter_of(model).rewrite(PROMPT) == CAPTION
 
 
 def test_an_endpoint_that_fails_again_and_again_is_left_alone(
     model: LanguageModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model.answer = lambda asked, before: Answer("", status=401)
+    model.answer = lambda asked, before: CompletionReply("", status=401)
     rewriter = rewriter_of(model)
     for number in range(REST_AFTER + 5):
         reason_of(rewriter, f"walk {number}")
@@ -151,15 +151,15 @@ def test_an_endpoint_that_fails_again_and_again_is_left_alone(
     assert "left alone" in reason_of(rewriter, "run")
     now = openai_rewriter.time.monotonic()
     monkeypatch.setattr(openai_rewriter.time, "monotonic", lambda: now + 31)
-    model.answer = lambda asked, before: Answer(CAPTION)
+    model.answer = lambda asked, before: CompletionReply(CAPTION)
     assert rewriter.rewrite("run") == CAPTION
 
 
 def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageModel) -> None:
     prompts = [f"walk {number} steps" for number in range(3 * AT_ONCE)]
 
-    def answer(asked: Asked, before: int) -> Answer:
-        return Answer(f"A person goes {asked.prompt}.", status=404 if asked.prompt == prompts[5] else 200)
+    def answer(asked: Asked, before: int) -> CompletionReply:
+        return CompletionReply(f"A person goes {asked.prompt}.", status=404 if asked.prompt == prompts[5] else 200)
 
     model.answer = answer
     rewriter = rewriter_of(model)
@@ -174,7 +174,7 @@ def test_several_prompts_are_asked_for_at_once_and_each_once(model: LanguageMode
 
 
 def test_neither_key_nor_prompt_is_told_to_the_log(model: LanguageModel, caplog: pytest.LogCaptureFixture) -> None:
-    model.answer = lambda asked, before: Answer("", status=401)
+    model.answer = lambda asked, before: CompletionReply("", status=401)
     rewriter = rewriter_of(model)
     pipeline = TextPipeline.load(TextSpec())
     pipeline.rewriter = rewriter
@@ -192,7 +192,7 @@ def test_neither_key_nor_prompt_is_told_to_the_log(model: LanguageModel, caplog:
 )
 def test_a_caption_that_says_something_else_is_not_used(model: LanguageModel, caption: str, reason: str | None) -> None:
     prompt = "he strolls to the left"
-    model.answer = lambda asked, before: Answer(caption)
+    model.answer = lambda asked, before: CompletionReply(caption)
     pipeline = TextPipeline.load(TextSpec())
     pipeline.rewriter = rewriter_of(model)
     (features,) = pipeline.features([prompt])
