@@ -116,10 +116,10 @@ def test_an_endpoint_that_is_not_there_is_the_reason() -> None:
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (CompletionReply(body=b"<html>welcome</html>"), "no chat completion"),
-        (CompletionReply(body=b"[" * 50_000), "no chat completion"),
-        (CompletionReply(body=b"\xff\xfe\x00"), "no chat completion"),
-        (CompletionReply(body=b'{"choices": []}'), "no chat completion"),
+        (CompletionReply(body=b"<html>welcome</html>"), "not a chat completion"),
+        (CompletionReply(body=b"[" * 50_000), "not a chat completion"),
+        (CompletionReply(body=b"\xff\xfe\x00"), "not a chat completion"),
+        (CompletionReply(body=b'{"choices": []}'), "not a chat completion"),
         (CompletionReply(body=b'{"choices": [{"message": {"content": null}}]}'), "no text"),
         (CompletionReply(body=b"x" * (MAX_ANSWER_BYTES + 1)), "too long"),
         (CompletionReply(""), "0 lines"),
