@@ -29,6 +29,28 @@ def served(models: Path) -> Iterator[tuple[Marey, Serving]]:
     shutil.rmtree(home, ignore_errors=True)
 
 
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Marey]:
+    """A server with a small trained evaluator beside its models."""
+    from marey.evaluator.assembly import assemble
+    from marey.evaluator.config import TINY as SMALL
+    from marey.evaluator.train import train_stage
+    from marey.training.budget import Budget
+    from marey.training.staging import TrainOptions
+    from tests.support.prepared import write_prepared
+
+    folder = tmp_path_factory.mktemp("judged")
+    models = tiny_models(folder / "models")
+    data, run = write_prepared(folder / "data", 240, ("walks", "runs", "waves", "bows")), folder / "run"
+    train_stage("tmr", TrainOptions(data, run, SMALL, Budget(steps=2), device="cpu", bf16=False, quiet=True))
+    assemble(data, run, models / "judge", SMALL)
+    home = Path(tempfile.mkdtemp(prefix="marey-"))
+    marey = Marey(home, models)
+    with serving(marey):
+        yield marey
+    shutil.rmtree(home, ignore_errors=True)
+
+
 @pytest.fixture
 def marey(served: tuple[Marey, Serving]) -> Marey:
     """The command line, with a server that runs."""

@@ -27,7 +27,7 @@ def processor() -> str:
 
 def motion(name: str) -> dict[str, Any]:
     """Tokens of one motion, and the hash of its npz and BVH files."""
-    from marey.cli.roles.oneshot import OneShot, Wanted
+    from marey.generate.oneshot import OneShot, Wanted
     from marey.motion.io.bvh import format_bvh
 
     torch.set_num_threads(1)

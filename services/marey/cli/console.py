@@ -6,7 +6,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
@@ -135,9 +135,9 @@ def _draw(columns: Sequence[str], rows: Iterable[Sequence[object]], *, full_ids:
 
 
 def listing(
-    found: Iterable[dict[str, Any]],
+    found: Iterable[Mapping[str, Any]],
     columns: Sequence[str],
-    cell: Callable[[dict[str, Any], str], object],
+    cell: Callable[[Any, str], object],
     *,
     as_json: bool,
     limit: int | None = None,

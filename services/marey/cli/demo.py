@@ -69,7 +69,7 @@ def _ensure_bundle(home: Path) -> bool:
     """Whether the model that will be used has random weights; makes such a bundle where there is no model at all."""
     os.environ["MAREY_HOME"] = str(home)
     from marey.bundles import choose_bundle
-    from marey.cli.roles.oneshot import make_random_bundle
+    from marey.cli.roles.generating import make_random_bundle
     from marey.core.settings import settings
 
     model = settings().default_model

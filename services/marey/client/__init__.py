@@ -7,8 +7,8 @@
         client.jobs.wait(job)
         client.jobs.fetch(job, "clips")
 
-What `__all__` names is public and documented in `docs/python-api.md`; the modules of this package are not. Names are
-imported when they are first used.
+What `__all__` names is public and documented in `docs/reference/python-api.md`; the modules of this package are not.
+Names are imported when they are first used.
 """
 
 from __future__ import annotations

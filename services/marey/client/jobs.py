@@ -175,14 +175,17 @@ class Jobs(Resource):
         reader = read_file(str(path), file_format, _defaults(defaults), extra_columns)
         return CheckedJob.of(self._send(reader, validate_only=True))
 
-    def list(self, *, state: str | None = None, limit: int | None = None) -> Iterator[Job]:
+    def list(
+        self, *, state: str | None = None, limit: int | None = None, page_size: int | None = None
+    ) -> Iterator[Job]:
         """The jobs, newest first, page after page.
 
         Args:
             state: only jobs in this state.
             limit: at most so many; None = all.
+            page_size: of each request, at most 1,000; None = as large as the limit allows.
         """
-        return self._pages(Job, "/v1/jobs", limit, state=state)
+        return self._pages(Job, "/v1/jobs", limit, page_size, state=state)
 
     def get(self, job: Job | str) -> Job:
         """The job as it stands now."""
@@ -193,7 +196,13 @@ class Jobs(Resource):
         return QueuePosition.of(self._transport.get(f"{_path(job)}/queue"))
 
     def items(
-        self, job: Job | str, *, state: str | None = None, review: str | None = None, limit: int | None = None
+        self,
+        job: Job | str,
+        *,
+        state: str | None = None,
+        review: str | None = None,
+        limit: int | None = None,
+        page_size: int | None = None,
     ) -> Iterator[JobItem]:
         """The items of a job in input order, each with its motion if it has one.
 
@@ -201,7 +210,7 @@ class Jobs(Resource):
             state: only items in this state.
             review: only items whose motion has this verdict.
         """
-        return self._pages(JobItem, f"{_path(job)}/items", limit, state=state, review=review)
+        return self._pages(JobItem, f"{_path(job)}/items", limit, page_size, state=state, review=review)
 
     def pause(self, job: Job | str, *, reason: str | None = None) -> Job:
         """Stop giving out items of the job; those being made are finished."""

@@ -36,6 +36,7 @@ class Motions(Resource):
         text: str | None = None,
         reviews: Sequence[Verdict] | None = None,
         limit: int | None = None,
+        page_size: int | None = None,
     ) -> Iterator[Motion]:
         """The motions that fit everything given, newest first; of a job, in the order they were made.
 
@@ -45,10 +46,12 @@ class Motions(Resource):
             text: words of the prompt in any form; `"a phrase"`, `or`, `-not`.
             reviews: verdicts; any of them. `new` = none yet.
             limit: at most so many; None = all.
+            page_size: of each request, at most 1,000; None = as large as the limit allows.
         """
         wanted = None if job is None else identifier(job)
         tag, review = list_or_none(tags), list_or_none(reviews)
-        return self._pages(Motion, "/v1/motions", limit, job=wanted, tag=tag, name=name, text=text, review=review)
+        params = {"job": wanted, "tag": tag, "name": name, "text": text, "review": review}
+        return self._pages(Motion, "/v1/motions", limit, page_size, **params)
 
     def search(self, text: str, *, limit: int | None = None) -> Iterator[Motion]:
         """The motions whose prompts hold the words of a text, newest first; see `list`."""
@@ -58,17 +61,29 @@ class Motions(Resource):
         """A motion with its metadata: the rewritten prompt, its graph, the settings, the software."""
         return MotionDetail.of(self._transport.get(f"/v1/motions/{identifier(motion)}"))
 
+    def review(
+        self, motions: Some, verdict: Literal["kept", "rejected"] | None, *, comment: str | None = None
+    ) -> Sequence[Motion]:
+        """Set the verdict of motions; None takes it back."""
+        return [
+            Motion.of(each)
+            for some in _batches(motions)
+            for each in self._transport.post(
+                "/v1/motions/review", {"motions": some, "verdict": verdict, "comment": comment}
+            )
+        ]
+
     def keep(self, motions: Some, *, comment: str | None = None) -> Sequence[Motion]:
         """Say that motions are good: `client.jobs.fetch(…, review="kept")` fetches them."""
-        return self._review(motions, "kept", comment)
+        return self.review(motions, "kept", comment=comment)
 
     def reject(self, motions: Some, *, comment: str | None = None) -> Sequence[Motion]:
         """Say that motions are no good; nothing is deleted."""
-        return self._review(motions, "rejected", comment)
+        return self.review(motions, "rejected", comment=comment)
 
     def clear(self, motions: Some) -> Sequence[Motion]:
         """Take back what was said of motions."""
-        return self._review(motions, None, None)
+        return self.review(motions, None)
 
     def reroll(self, motions: Some, *, comment: str | None = None) -> Sequence[Reroll]:
         """Make motions again with the next seed, everything else as it was: a new item in the same job.
@@ -121,15 +136,6 @@ class Motions(Resource):
             except InvalidFile as error:
                 error.where = f"motion {identifier(motion)}"
                 raise
-
-    def _review(self, motions: Some, verdict: str | None, comment: str | None) -> Sequence[Motion]:
-        return [
-            Motion.of(each)
-            for some in _batches(motions)
-            for each in self._transport.post(
-                "/v1/motions/review", {"motions": some, "verdict": verdict, "comment": comment}
-            )
-        ]
 
 
 def list_or_none(values: Sequence[str] | None) -> Sequence[str] | None:

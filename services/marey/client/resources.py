@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Any, TypeVar
 from urllib.parse import quote
 
 from marey.client.results import Result
 from marey.client.transport import Transport
+from marey.core.errors import InvalidInput
 
 R = TypeVar("R", bound=Result)
 PAGE = 1000
@@ -20,19 +22,27 @@ class Resource:
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
 
-    def _pages(self, kind: type[R], path: str, limit: int | None, **params: Any) -> Iterator[R]:
+    def _pages(
+        self, kind: type[R], path: str, limit: int | None, page_size: int | None = None, **params: Any
+    ) -> Iterator[R]:
         """The elements of a listing, page after page, as they are asked for; at most `limit`."""
-        size = PAGE if limit is None else max(1, min(limit, PAGE))
-        found = self._transport.pages(path, **params, limit=size)
-        for number, each in enumerate(found):
-            if limit is not None and number >= limit:
-                return
+        if page_size is None:
+            page_size = PAGE if limit is None else max(1, min(limit, PAGE))
+        found = self._transport.pages(path, **params, limit=page_size)
+        for each in islice(found, limit):
             yield kind.of(each)
 
 
 def identifier(of: Result | str) -> str:
-    """The id of a result, or the id itself, as part of a path."""
-    return quote(of if isinstance(of, str) else str(getattr(of, "id", "")), safe="")
+    """The id of a result, or the id itself, as one part of a path.
+
+    Raises:
+        InvalidInput: it is empty, or would be another path.
+    """
+    (text,) = identifiers(of)
+    if text in ("", ".", ".."):
+        raise InvalidInput(f"{text!r} is no id", where="id", hint="Give the id, or an object that the client gave.")
+    return quote(text, safe="")
 
 
 def identifiers(of: Result | str | Iterable[Result | str]) -> list[str]:

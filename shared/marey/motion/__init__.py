@@ -1,0 +1,41 @@
+"""Motions: clips in memory, their npz and BVH files, and the geometry behind them. Needs the extra `motion`.
+
+    from marey.motion import load_npz, write_bvh
+
+    write_bvh("wave.bvh", load_npz("wave.npz"))
+
+What `__all__` names is public and documented in `docs/reference/python-api.md`; the modules of this package are not.
+Names are imported when they are first used, so that importing a module of this package costs nothing more.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from marey.core.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from marey.motion.clip import MotionClip, load_npz
+    from marey.motion.io.bvh import BvhClip, read_bvh, write_bvh
+    from marey.motion.io.convert import clip_from_bvh
+
+    __version__: str
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "marey.motion.clip": "MotionClip load_npz",
+        "marey.motion.io.bvh": "BvhClip read_bvh write_bvh",
+        "marey.motion.io.convert": "clip_from_bvh",
+    },
+)
+
+__all__ = [
+    "BvhClip",
+    "MotionClip",
+    "__version__",
+    "clip_from_bvh",
+    "load_npz",
+    "read_bvh",
+    "write_bvh",
+]

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import threading
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Iterator
 
 import pytest
 
@@ -15,58 +11,14 @@ from marey.client.place import Server
 from marey.client.transport import Transport
 from marey.core.errors import Busy, Conflict, InvalidInput, NotFound, Overloaded, Refused, Unreachable
 from marey.items.item import InvalidItems
-
-
-@dataclass
-class Script:
-    """Answers of the server in order, and the requests it received."""
-
-    answers: list[tuple[int, bytes]]
-    asked: list[tuple[str, str | None, bytes]] = field(default_factory=list)
-
-
-Scripted = Callable[..., tuple[Transport, Script]]
+from tests.support.scripted import Scripted, problem, scripted_servers
 
 
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scripted]:
     monkeypatch.setattr(transport, "FIRST_PAUSE", 0.001)
-    servers: list[ThreadingHTTPServer] = []
-
-    def start(*answers: tuple[int, object]) -> tuple[Transport, Script]:
-        script = Script([(code, json.dumps(body).encode()) for code, body in answers])
-
-        class Handler(BaseHTTPRequestHandler):
-            def answer(self) -> None:
-                body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-                script.asked.append((self.command, self.headers.get("Idempotency-Key"), body))
-                code, content = script.answers.pop(0)
-                if code == 0:  # the answer is lost on the way
-                    self.close_connection = True
-                    return
-                self.send_response(code)
-                self.send_header("Content-Length", str(len(content)))
-                self.end_headers()
-                self.wfile.write(content)
-
-            do_GET = do_POST = answer
-
-            def log_message(self, *_: object) -> None:
-                pass
-
-        server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        servers.append(server)
-        return Transport(Server(f"http://127.0.0.1:{server.server_port}", "key")), script
-
-    yield start
-    for server in servers:
-        server.shutdown()
-        server.server_close()
-
-
-def problem(kind: str, **more: object) -> dict[str, object]:
-    return {"type": f"urn:marey:problem:{kind}", "detail": "no", **more}
+    with scripted_servers() as start:
+        yield start
 
 
 def test_a_submit_whose_answer_is_lost_is_sent_again_with_the_same_key(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -10,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("marey.client",)
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGES = ("marey.client", "marey.generate", "marey.motion")
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -30,6 +32,9 @@ def test_every_public_name_is_there_and_typed(package: str) -> None:
     [
         ("marey.client", ("httpx2", "websockets", "numpy", "marey.client.types")),
         ("marey.client.rows", ("httpx2", "websockets", "numpy", "marey.client.types")),
+        ("marey.motion", ("numpy", "marey.motion.clip")),
+        ("marey.motion.units", ("marey.motion.clip",)),
+        ("marey.generate", ("numpy", "torch", "pydantic", "marey.generate.local")),
         ("marey.client.client", ("numpy", "pydantic", "sqlalchemy", "typer", "rich", "platformdirs")),
     ],
 )
@@ -37,3 +42,14 @@ def test_an_import_brings_only_what_it_needs(module: str, absent: tuple[str, ...
     code = f"import {module}, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(absent) & set(done.stdout.split())
+
+
+def test_the_reference_names_everything_that_is_public_and_every_example() -> None:
+    page = (ROOT / "docs" / "reference" / "python-api.md").read_text(encoding="utf-8")
+    for name in ("Client", "LiveStream", "Frame", "Progress", "MareyError", "InvalidItems", "LocalModel", "MotionClip"):
+        assert name in page
+    errors = import_module("marey.core.errors")
+    public = import_module("marey.client").__all__
+    assert {name for name in public if hasattr(errors, name)} <= set(re.findall(r"`(\w+)`", page))
+    scripts = {path.name for path in (ROOT / "examples").glob("*.py")}
+    assert set(re.findall(r"`(\w+\.py)`", page)) == scripts

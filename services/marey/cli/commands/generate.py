@@ -19,7 +19,7 @@ from marey.items.item import MAX_SEED, Item, Problem
 
 if TYPE_CHECKING:
     from marey.bundles import Bundle
-    from marey.cli.roles.oneshot import Wanted
+    from marey.cli.roles.generating import Wanted
     from marey.core.settings import Settings
     from marey.exporters import Exporter
     from marey.motion.clip import MotionClip
@@ -56,7 +56,7 @@ def generate(
     as_json: console.Json = False,
 ) -> None:
     """Generate motions in this process, without a server or a queue."""
-    from marey.cli.roles.oneshot import OneShot
+    from marey.cli.roles.generating import OneShot
     from marey.client.fetching import check_folder, make_folders
 
     check_template(name_template)
@@ -187,7 +187,7 @@ def _plan(items: list[Item], bundle: Bundle, folder: Path, template: str, kinds:
     Raises:
         InvalidInput: two motions would have one name, an item lacks a tag, or a name is not a plain file name.
     """
-    from marey.cli.roles.oneshot import Wanted
+    from marey.cli.roles.generating import Wanted
 
     names = FileNames(template)
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import Annotated, Any
+from itertools import islice
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from marey.cli import console
 from marey.cli.references import FORMS, find, find_all, listed, named, of_view
 from marey.core.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from marey.client import Client, JobChanges
 
 app = typer.Typer(help="Jobs on the server.", no_args_is_help=True)
 
@@ -48,22 +53,22 @@ def list_jobs(
     as_json: console.Json = False,
 ) -> None:
     """List jobs, newest first."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = client.pages("/v1/jobs", state=state.value if state else None, limit=console.page_size(limit))
-        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
+    with Client() as client:
+        found = client.jobs.list(state=state.value if state else None, page_size=console.page_size(limit))
+        console.listing((each.raw for each in found), COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 @app.command()
 def show(job: Job, as_json: console.Json = False) -> None:
     """Show a job, and the reasons of failed items."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        job = find(client, "job", job).id
-        found = client.get(f"/v1/jobs/{job}")
-        place = client.get(f"/v1/jobs/{job}/queue")
+    with Client() as client:
+        job = find(client.transport, "job", job).id
+        found = client.jobs.get(job).raw
+        place = client.jobs.queue(job).raw
         if as_json:
             console.result_json({**found, "queue": place})
             return
@@ -117,7 +122,7 @@ def retry(
     as_json: console.Json = False,
 ) -> None:
     """Retry failed, dead and cancelled items."""
-    _act(jobs, "retry", as_json, failed_only=failed_only or None, reason=reason)
+    _act(jobs, "retry", as_json, failed_only=failed_only, reason=reason)
 
 
 @app.command()
@@ -155,13 +160,13 @@ def comment(
 @app.command()
 def delete(jobs: Jobs, yes: console.Yes = False) -> None:
     """Delete ended jobs with their motions."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = find_all(client, "job", jobs)
+    with Client() as client:
+        found = find_all(client.transport, "job", jobs)
         console.confirm(f"Delete {listed(found)} with all motions?", yes=yes)
-        for job in named(client, "/v1/jobs", found):
-            client.delete(f"/v1/jobs/{job.id}")
+        for job in named(client.transport, "/v1/jobs", found):
+            client.jobs.delete(job.id)
             console.say(f"deleted {job}")
 
 
@@ -172,13 +177,13 @@ def erase(
     as_json: console.Json = False,
 ) -> None:
     """Erase the prompts of ended jobs permanently; motions, names and tags stay."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        wanted = find_all(client, "job", jobs)
+    with Client() as client:
+        wanted = find_all(client.transport, "job", jobs)
         console.confirm(f"Forget the prompts of {listed(wanted)} for good?", yes=yes)
-        for job in named(client, "/v1/jobs", wanted):
-            found = client.post(f"/v1/jobs/{job.id}/erase")
+        for job in named(client.transport, "/v1/jobs", wanted):
+            found = client.jobs.erase(job.id).raw
             if as_json:
                 console.result_json(found)
                 continue
@@ -189,32 +194,39 @@ def erase(
 
 def _wait(job: str, timeout: float | None, as_json: bool, *, quiet: bool) -> None:
     from marey.cli.watching import check_ended, watch_job
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        ended = watch_job(client, find(client, "job", job).id, timeout=timeout, quiet=quiet)
+    with Client() as client:
+        found = find(client.transport, "job", job)
+        ended = watch_job(client.transport, found.id, timeout=timeout, quiet=quiet)
     if as_json:
         console.result_json(ended)
     check_ended(ended)
 
 
 def _act(jobs: list[str], verb: str, as_json: bool, **params: Any) -> None:
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
-        for job in find_all(client, "job", jobs):
-            found = client.post(f"/v1/jobs/{job.id}/{verb}", **params)
+    with Client() as client:
+        act = {
+            "pause": client.jobs.pause,
+            "resume": client.jobs.resume,
+            "cancel": client.jobs.cancel,
+            "retry": client.jobs.retry,
+        }[verb]
+        for job in find_all(client.transport, "job", jobs):
+            found = act(job.id, **params).raw
             if as_json:
                 console.result_json(found)
             else:
                 console.say(f"{DONE[verb]} {of_view('job', found)}: {found['state']}")
 
 
-def _change(job: str, patch: dict[str, Any], as_json: bool, reason: str | None = None) -> None:
-    from marey.client.transport import Transport
+def _change(job: str, patch: JobChanges, as_json: bool, reason: str | None = None) -> None:
+    from marey.client import Client
 
-    with Transport.here() as client:
-        found = client.patch(f"/v1/jobs/{find(client, 'job', job).id}", patch, reason=reason)
+    with Client() as client:
+        found = client.jobs.update(find(client.transport, "job", job).id, reason=reason, **patch).raw
     if as_json:
         console.result_json(found)
         return
@@ -236,18 +248,18 @@ def _share(text: str) -> float | None:
     return share
 
 
-def _show_failures(client: Any, job: str, state: str, limit: int = 20) -> None:
-    page = client.get(f"/v1/jobs/{job}/items", state=state, limit=limit)
-    for item in page["items"]:
+def _show_failures(client: Client, job: str, state: str, limit: int = 20) -> None:
+    found = client.jobs.items(job, state=state, page_size=limit)
+    for item in (each.raw for each in islice(found, limit)):
         error = item["error"] or {"message": item["reason"], "hint": None}
         console.result(f"{state:<10} {item['index']}: {item['prompt'][:60]!r}: {error['message']}")
         if error.get("hint"):
             console.result(f"{'':<10} {error['hint']}")
-    if page.get("next"):
+    if next(found, None) is not None:
         console.result(f"{'':<10} … and more: `marey fetch {job} --json` has a line for each")
 
 
-def _show_place(place: dict[str, Any]) -> None:
+def _show_place(place: Mapping[str, Any]) -> None:
     ahead = f"{place['items_ahead']} items of {place['jobs_ahead']} jobs come first"
     turns = f"; {place['tenants'] - 1} other tenants take turns" if place["tenants"] > 1 else ""
     console.result(f"{'queue':<10} {ahead}{turns}")
@@ -256,7 +268,7 @@ def _show_place(place: dict[str, Any]) -> None:
     console.result(f"{'':<10} {place['estimate']['basis']}")
 
 
-def _cell(job: dict[str, Any], column: str) -> object:
+def _cell(job: Mapping[str, Any], column: str) -> object:
     if column == "done":
         return sum(job["counters"][name] for name in ("succeeded", "failed", "dead", "cancelled"))
     return job[column]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -14,7 +14,7 @@ from marey.cli.references import FORMS, MOTION_FORMS, find, find_all
 from marey.core.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from marey.client.transport import Transport
+    from marey.client import Client
 
 app = typer.Typer(help="Motions on the server: find them, keep, reject and re-roll them.", no_args_is_help=True)
 
@@ -54,20 +54,18 @@ def list_motions(
     as_json: console.Json = False,
 ) -> None:
     """List motions that match all filters, newest first."""
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    params: dict[str, Any] = {
-        "tag": tags,
-        "name": name,
-        "text": text,
-        "review": [review.value for review in reviews] if reviews else None,
-        "limit": console.page_size(limit),
-    }
-    with Transport.here() as client:
-        if job is not None:
-            params["job"] = find(client, "job", job).id
-        found = client.pages("/v1/motions", **params)
-        console.listing(found, COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
+    with Client() as client:
+        found = client.motions.list(
+            job=None if job is None else find(client.transport, "job", job).id,
+            tags=tags,
+            name=name,
+            text=text,
+            reviews=[review.value for review in reviews] if reviews else None,
+            page_size=console.page_size(limit),
+        )
+        console.listing((each.raw for each in found), COLUMNS, _cell, as_json=as_json, limit=limit, full_ids=full_ids)
 
 
 @app.command()
@@ -94,32 +92,31 @@ def reroll(motions: Motions, comment: Comment = None, as_json: console.Json = Fa
 
     Said twice, it is done once; to go on, re-roll the new motion.
     """
-    from marey.client.transport import Transport
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         for some in _ids(client, motions):
-            for take in client.post("/v1/motions/reroll", {"motions": some, "comment": comment})["items"]:
+            for take in client.motions.reroll(some, comment=comment):
                 if as_json:
-                    console.result_json(take)
+                    console.result_json(take.raw)
                 else:
-                    when = "" if take["made"] else f" (asked for before; it is {take['state']})"
-                    console.result(f"{take['motion']} item {take['item']} seed {take['seed']} job {take['job']}{when}")
+                    when = "" if take.made else f" (asked for before; it is {take.state})"
+                    console.result(f"{take.motion} item {take.item} seed {take.seed} job {take.job}{when}")
 
 
-def _say(motions: list[str], verdict: str | None, comment: str | None, as_json: bool) -> None:
-    from marey.client.transport import Transport
+def _say(motions: list[str], verdict: Literal["kept", "rejected"] | None, comment: str | None, as_json: bool) -> None:
+    from marey.client import Client
 
-    with Transport.here() as client:
+    with Client() as client:
         for some in _ids(client, motions):
-            body = {"motions": some, "verdict": verdict, "comment": comment}
-            for motion in client.post("/v1/motions/review", body):
+            for motion in client.motions.review(some, verdict, comment=comment):
                 if as_json:
-                    console.result_json(motion)
+                    console.result_json(motion.raw)
                 else:
-                    console.say(f"{motion['id']} {review_of(motion) or Review.NEW.value}")
+                    console.say(f"{motion.id} {motion.review.verdict if motion.review else Review.NEW.value}")
 
 
-def _ids(client: Transport, motions: list[str]) -> Iterator[list[str]]:
+def _ids(client: Client, motions: list[str]) -> Iterator[list[str]]:
     """The ids, each once, so many as one request takes at a time.
 
     Raises:
@@ -127,7 +124,7 @@ def _ids(client: Transport, motions: list[str]) -> Iterator[list[str]]:
         NotFound: there is no such motion.
     """
     given = _lines(sys.stdin.read()) if motions == ["-"] else motions
-    ids = [each.id for each in find_all(client, "motion", dict.fromkeys(given))]
+    ids = [each.id for each in find_all(client.transport, "motion", dict.fromkeys(given))]
     if not ids:
         raise InvalidInput("no motion id is given", hint="`marey motions list` shows them.")
     for first in range(0, len(ids), MOST):
@@ -139,7 +136,7 @@ def _lines(text: str) -> list[str]:
     return [word for line in text.splitlines() for word in ([line.strip()] if ":" in line else line.split()) if word]
 
 
-def _cell(motion: dict[str, Any], column: str) -> object:
+def _cell(motion: Mapping[str, Any], column: str) -> object:
     if column == "tags":
         return "; ".join(motion["tags"])
     if column == "seconds":
@@ -147,6 +144,6 @@ def _cell(motion: dict[str, Any], column: str) -> object:
     return review_of(motion) if column == "review" else motion[column]
 
 
-def review_of(motion: dict[str, Any]) -> str | None:
+def review_of(motion: Mapping[str, Any]) -> str | None:
     """The review of a motion of the API."""
     return motion["review"] and motion["review"]["verdict"]

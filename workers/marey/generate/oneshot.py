@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from marey.cli.roles.serving import threads_of
 from marey.core.errors import InvalidInput
 from marey.core.extras import needs_extra
 from marey.registry import get_model, resolve
@@ -32,7 +31,7 @@ class Wanted:
 
 
 class OneShot:
-    """A model in this process: what `marey generate` runs."""
+    """A model in this process, as `marey generate` and `marey.generate` run it."""
 
     def __init__(self, bundle: Bundle, config: Settings) -> None:
         """Load the bundle and what reads its prompts.
@@ -52,7 +51,8 @@ class OneShot:
             raise InvalidInput(f"{bundle.manifest.name!r} does not read prompts", where=str(bundle.path))
         self.bundle = bundle
         self._text = TextPipeline.load(as_served(bundle.manifest.text, config=config))
-        self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads_of(config, 1))
+        threads = config.threads or max(1, len(os.sched_getaffinity(0)))
+        self._generator: Generator[Any] = load(bundle, device=config.device, threads=threads)
 
     def make(self, wanted: Sequence[Wanted]) -> Iterator[tuple[Wanted, MotionClip, float]]:
         """Each motion with the seconds it took, in the order given.
@@ -84,16 +84,3 @@ class OneShot:
                     assert generated is not None  # nothing was dropped
                     yield row, finish(self._generator, request, generated, settings, fps=output_fps), elapsed
             start += len(rows)
-
-
-def make_random_bundle(model: str, path: Path) -> None:
-    """Write a tiny bundle of a model with random weights: it exercises everything and generates nonsense.
-
-    Raises:
-        NotFound: there is no such model.
-        InvalidInput: the model makes no such bundles.
-    """
-    spec = get_model(model)
-    if spec.random_bundle is None:
-        raise InvalidInput(f"the model {model!r} makes no bundles with random weights")
-    resolve(spec.random_bundle)(path)

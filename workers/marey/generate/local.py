@@ -1,0 +1,154 @@
+"""`marey.generate`: load a model, make clips."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from marey.core.errors import InvalidBundle, InvalidInput
+from marey.core.extras import needs_extra
+from marey.generate.oneshot import OneShot, Wanted
+from marey.items.item import MAX_SEED, OUTPUT_FPS, Item, Problem, read_items
+from marey.registry import find_model, model_names
+
+if TYPE_CHECKING:
+    from marey.bundles import Bundle
+    from marey.motion.clip import MotionClip
+
+Row = Item | Mapping[str, object] | str
+"""A prompt, a dict with the fields of an item, or an `Item`."""
+
+
+class LocalModel:
+    """A model in the memory of this process. Not for several threads.
+
+    Attributes:
+        name: of its bundle.
+        reference: its exact bundle, as `hgm3-starter@0123456789ab`.
+        model: the kind of model, as `hgm3`.
+        licence: the terms of its weights and of what they make.
+        is_random: the weights were never trained: motions show the machinery, not the prompts.
+    """
+
+    def __init__(self, bundle: Bundle, studio: OneShot) -> None:
+        self.name = bundle.manifest.name
+        self.reference = bundle.reference
+        self.model = bundle.manifest.model
+        self.licence = bundle.manifest.licence
+        self.is_random = bundle.manifest.random
+        self._bundle = bundle
+        self._studio = studio
+
+    def generate(
+        self,
+        prompts: Iterable[Row] | str,
+        *,
+        seed: int | None = None,
+        seconds: float | None = None,
+        variants: int | None = None,
+        fps: float | None = None,
+        settings: Mapping[str, float] | None = None,
+    ) -> Sequence[MotionClip]:
+        """Make motions; the same prompts, seeds and settings give the same clips as a server's.
+
+        Args:
+            prompts: one or several; a row's own values override the arguments below.
+            seed: of variant 0 of each prompt, variant k has seed + k; None = drawn.
+            seconds: length; None = the model decides.
+            variants: motions of each prompt; None = 1.
+            fps: frame rate of the clips; None = the model's.
+            settings: of sampling, as `{"guidance": 4.5}`.
+
+        Returns:
+            A clip for each variant of each prompt, in that order.
+
+        Raises:
+            InvalidItems: with every problem of every prompt; nothing is made then.
+            InvalidInput: there is no prompt.
+        """
+        return [*self.stream(prompts, seed=seed, seconds=seconds, variants=variants, fps=fps, settings=settings)]
+
+    def stream(
+        self,
+        prompts: Iterable[Row] | str,
+        *,
+        seed: int | None = None,
+        seconds: float | None = None,
+        variants: int | None = None,
+        fps: float | None = None,
+        settings: Mapping[str, float] | None = None,
+    ) -> Iterator[MotionClip]:
+        """Make motions as `generate` does, and give each as it is made."""
+        sampling = {**(settings or {}), **({} if fps is None else {OUTPUT_FPS: fps})}
+        defaults = {"seed": seed, "seconds": seconds, "variants": variants, "settings": sampling or None}
+        rows = [prompts] if isinstance(prompts, str) else prompts
+        raws = ((number, _raw(row, defaults)) for number, row in enumerate(rows, 1))
+        items = [*read_items(raws, where="prompts", check=self._check)]
+        wanted = [each for item in items for each in _wanted(item)]
+        for _, clip, _ in self._studio.make(wanted):
+            yield clip
+
+    def _check(self, values: Mapping[str, Any], line: int | None) -> Iterator[Problem]:
+        """The problems of a row that this model alone has: lengths it cannot make, settings it does not have."""
+        from marey.bundles.limits import check_seconds, check_settings
+
+        for field, check in (("seconds", check_seconds), ("settings", check_settings)):
+            if values.get(field) is None:
+                continue
+            try:
+                check(self._bundle, values[field])
+            except InvalidBundle:
+                raise
+            except InvalidInput as error:
+                yield Problem(line, field, error.message)
+
+
+def load(bundle: str | os.PathLike[str], *, device: str | None = None, threads: int | None = None) -> LocalModel:
+    """Load a model into this process.
+
+    Args:
+        bundle: a model (`hgm3`), a bundle (`hgm3-starter`), an exact bundle, or the path of its folder.
+        device: `cpu`, `cuda` or `auto`; None = that of MAREY_DEVICE.
+        threads: of the CPU; None = that of MAREY_THREADS, by default all cores.
+
+    Raises:
+        InvalidInput: the extra `worker` is not installed, or there is no such device.
+        NotFound, InvalidBundle: there is no such bundle, or it is damaged or not one that makes motions.
+    """
+    try:
+        from marey.bundles import choose_bundle
+        from marey.core.settings import settings
+    except ImportError as error:
+        raise needs_extra("worker", error) from error
+    changes = {"device": device, "threads": threads}
+    config = settings().model_copy(update={name: value for name, value in changes.items() if value is not None})
+    found = choose_bundle(os.fspath(bundle), config=config)
+    if find_model(found.manifest.model) is None:
+        raise InvalidBundle(
+            f"is a bundle of {found.manifest.model!r}, which does not run here",
+            where=str(found.path),
+            hint=f"Models that do: {', '.join(model_names())}.",
+        )
+    return LocalModel(found, OneShot(found, config))
+
+
+def _raw(row: Row, defaults: Mapping[str, object]) -> object:
+    """A row with the defaults for what it does not say; settings one by one."""
+    own: object = {"prompt": row} if isinstance(row, str) else row.as_json() if isinstance(row, Item) else row
+    if not isinstance(own, Mapping):
+        return own
+    whole = {**defaults, **{str(name): value for name, value in own.items() if value is not None}}
+    if isinstance(row, Item) and row.variants == 1:
+        whole["variants"] = defaults["variants"]
+    shared, its = defaults["settings"], own.get("settings")
+    if isinstance(shared, Mapping) and isinstance(its, Mapping):
+        whole["settings"] = {**shared, **its}
+    return whole
+
+
+def _wanted(item: Item) -> Iterator[Wanted]:
+    seed = secrets.randbelow(MAX_SEED - item.variants + 2) if item.seed is None else item.seed
+    for variant in range(item.variants):
+        yield Wanted(item.prompt, seed + variant, item.seconds, item.settings)
