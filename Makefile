@@ -31,7 +31,7 @@ demo: $(STAMP) ## Eight prompts through the whole platform, into out/demo
 	$(BIN)/python -m marey.cli.demo
 
 # Many tests wait for servers and timeouts: lint runs beside them.
-TOGETHER := $(MAKE) --no-print-directory --jobs 2 --output-sync=line
+TOGETHER := $(MAKE) --no-print-directory --jobs 2
 
 test: $(STAMP) ## Lint, and everything but slow and gpu tests: under ten minutes on two cores
 	$(TOGETHER) lint pytest
