@@ -224,7 +224,7 @@ def test_events_are_pages_of_json(http: httpx2.Client) -> None:
 
 def test_a_stream_follows_a_job_to_its_end_and_then_says_so(api: LiveApi, http: httpx2.Client) -> None:
     job = str(submit(http, *[{"prompt": f"a person walks {i} steps"} for i in range(5)])["id"])
-    threading.Timer(0.3, api.telemetry).start()
+    threading.Timer(0.3, api.work).start()
     with api.client() as client:
         events = list(client.events(job))
         assert events[-1]["data"]["state"] == "succeeded"

@@ -260,7 +260,7 @@ def test_all_lengths_that_the_model_cannot_make_are_told(http: httpx2.Client) ->
         ({"source": "test+compositional"}, "what the evaluator's own prompts are called"),
         ({"prompts": None, "split": "val"}, "Input should be 'test'"),
         ({"prompts": None, "split": "compositional"}, "carries no captions of the split 'compositional'"),
-        ({"settings": {"steps": 1000}}, "steps: 1000 is outside"),
+        ({"settings": {"fps": 1000}}, "fps: 1000 is outside"),
         ({"settings": {"guidance": 2}}, "'guidance' is not a setting of toy-starter"),
         ({"repeats": 0}, "repeats"),
         ({"seed": 2**31 - 1, "repeats": 2}, "plus 3 for the last motion"),

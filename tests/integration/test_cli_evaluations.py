@@ -173,7 +173,7 @@ def test_bad_input_is_2_with_every_line_and_nothing_is_begun(marey: Marey, tmp_p
     for arguments, said in (
         (["run", "--bundle", "gone"], "no model or bundle is named 'gone'"),
         (["run", "--bundle", GENERATOR, "--split", tmp_path / "none.csv"], "no such file"),
-        (["run", "--bundle", GENERATOR, "--set", "guidance"], "--set guidance=4.5"),
+        (["run", "--bundle", GENERATOR, "--set", "guidance"], "such as guidance=4.5"),
         (["run", "--bundle", GENERATOR, "--baseline", uuid4()], "there is no such evaluation"),
         (["schedule", "0 3 * *", "--bundle", GENERATOR], "does not have five fields"),
         (["schedule", MONDAYS, "--bundle", GENERATOR, "--time-zone", "Mars/Olympus"], "there is no time zone"),

@@ -144,6 +144,6 @@ def test_the_command_line_ends_with_5_when_it_may_not_ask_again_soon(
     with Transport(Server(url, secret)) as client:
         for _ in range(3):
             client.get("/v1/jobs")
-        with pytest.raises(Busy, match="class read") as refused:
+        with pytest.raises(Busy, match="rate read") as refused:
             client.get("/v1/jobs")
     assert refused.value.exit_code == 5

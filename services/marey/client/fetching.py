@@ -259,7 +259,7 @@ def _is_there(download: Download, overwrite: bool) -> bool:
         return False
     if not overwrite:
         raise Conflict(
-            "is there already and holds something else",
+            "already exists and holds something else",
             where=str(download.path),
             hint="Choose another folder, or --overwrite.",
         )

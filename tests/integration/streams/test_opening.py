@@ -102,7 +102,7 @@ def test_a_key_has_a_share_of_the_sockets_and_leaves_the_rest_to_others(
             viewer.until("stream")
             with watching(url, stream, secret) as second:
                 code, reason = second.closed()
-                assert (code, reason) == (1013, "this key has 1 sockets open, its share")
+                assert (code, reason) == (1013, "this key has 1 sockets open, its limit")
             with watching(url, stream, other) as third:
                 third.until("stream")
             viewer.connection.socket.shutdown(socket.SHUT_RDWR)  # it does not say goodbye

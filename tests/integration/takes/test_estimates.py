@@ -17,6 +17,7 @@ from marey.jobs import (
     commit_motions,
     estimate,
     pause,
+    place_of,
 )
 from marey.tenants import set_quotas
 from marey.tenants.quotas import EXPECTED_BYTES
@@ -63,21 +64,21 @@ def test_a_job_waits_for_higher_priorities_and_older_jobs_of_its_tenant_and_shar
     with measured.begin() as conn:
         conn.execute(sa.text("INSERT INTO tenant (id) VALUES ('other')"))
 
-    def place_of(job: int) -> tuple[int, int, int, float | None]:
+    def standing(job: int) -> tuple[int, int, int, float | None]:
         with transaction(measured) as conn:
             place = place_of(conn, "default", jobs[job])
             return place.jobs_ahead, place.items_ahead, place.tenants, place.seconds
 
-    assert [place_of(k) for k in range(3)] == [(1, 4, 1, 2.0), (2, 8, 1, 3.0), (0, 0, 1, 1.0)]
+    assert [standing(k) for k in range(3)] == [(1, 4, 1, 2.0), (2, 8, 1, 3.0), (0, 0, 1, 1.0)]
     submit_items(measured, items, tenant="other", priority=900)
-    assert place_of(2) == (0, 0, 2, 2.0)  # its priority is worth nothing here: the two take turns
+    assert standing(2) == (0, 0, 2, 2.0)  # its priority is worth nothing here: the two take turns
     with transaction(measured) as conn:
         pause(conn, "default", jobs[2])
-    assert place_of(0) == (0, 0, 2, 2.0)
-    assert place_of(2) == (0, 0, 2, None)
+    assert standing(0) == (0, 0, 2, 2.0)
+    assert standing(2) == (0, 0, 2, None)
     with transaction(measured) as conn:
         cancel(conn, "default", jobs[1])
-    assert place_of(1) == (0, 0, 1, None)
+    assert standing(1) == (0, 0, 1, None)
 
 
 def test_a_dry_run_tells_what_is_left_of_the_quotas_and_refuses_what_a_submit_would(

@@ -75,14 +75,14 @@ def test_the_api_tells_all_problems_of_a_body_at_once(api: LiveApi) -> None:
         json.dumps(each)
         for each in (
             {"prompt": "a person walks", "seconds": 12},
-            {"prompt": "", "seconds": 12, "settings": {"temperature": 1.0}},
+            {"prompt": "", "seconds": 12, "settings": {"fps": 1000}},
             {"prompt": "a person bows", "seed": "x"},
         )
     )
     with api.http() as http:
         answer = http.post("/v1/jobs", content=body, headers={"Content-Type": "application/x-ndjson"}).json()
     assert [(p["line"], p["field"]) for p in answer["problems"]] == [
-        (1, "seconds"), (2, "prompt"), (2, "seconds"), (2, "settings"), (3, "seed"),
+        (1, "seconds"), (2, "prompt"), (2, "settings"), (2, "seconds"), (3, "seed"),
     ]  # fmt: skip
 
 

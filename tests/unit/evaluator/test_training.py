@@ -133,7 +133,7 @@ def test_data_or_texts_of_another_kind_are_refused(
         TMRStage(replace(TINY, layout="kit-251", features=251, fps=12.5), data, encoder)
     with pytest.raises(InvalidFile, match="texts are 384 wide, this configuration reads 768"):
         TMRStage(replace(TINY, text_width=768), data, encoder)
-    with pytest.raises(InvalidInput, match="no stage 'tokenizer'"):
+    with pytest.raises(InvalidInput, match="unknown stage 'tokenizer'"):
         train_stage("tokenizer", options(prepared, tmp_path, 1))
     with pytest.raises(NotFound, match="has not finished"):
         assemble(prepared.path, tmp_path, tmp_path / "bundle", TINY)
@@ -194,7 +194,7 @@ def test_a_bundle_of_another_layout_or_model_is_refused(bundle: Bundle, encoder:
     for changes, message in (
         ({"layout": "kit-251", "fps": 12.5}, "read humanml3d-263, not kit-251"),
         ({"kind": "generator"}, "not an evaluator of tmr"),
-        ({"text": None}, "which text encoder"),
+        ({"text": None}, "declares no text encoder"),
     ):
         changed = Bundle(bundle.path, bundle.manifest.model_copy(update=changes))
         with pytest.raises(InvalidBundle, match=message):
