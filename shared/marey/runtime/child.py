@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import signal
@@ -19,6 +18,7 @@ from marey.core.settings import Settings, settings
 from marey.core.tracing import configure_tracing, end_tracing
 from marey.db import HEARTBEAT, create_engine, transaction
 from marey.jobs import HeartbeatReply, WorkerHeartbeat, beat, heartbeat, leased_items, retire
+from marey.registry import resolve
 from marey.runtime.committer import Committer
 from marey.runtime.exposition import expose, measure_gpu
 from marey.runtime.faults import retry_unreachable
@@ -42,9 +42,8 @@ def import_handler(reference: str) -> Handler:
     Raises:
         InvalidInput: there is no such module or attribute.
     """
-    module, _, attribute = reference.partition(":")
     try:
-        factory = cast("HandlerFactory", getattr(importlib.import_module(module), attribute))
+        factory = cast("HandlerFactory", resolve(reference))
     except (ImportError, AttributeError) as error:
         raise InvalidInput(
             f"the handler {reference!r} cannot be imported: {error}",

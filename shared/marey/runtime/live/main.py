@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import socket
 import threading
@@ -13,6 +12,7 @@ from marey.core.errors import InvalidInput
 from marey.core.settings import Settings
 from marey.db import create_engine
 from marey.jobs import WorkerHeartbeat
+from marey.registry import resolve
 from marey.runtime.child import wait_for_database
 from marey.runtime.exposition import expose
 from marey.runtime.live.loop import LiveLoop
@@ -55,8 +55,7 @@ def live_main(factory: str, chosen: Settings, *, stopping: threading.Event | Non
         stopping = threading.Event()
         stop_on_signals(stopping)
     wait_for_database(chosen)
-    module, _, attribute = factory.partition(":")
-    model = cast("LiveModelFactory", getattr(importlib.import_module(module), attribute))()
+    model = cast("LiveModelFactory", resolve(factory))()
     engine = create_engine(chosen.database_url.get_secret_value())
     client = redis_client(queue_url.get_secret_value(), timeout=REDIS_SECONDS, connect_timeout=REDIS_SECONDS)
     name = f"live-{socket.gethostname()}-{os.getpid()}"
