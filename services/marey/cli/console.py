@@ -193,7 +193,7 @@ def can_ask() -> bool:
 
 
 def confirm(question: str, *, yes: bool) -> None:
-    """Nothing, if that may be done: by `--yes`, or because a person says so.
+    """Ask a person whether to go on; pass without asking where `yes` is set.
 
     Raises:
         InvalidInput: there is no terminal to ask at.

@@ -22,7 +22,7 @@ class Check:
     state: State
     message: str
     hint: str | None = None
-    """What to do; None where nothing is to be done."""
+    """The advice to the user; None where none is needed."""
 
 
 def broken(name: str, error: MareyError) -> Check:

@@ -45,7 +45,7 @@ def watch_job(transport: Transport, job: str, *, timeout: float | None = None, q
 
 
 def check_ended(job: dict[str, Any]) -> None:
-    """Nothing, if all items of the ended job succeeded.
+    """Check that all items of the ended job succeeded.
 
     Raises:
         ItemsFailed: some failed, died or were cancelled.

@@ -48,7 +48,7 @@ Planned = list[tuple[dict[str, Any], list[Download]]]
 
 
 class FetchObserver:
-    """What a caller of `fetch_job` is told; each method does nothing by itself."""
+    """Callbacks of `fetch_job`; each method does nothing by default."""
 
     def planned(self, total: int) -> None:
         """The number of files is known."""

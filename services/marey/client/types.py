@@ -334,7 +334,7 @@ class StreamDetail(Stream):
 
     prompts: tuple[StreamPrompt, ...] = ()
     skeleton: StreamSkeleton | None = None
-    """What the frames drive; None when the bundle is no longer here."""
+    """The skeleton that the frames drive; None when the bundle is no longer here."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -380,7 +380,7 @@ class Model(Result):
     metrics: Mapping[str, float] = field(default_factory=dict[str, float])
     settings: tuple[SamplingSetting, ...] = ()
     about: str = ""
-    """What the model can and cannot do, in a few lines; empty where the server does not know it."""
+    """A few lines on the abilities and limits of the model; empty where the server does not know it."""
 
 
 @dataclass(frozen=True, kw_only=True)
