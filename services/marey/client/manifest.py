@@ -187,7 +187,7 @@ def _read(path: Path) -> list[Row]:
     except OSError as error:
         raise InvalidInput(f"cannot be read: {error.strerror}", where=str(path)) from error
     raise Conflict(
-        "already exists and is not a manifest of fetched motions",
+        "already exists and is no manifest of fetched motions",
         where=str(path),
         hint="Choose another folder, or --overwrite.",
     )
