@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -21,7 +21,7 @@ _FILE = Path(__file__).with_name("vocabulary.toml")
 FLIGHT_SECONDS = 0.3
 """Longest flight of an action that states none."""
 
-_FIELDS = {"definition", "verbs", "nouns", "near", "implies", "support", "sided", "flight_s", "in_place"}
+_FIELDS = {"definition", "verbs", "nouns", "near", "implies", "kind_of", "support", "sided", "flight_s", "in_place"}
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Action:
         flight_s: longest time off its support in one stretch, seconds.
         in_place: may be done without travel though its words say travel (a walk cycle).
         implies: actions that every clip of this action shows as well.
+        kind_of: of these, the one that this action is a manner of; it is read as that where a bundle knows no better.
         sided: meaning of left and right.
     """
 
@@ -50,6 +51,7 @@ class Action:
     flight_s: float = FLIGHT_SECONDS
     in_place: bool = False
     implies: tuple[str, ...] = ()
+    kind_of: str = ""
     sided: Sided = ""
 
 
@@ -78,6 +80,13 @@ class Vocabulary:
     def implied(self, name: str) -> frozenset[str]:
         """Ids of all actions that a clip of this one shows as well, directly or through others."""
         return self._implied[name]
+
+    def kinds(self, name: str) -> Iterator[str]:
+        """Yield the actions that this one is a manner of, the nearest first."""
+        seen = {name}
+        while (name := self.actions[name].kind_of) and name not in seen:
+            seen.add(name)
+            yield name
 
     def _closure(self, name: str) -> set[str]:
         found, open_names = set[str](), [name]
@@ -109,6 +118,8 @@ def parse_vocabulary(data: bytes, where: str) -> Vocabulary:
     for action in actions.values():
         if missing := [name for name in action.implies if name not in actions]:
             raise InvalidFile(f"implies names no action: {', '.join(missing)}", where=f"{where}: {action.id}")
+        if action.kind_of and action.kind_of not in action.implies:
+            raise InvalidFile(f"kind_of is not in implies: {action.kind_of}", where=f"{where}: {action.id}")
     return Vocabulary(actions, hashlib.sha256(data).hexdigest())
 
 
@@ -135,6 +146,7 @@ def _action(name: str, value: object, where: str) -> Action:
         flight_s=float(table.get("flight_s", FLIGHT_SECONDS)),
         in_place=bool(table.get("in_place", False)),
         implies=_words(table, "implies", place),
+        kind_of=str(table.get("kind_of", "")),
         sided=cast("Sided", _one_of(table, "sided", "", get_args(Sided), place)),
     )
 

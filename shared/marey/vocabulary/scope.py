@@ -1,0 +1,179 @@
+"""Scope of a prompt by its words: which actions it names, and whether a bundle knows them.
+
+No network and no labeller: `submit` runs this on every prompt, in the client and in the server. It sees words alone;
+the text stage judges by meaning where it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal, get_args
+
+from marey.core.errors import InvalidInput
+from marey.vocabulary.entries import Vocabulary, load_vocabulary
+from marey.vocabulary.flags import Flag, Flagger
+from marey.vocabulary.lexicon import Lexicon, Meaning
+from marey.vocabulary.phrases import Match, PhraseFinder, Word
+from marey.vocabulary.word_lists import load_word_lists
+
+Verdict = Literal["known", "close", "tried", "unknown"]
+"""`known`: the bundle supports the action; `close`: it is read as another that the bundle supports; `tried`: the bundle
+was trained on it, with less than 80 % adherence; `unknown`: none of these."""
+ScopePolicy = Literal["warn", "refuse", "ignore"]
+"""Treatment of prompts with an unknown action: accepted with a warning, refused, or not examined."""
+POLICIES: tuple[ScopePolicy, ...] = get_args(ScopePolicy)
+
+VERSION = 1
+MAX_TEXT = 200
+"""Characters of a prompt that stand for the action of one that names none."""
+_ORDER: dict[str, int] = {verdict: rank for rank, verdict in enumerate(get_args(Verdict))}
+
+
+@dataclass(frozen=True)
+class ActionLists:
+    """The actions that a bundle's card lists, by id.
+
+    Attributes:
+        supported: at least 80 % adherence.
+        single_take: supported, learned from fewer than four sources.
+        tried: trained on, below 80 %.
+    """
+
+    supported: tuple[str, ...]
+    single_take: tuple[str, ...] = ()
+    tried: tuple[str, ...] = ()
+
+    def knows(self, name: str) -> bool:
+        """Return True if the action is supported."""
+        return name in self.supported or name in self.single_take
+
+
+UNLISTED = ActionLists(
+    supported=("walk", "walk-backward", "run", "turn", "wave", "raise-arm", "bow"),
+    tried=("kick", "punch", "slash", "dance"),
+)
+"""Lists of bundles whose manifest has none: those trained on the Bandai-Namco sets."""
+
+
+@dataclass(frozen=True)
+class NamedAction:
+    """One action that a prompt names.
+
+    Attributes:
+        text: the words for it, as the prompt has them.
+        verdict: see `Verdict`.
+        action: id of the action in the vocabulary; None = in no entry.
+        read_as: id of the supported action that a `close` one is read as.
+    """
+
+    text: str
+    verdict: Verdict
+    action: str | None = None
+    read_as: str | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields that say something."""
+        values = {"text": self.text, "verdict": self.verdict, "action": self.action, "read_as": self.read_as}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Scope of one prompt."""
+
+    actions: tuple[NamedAction, ...]
+    flags: tuple[Flag, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst verdict of the prompt's actions."""
+        return max((action.verdict for action in self.actions), key=_ORDER.__getitem__)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the record that items and manifests store."""
+        return {
+            "version": VERSION,
+            "by": "words",
+            "verdict": self.verdict,
+            "actions": [action.as_json() for action in self.actions],
+            "flags": list(self.flags),
+        }
+
+
+class ScopeMatcher:
+    """Matches prompts against a vocabulary."""
+
+    def __init__(self, vocabulary: Vocabulary) -> None:
+        """Build the tables, once."""
+        lists = load_word_lists()
+        lexicon = Lexicon(vocabulary, lists.other_verbs, lists.idioms)
+        self._vocabulary = vocabulary
+        self._phrases = PhraseFinder(lexicon, lists)
+        self._flagger = Flagger(lexicon, lists)
+
+    def match(self, prompt: str, lists: ActionLists) -> Scope:
+        """Return the scope of a prompt relative to what a bundle supports."""
+        words = self._phrases.words(prompt)
+        found = self._phrases.find(words)
+        flags = list(self._flagger.details(words, found))
+        foreign = self._flagger.foreign(words, found)
+        if foreign is not None or not found:
+            nothing = NamedAction(prompt[:MAX_TEXT], "unknown")
+            return Scope((nothing,), (*flags, foreign or "no-action"))
+        return Scope(tuple(_unique(self._named(words, match, lists) for match in found)), tuple(flags))
+
+    def _named(self, words: list[Word], match: Match, lists: ActionLists) -> NamedAction:
+        """Return the best of a phrase's meanings."""
+        text = " ".join(word.text for word in words[match.start : match.end])
+        candidates = [self._judged(text, meaning, lists) for meaning in match.meanings]
+        return min(candidates, key=lambda named: _ORDER[named.verdict])
+
+    def _judged(self, text: str, meaning: Meaning, lists: ActionLists) -> NamedAction:
+        name = meaning.action
+        if name is None:
+            return NamedAction(text, "unknown")
+        if lists.knows(name):
+            return NamedAction(text, "close", name, name) if meaning.near else NamedAction(text, "known", name)
+        if name in lists.tried:
+            return NamedAction(text, "tried", name)
+        read_as = next((kind for kind in self._vocabulary.kinds(name) if lists.knows(kind)), None)
+        return NamedAction(text, "close" if read_as else "unknown", name, read_as)
+
+
+def _unique(named: Iterable[NamedAction]) -> Iterator[NamedAction]:
+    """Yield actions once each, in their order."""
+    seen = set[tuple[str, str]]()
+    for action in named:
+        key = (action.action or action.text, action.verdict)
+        if key not in seen:
+            seen.add(key)
+            yield action
+
+
+@lru_cache(maxsize=1)
+def _matcher() -> ScopeMatcher:
+    return ScopeMatcher(load_vocabulary())
+
+
+def match_scope(prompt: str, lists: ActionLists = UNLISTED) -> Scope:
+    """Return the scope of a prompt by its words.
+
+    Args:
+        prompt: as `check_prompt` returns it.
+        lists: actions of the bundle that will read it.
+    """
+    return _matcher().match(prompt, lists)
+
+
+def read_policy(text: str) -> ScopePolicy:
+    """Return the policy of this name.
+
+    Raises:
+        InvalidInput: no policy has this name.
+    """
+    for policy in POLICIES:
+        if policy == text:
+            return policy
+    raise InvalidInput(f"unknown scope {text[:40]!r}; known: {', '.join(POLICIES)}")

@@ -1,0 +1,106 @@
+"""Scope of prompts by their words."""
+
+import pytest
+
+from marey.checks.scope_prompts import IN_SCOPE, ScopeRate, is_right, scope_prompts, scope_rates
+from marey.core.errors import InvalidInput
+from marey.vocabulary.entries import load_vocabulary
+from marey.vocabulary.scope import ActionLists, match_scope, read_policy
+
+ALL = ActionLists(tuple(load_vocabulary().actions))
+DEVELOPMENT = scope_prompts("development")
+
+
+def test_the_development_set_has_eight_classes() -> None:
+    assert len(DEVELOPMENT) >= 150
+    assert len({prompt.group for prompt in DEVELOPMENT}) == 8
+
+
+@pytest.mark.parametrize("rate", scope_rates(DEVELOPMENT, ALL), ids=lambda rate: rate.group)
+def test_rates_on_the_development_set(rate: ScopeRate) -> None:
+    assert rate.share >= (0.97 if rate.group == IN_SCOPE else 0.9)
+
+
+def test_the_action_of_an_in_scope_prompt_is_found() -> None:
+    wrong = [
+        prompt.text
+        for prompt in DEVELOPMENT
+        if prompt.action and prompt.action not in {named.action for named in match_scope(prompt.text, ALL).actions}
+    ]
+    assert len(wrong) <= 3, wrong
+
+
+def test_a_prompt_out_of_scope_is_right_only_as_unknown() -> None:
+    dog = next(prompt for prompt in DEVELOPMENT if prompt.text == "the dog barks")
+    assert is_right(dog, match_scope(dog.text, ALL))
+    assert not is_right(dog, match_scope("a person walks", ALL))
+
+
+@pytest.mark.parametrize(
+    ("prompt", "verdict", "action", "read_as"),
+    [
+        ("a person walks forward", "known", "walk", None),
+        ("a man raises both his arms slowly", "known", "raise-arm", None),
+        ("she sprints", "close", "sprint", "run"),
+        ("a person limps", "close", "walk", "walk"),
+        ("he kicks", "tried", "kick", None),
+        ("a person climbs a ladder", "unknown", "climb-ladder", None),
+        ("a person juggles", "unknown", None, None),
+        ("is punching a bag", "tried", "punch", None),
+        ("gets punched", "unknown", "flinch", None),
+        ("jumps on a box", "unknown", "jump", None),
+        ("picks the heavy box up", "unknown", "pick-up", None),
+    ],
+)
+def test_verdicts_of_a_bundle_without_lists(prompt: str, verdict: str, action: str | None, read_as: str | None) -> None:
+    (named,) = match_scope(prompt).actions
+    assert (named.verdict, named.action, named.read_as) == (verdict, action, read_as)
+
+
+@pytest.mark.parametrize(
+    ("prompt", "flag"),
+    [
+        ("he does not wave", "negation"),
+        ("walks without moving the arms", "negation"),
+        ("throws a ball", "objects"),
+        ("kicks three times", "counts"),
+        ("two people dance", "several-people"),
+        ("the dog barks", "other-subject"),
+        ("ein Mann läuft", "other-language"),
+        ("an old man in a coat", "no-action"),
+        ("asdf qwer zxcv", "gibberish"),
+    ],
+)
+def test_flags(prompt: str, flag: str) -> None:
+    assert flag in match_scope(prompt, ALL).flags
+
+
+@pytest.mark.parametrize("prompt", ["lifts two hands", "a wave of the left hand", "he walks for 3 seconds", "..."])
+def test_prompts_without_counts(prompt: str) -> None:
+    assert "counts" not in match_scope(prompt, ALL).flags
+
+
+def test_the_worst_action_is_the_verdict_of_a_prompt() -> None:
+    scope = match_scope("he walks, kicks and juggles")
+    assert [named.verdict for named in scope.actions] == ["known", "tried", "unknown"]
+    assert scope.verdict == "unknown"
+
+
+def test_a_prompt_without_an_action_has_one_unknown() -> None:
+    assert match_scope("hmm").as_json() == {
+        "version": 1,
+        "by": "words",
+        "verdict": "unknown",
+        "actions": [{"text": "hmm", "verdict": "unknown"}],
+        "flags": ["gibberish"],
+    }
+
+
+def test_a_single_take_is_known() -> None:
+    assert match_scope("claps", ActionLists((), single_take=("clap",))).verdict == "known"
+
+
+def test_an_unknown_policy_lists_the_known_ones() -> None:
+    assert read_policy("refuse") == "refuse"
+    with pytest.raises(InvalidInput, match="unknown scope 'no'; known: warn, refuse, ignore"):
+        read_policy("no")

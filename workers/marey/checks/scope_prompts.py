@@ -1,0 +1,76 @@
+"""Prompts for measuring scope, in sets by different authors: eight classes, one of them in scope.
+
+`development` is by the author of the words in `marey.vocabulary`; other sets are by other authors and are never used
+for choosing words.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from marey.vocabulary.scope import ActionLists, Scope, match_scope
+
+ScopeSet = Literal["development"]
+IN_SCOPE = "in-scope"
+OBJECTS = "objects"
+"""Classes with rules of their own; the prompts of all others are out of scope."""
+
+
+@dataclass(frozen=True)
+class ScopePrompt:
+    """A prompt with its class; in scope also the action that it names."""
+
+    text: str
+    group: str
+    action: str | None = None
+
+
+@dataclass(frozen=True)
+class ScopeRate:
+    """Count of a class: how many prompts, and how many of them got the right answer.
+
+    Right is: in scope not `unknown`; objects flagged as such; all others `unknown`, or, for plausible unknown actions,
+    not `known`.
+    """
+
+    group: str
+    prompts: int
+    right: int
+
+    @property
+    def share(self) -> float:
+        """Share of right answers."""
+        return self.right / self.prompts
+
+
+def scope_prompts(which: ScopeSet) -> tuple[ScopePrompt, ...]:
+    """Read one of the sets, in the order of its file."""
+    path = Path(__file__).with_name(f"scope_prompts_{which}.toml")
+    table: dict[str, Any] = tomllib.loads(path.read_text("utf-8"))
+    named = table.pop(IN_SCOPE)["expect"]
+    outside = [ScopePrompt(text, group) for group, content in table.items() for text in content["prompts"]]
+    return (*outside, *(ScopePrompt(text, IN_SCOPE, action) for text, action in named))
+
+
+def scope_rates(prompts: Sequence[ScopePrompt], lists: ActionLists) -> list[ScopeRate]:
+    """Return the rate of each class under a bundle's lists."""
+    groups = list(dict.fromkeys(prompt.group for prompt in prompts))
+    return [_rate(group, [prompt for prompt in prompts if prompt.group == group], lists) for group in groups]
+
+
+def _rate(group: str, prompts: Sequence[ScopePrompt], lists: ActionLists) -> ScopeRate:
+    right = sum(is_right(prompt, match_scope(prompt.text, lists)) for prompt in prompts)
+    return ScopeRate(group, len(prompts), right)
+
+
+def is_right(prompt: ScopePrompt, scope: Scope) -> bool:
+    """Return True if the scope of a prompt fits its class; see `ScopeRate`."""
+    if prompt.group == IN_SCOPE:
+        return scope.verdict != "unknown"
+    if prompt.group == OBJECTS:
+        return "objects" in scope.flags
+    return scope.verdict == "unknown" or (prompt.group == "unknown-action" and scope.verdict != "known")
