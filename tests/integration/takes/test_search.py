@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from uuid import UUID
 
@@ -109,13 +110,14 @@ def test_a_search_has_two_plans_whatever_the_planner_believes(
     engine: sa.Engine, jobs: list[UUID], name: str, statistics: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(searching, "WALKED", 3)
-    seen: list[str] = []
+    seen: dict[str, list[str]] = {"recent": [], "matches": [], "near": []}
 
     def explain(conn: sa.Connection, _cursor: object, statement: str, parameters: object, *_: object) -> None:
-        if statement.startswith(("SELECT recent", "SELECT matches")):
+        source = statement.removeprefix("SELECT ").partition(".")[0]
+        if source in seen:
             raw = conn.connection.cursor()
             raw.execute("EXPLAIN " + statement, parameters)
-            seen.append("\n".join(row[0] for row in raw.fetchall()))
+            seen[source].append("\n".join(row[0] for row in raw.fetchall()))
 
     with engine.connect() as conn:
         if statistics:
@@ -128,15 +130,45 @@ def test_a_search_has_two_plans_whatever_the_planner_believes(
         changed = "SELECT name FROM pg_settings WHERE name LIKE 'enable%' AND setting <> reset_val"
         assert conn.execute(sa.text(changed)).scalars().all() == [], "what comes after it is planned freely"
         conn.rollback()
-    walk, look_up, walk_of_job, look_up_of_job = seen
+    walk, walk_of_job = seen["recent"]
     assert "Index Scan Backward using ix_motion_search_created" in walk
     assert "Index Scan using ix_motion_search_job" in walk_of_job
     for plan in (walk, walk_of_job):
         assert "Sort" not in plan
-    for plan in (look_up, look_up_of_job):
+    assert seen["matches"]
+    for plan in seen["matches"]:
         assert "Bitmap Index Scan on ix_motion_search_terms" in plan
-    for plan in seen:
+    for plan in seen["near"]:
+        assert re.search(r"Index Scan (Backward )?using ix_motion_search_(created|job) on motion_search", plan)
+        assert plan.count("Sort") <= 2, "only the rows that are left are sorted"  # the node and its key
+    for plan in (plan for plans in seen.values() for plan in plans):
         assert "Seq Scan" not in plan
+
+
+@pytest.mark.parametrize(("walked", "sorts"), [(searching.WALKED, 0), (1, 1)], ids=["by their times", "themselves"])
+def test_matches_behind_the_walk_are_read_by_their_times_or_sorted(
+    engine: sa.Engine, jobs: list[UUID], walked: int, sorts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Postgres sorts a number by value; a sort of wider rows copies each."""
+    seen: list[str] = []
+
+    def note(_conn: object, _cursor: object, statement: str, *_: object) -> None:
+        seen.append(statement.partition("\n")[0])
+
+    with engine.connect() as conn:
+        newest = list_motions(conn, "default", limit=3)
+        found = MotionFilter(text="walk or run or bow")
+        expected = [row.id for row in pages(conn, found, None, 100) if row not in newest.rows]
+        monkeypatch.setattr(searching, "WALKED", walked)
+        monkeypatch.setattr(searching._Page, "_among_newest", lambda *_: [])
+        sa.event.listen(engine, "before_cursor_execute", note)
+        rows = list_motions(conn, "default", found=found, cursor=newest.cursor, limit=100).rows
+        sa.event.remove(engine, "before_cursor_execute", note)
+        conn.rollback()
+    assert [row.id for row in rows] == expected
+    assert len(expected) > 1
+    assert seen.count("SELECT matches.created_at ") == 1
+    assert seen.count("SELECT matches.motion_id ") == sorts
 
 
 def test_motions_of_another_tenant_are_not_looked_through(engine: sa.Engine, jobs: list[UUID]) -> None:
