@@ -33,6 +33,8 @@ from marey.takes.types import MotionFilter
 
 WALKED = 20_000
 """Motions walked in order before the index is used: about 10 ms."""
+NEAR = 5_000
+"""Motions read of the creation times of a page: a bulk load gives thousands the same; workers write 32 at a time."""
 UNREVIEWED = "new"
 VARIANTS = 1000
 """Maximum motions of one prompt, by its index."""
@@ -93,7 +95,7 @@ class _Page:
             .offset(0)  # optimization fence: order and page condition stay outside
             .subquery("matches")
         )
-        order = self._order(matches)
+        order = Order(matches.c.created_at, matches.c.motion_id, descending=self.order.descending)
         after = [] if self.place is None else [order.beyond(self.place)]
         query = sa.select(matches.c.created_at).where(*after).order_by(order.by()[0]).limit(self.limit)
         with _plan(self.conn, _LOOK_UP):
@@ -106,15 +108,15 @@ class _Page:
         return self._ids(query, _LOOK_UP)
 
     def _made_at(self, times: Sequence[datetime]) -> list[UUID]:
-        """Return ids of matching motions by their creation times; ends early after `WALKED` motions of these times."""
+        """Return ids of matching motions by their creation times; ends early after `NEAR` motions of these times."""
         distinct = sa.literal(list(dict.fromkeys(times)), sa.ARRAY(Time))
         moment = sa.func.unnest(distinct).table_valued("at", name="moment").render_derived()
         # A lateral subquery with an order is always run as a nested loop, which keeps the order of the times.
         each = self._walk(tables.motion_search.c.created_at == moment.c.at).lateral("each")
-        near = sa.select(each).select_from(moment.join(each, sa.true())).limit(WALKED).subquery("near")
-        conditions = _conditions(self.found, near.c.terms)
-        query = sa.select(near.c.motion_id).where(*conditions).order_by(*self._order(near).by()).limit(self.limit)
-        return self._ids(query, _WALK)
+        near = sa.select(each).select_from(moment.join(each, sa.true())).limit(NEAR).subquery("near")
+        return self._ids(
+            sa.select(near.c.motion_id).where(*_conditions(self.found, near.c.terms)).limit(self.limit), _WALK
+        )
 
     def _walk(self, *conditions: sa.ColumnElement[bool]) -> sa.Select[UUID, datetime, Any]:
         """Return the motions of the listing in its order, from the place on."""
@@ -122,9 +124,6 @@ class _Page:
         after = [] if self.place is None else [self.order.beyond(self.place)]
         rows = sa.select(table.motion_id, table.created_at, table.terms)
         return rows.where(self.ours, *conditions, *after).order_by(*self.order.by())
-
-    def _order(self, rows: sa.FromClause) -> Order:
-        return Order(rows.c.created_at, rows.c.motion_id, descending=self.order.descending)
 
     def _ids(self, query: sa.Select[Any], plan: Sequence[str]) -> list[UUID]:
         with _plan(self.conn, plan):

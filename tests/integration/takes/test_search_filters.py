@@ -129,15 +129,22 @@ def walked(engine: sa.Engine, found: MotionFilter, job: UUID | None, limit: int)
             return
 
 
-@given(found=filters, which=st.none() | st.integers(0, 2), size=st.integers(1, 9), limit=st.integers(0, 40))
+@given(
+    found=filters,
+    which=st.none() | st.integers(0, 2),
+    size=st.integers(1, 9),
+    limit=st.integers(0, 40),
+    near=st.integers(0, 20),
+)
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_filter_finds_what_plain_sql_finds(
     engine: sa.Engine, jobs: list[UUID], monkeypatch: pytest.MonkeyPatch,
-    found: MotionFilter, which: int | None, size: int, limit: int,
+    found: MotionFilter, which: int | None, size: int, limit: int, near: int,
 ) -> None:  # fmt: skip
     job = None if which is None else jobs[which]
     with monkeypatch.context() as patch, engine.connect() as conn:
         patch.setattr(searching, "WALKED", limit)
+        patch.setattr(searching, "NEAR", near)
         expected = naive(conn, found, job)
         conn.rollback()
         assert [each for page in walked(engine, found, job, size) for each in page] == expected
