@@ -19,9 +19,11 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PROJECT = ("ROADMAP.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md")
-COPIED = {".md", ".png", ".svg", ".json"}
+COPIED = {".md", ".png", ".svg", ".json", ".css"}
 LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((?!https?:|mailto:|#)([^)#\s]+)(#[^)\s]*)?\)")
 FENCE = re.compile(r"^\s*```")
+UNSAFE = re.compile(r"(`[^`]*`)|([<*_|])")
+"""Code, which stays as it is, or a character that Markdown would take for its own."""
 
 
 def main(arguments: list[str]) -> int:
@@ -46,7 +48,7 @@ def main(arguments: list[str]) -> int:
 def collect() -> dict[Path, str]:
     """Return every file of the site with its place among the pages."""
     own = {path: path.relative_to(DOCS).as_posix() for path in sorted(DOCS.rglob("*")) if path.suffix in COPIED}
-    cards = {path: path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("models/*/README.md"))}
+    cards = {path: f"models/{path.parent.name}.md" for path in sorted(ROOT.glob("models/*/README.md"))}
     return own | cards | {ROOT / name: name for name in PROJECT}
 
 
@@ -102,7 +104,7 @@ def _command(command: Any, name: str, parent: Any) -> Iterator[str]:
     yield _prose(command.help or "")
     rows = [_parameter(each, context) for each in command.get_params(context) if not getattr(each, "hidden", False)]
     if rows:
-        yield "| argument or option | |\n|---|---|\n" + "\n".join(rows) + "\n"
+        yield "| argument or option | meaning |\n|---|---|\n" + "\n".join(rows) + "\n"
     children: Mapping[str, Any] = getattr(command, "commands", {})
     for child in command.list_commands(context) if children else ():
         if not children[child].hidden:
@@ -138,12 +140,12 @@ def _route(path: str, method: str, operation: Mapping[str, Any]) -> str:
     scopes = [scope for entry in operation.get("security", []) for needed in entry.values() for scope in needed]
     parts += [f"Scope: {', '.join(f'`{scope}`' for scope in scopes)}."] if scopes else []
     rows = [_argument(each) for each in operation.get("parameters", [])]
-    parts += ["| parameter | in | type | |\n|---|---|---|---|\n" + "\n".join(rows)] if rows else []
+    parts += ["| parameter | in | type | meaning |\n|---|---|---|---|\n" + "\n".join(rows)] if rows else []
     body = operation.get("requestBody", {}).get("content", {})
     kinds = [f"`{kind}` {_type(each.get('schema', {}))}" for kind, each in body.items()]
     parts += [f"Body: {', '.join(kinds)}."] if kinds else []
     answers = [_answer(status, each) for status, each in operation["responses"].items()]
-    parts.append("| answer | | |\n|---|---|---|\n" + "\n".join(answers))
+    parts.append("| answer | meaning | content |\n|---|---|---|\n" + "\n".join(answers))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -164,7 +166,7 @@ def _schema(name: str, schema: Mapping[str, Any]) -> str:
         f"| `{field}`{marks.get(field, '')} | {_type(each)} | {_cell(each.get('description', ''))} |"
         for field, each in schema.get("properties", {}).items()
     ]
-    table = "| field | type | |\n|---|---|---|\n" + "\n".join(rows) if rows else _type(schema)
+    table = "| field | type | meaning |\n|---|---|---|\n" + "\n".join(rows) if rows else _type(schema)
     return "\n\n".join(part for part in (f"### {name}", _prose(schema.get("description", "")), table) if part)
 
 
@@ -189,7 +191,8 @@ def _type(schema: Mapping[str, Any]) -> str:
 
 
 def _prose(text: str) -> str:
-    return re.sub(r"([<*_|])", r"\\\1", text.replace("\b\n", "")).strip() + "\n" if text else ""
+    escaped = UNSAFE.sub(lambda found: found[1] or f"\\{found[2]}", text.replace("\b\n", ""))
+    return escaped.strip() + "\n" if text else ""
 
 
 def _cell(text: str) -> str:
@@ -197,7 +200,7 @@ def _cell(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    return "`" + text.replace("|", "\\|") + "`"
+    return f"`{text}`"  # also with a pipe: in code it does not end a cell
 
 
 if __name__ == "__main__":

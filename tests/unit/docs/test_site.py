@@ -102,9 +102,11 @@ def test_the_reference_has_every_command_and_route(out: Path) -> None:
     for name in ("## marey submit", "### marey jobs list", "#### marey eval schedule add", "#### marey train hgm3 all"):
         assert f"\n{name}\n" in commands
     assert re.search(r"^\| `--dry-run` \| \w", commands, re.MULTILINE)
+    assert "| `--input-format <csv|jsonl|txt>` |" in commands, "code stays as it is"
     routes = (out / "pages" / "reference" / "http-api.md").read_text(encoding="utf-8")
     assert "\n### POST /v1/jobs\n" in routes
     assert "\n### NewJobBody\n" in routes
+    assert "`validate_only`: nothing was written" in routes
 
 
 def test_a_broken_anchor_fails_the_build(out: Path, tmp_path: Path) -> None:
