@@ -33,6 +33,10 @@ os.environ["PYTHONPATH"] = os.pathsep.join(
     filter(None, [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH")])
 )
 """Processes that tests start find `tests` there, as this one does by pytest's `pythonpath`."""
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+"""A run starts hundreds of processes: each would compile the whole package anew."""
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+"""Tests run in several processes, which share the cores already; those of more threads set their number."""
 
 
 def pytest_configure() -> None:

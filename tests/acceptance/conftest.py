@@ -1,4 +1,4 @@
-"""One `marey serve` for all acceptance tests that do not break it."""
+"""One `marey serve` for all acceptance tests that do not break it; it ends with the last of them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tiny_models(tmp_path_factory.mktemp("models"))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def served(models: Path) -> Iterator[tuple[Marey, Serving]]:
     """The command line with a server, and the server."""
     home = Path(tempfile.mkdtemp(prefix="marey-"))

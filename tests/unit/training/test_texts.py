@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+import pytest
 
 from marey.bundles import TextSpec
 from marey.text.pipeline import TextPipeline
-from marey.training.texts import CHUNK, CaptionTexts
+from marey.training import texts as module
+from marey.training.texts import CaptionTexts
 
 CAPTIONS = (("a person walks forward", "Someone walks, then waves the left hand."), ("a person bows deeply",))
 
@@ -23,9 +25,10 @@ def test_every_caption_has_its_graph_and_each_text_is_encoded_once():
     assert np.array_equal(sentence, pipeline.pooled(["a person bows deeply"])[0].astype(np.float16))
 
 
-def test_two_processes_read_captions_as_one_does():
+def test_two_processes_read_captions_as_one_does(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(module, "CHUNK", 8)
     pipeline = TextPipeline.load(TextSpec())
-    captions = [(f"a person walks {k} steps",) for k in range(CHUNK + 3)]
+    captions = [(f"a person walks {k} steps",) for k in range(2 * module.CHUNK + 3)]
     steps: list[tuple[int, int]] = []
     alone = CaptionTexts.build(captions, pipeline)
     shared = CaptionTexts.build(captions, pipeline, processes=2, progress=lambda *done: steps.append(done))
