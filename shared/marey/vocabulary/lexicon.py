@@ -17,7 +17,7 @@ _LEFT_OUT = frozenset({"a", "an", "the", "his", "her", "one", "two", "both", "ow
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a phrase names.
+    """Meaning of a phrase.
 
     Attributes:
         action: id; None = an action outside the vocabulary.

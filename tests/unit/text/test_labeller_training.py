@@ -162,7 +162,7 @@ NOTHING = CaptionPool(variants=0, grammar=0, propbank=0)
 @pytest.fixture(scope="module")
 def recipe() -> Recipe:
     network = LightConfig(tag_set(roles_of([WALK, WAVE])), layers=(0, 3), width=48, heads=4, trunk=1, body=1)
-    config = FitConfig(steps=60, batch=8, learning_rate=4e-3, rank=2)
+    config = FitConfig(steps=40, batch=4, learning_rate=4e-3, rank=2)
     return Recipe(find_weights("minilm"), network, config, NOTHING, 0)
 
 
@@ -177,7 +177,10 @@ def test_half_of_propbank_is_refused(
     assert not (tmp_path / "bundle").exists()
 
 
-def test_a_small_head_learns_two_sentences_and_survives_its_bundle(recipe: Recipe, tmp_path: Path) -> None:
+def test_a_small_head_learns_two_sentences_and_survives_its_bundle(
+    recipe: Recipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("marey.labeller.fit.SMOOTHING_SENTENCES", 8)  # there are two
     weights = recipe.make([WALK, WAVE])
     labeller = weights.labeller(recipe.minilm)
     assert labeller.label([WALK.words, WAVE.words]) == [WALK.frames, WAVE.frames]
