@@ -89,6 +89,7 @@ def _server(home: Path) -> Iterator[None]:
     home.mkdir(mode=0o700, parents=True, exist_ok=True)
     (home / "server.json").unlink(missing_ok=True)
     log = home / "serve.log"
+    log.touch(mode=0o600)
     with log.open("wb") as output:
         process = subprocess.Popen(
             [sys.executable, "-m", "marey.cli", "serve", "--port", "0"], stdout=output, stderr=output
