@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marey.data.dataset import known_set
 from marey.data.pack import JointsPack, PackClip
 from tests.support.bodies import walker
 from tests.support.marey import Marey
@@ -20,14 +21,14 @@ def alone(tmp_path: Path) -> Marey:
 
 def test_a_pack_is_prepared_and_inspected_where_the_archive_is_not(alone: Marey, tmp_path: Path) -> None:
     clip = PackClip("stroll", "cmu", "walk", "", "train", 0, 0)
-    JointsPack.of([(clip, walker(4.0).astype(np.float32))]).save(tmp_path / "a.pack.npz")
+    JointsPack.of([(clip, walker(4.0).astype(np.float32))], [known_set("cmu").terms]).save(tmp_path / "a.pack.npz")
     alone("data", "prepare", "pack", tmp_path / "a.pack.npz", "-o", tmp_path / "prepared").ok()
     assert "stroll" in alone("data", "inspect", tmp_path / "prepared", "--clip", "stroll").ok().out
 
 
 def test_unknown_sources_missing_archives_and_foreign_packs_are_told(alone: Marey, tmp_path: Path) -> None:
     output = tmp_path / "out"
-    alone("data", "prepare", "amass", tmp_path, "-o", output).refused(2, "'amass'", "bandai-namco, cmu, pack")
+    alone("data", "prepare", "amass", tmp_path, "-o", output).refused(2, "'amass'", "bandai-namco")
     alone("data", "prepare", "pack", "-o", output).refused(2, "SOURCE without its PATH")
     alone("data", "prepare", "pack", tmp_path / "none.npz", "-o", output).refused(3, "none.npz")
     (tmp_path / "text.npz").write_text("not a pack")

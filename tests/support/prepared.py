@@ -12,7 +12,7 @@ import torch
 from marey.bundles import TextSpec
 from marey.core.hashing import sha256_of
 from marey.data import manifest as names
-from marey.data.manifest import Clip, FileEntry, Manifest, Measured
+from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from marey.data.pack import split_root
 from marey.motion.features import HUMANML3D_263
 from marey.motion.kinematics import forward_kinematics
@@ -100,9 +100,12 @@ def write_prepared(folder: Path, clips: int = 18, acts: Sequence[str] = ()) -> P
     np.save(folder / names.ROOTS, roots)
     np.savez(folder / names.STATISTICS, mean=whole.mean(0), std=std)
     files = {n: FileEntry(sha256=sha256_of(folder / n), bytes=(folder / n).stat().st_size) for n in names.FILES}
-    source = {"name": "synthetic", "title": "-", "licence": "MIT", "credit": "-", "url": "-"}
+    source = SourceEntry(
+        name="synthetic", title="-", licence="MIT", credit="-", url="-", tier="commercial", clips=clips
+    )
     manifest = Manifest(
-        format=names.FORMAT, sources=(source,), layout="humanml3d-263", facing_sigma=20, fps=20, skeleton="humanml3d",
+        format=names.FORMAT, sources=(source,), tier="commercial",
+        layout="humanml3d-263", facing_sigma=20, fps=20, skeleton="humanml3d",
         dim=263, frames=len(whole), clips=clips, splits={}, lengths={}, kinds={}, captions=2, left_out={},
         compositional_pairs=(), files=files,
     )  # fmt: skip

@@ -16,6 +16,7 @@ from marey.core.errors import Conflict, InvalidFile, NotFound
 from marey.data import compose
 from marey.data.build import LAYOUT, build, swap_sides, windows
 from marey.data.compose import Counts
+from marey.data.dataset import known_set
 from marey.data.inspect import summarize
 from marey.data.pack import JointsPack, PackClip
 from marey.data.prepared import PreparedData
@@ -47,7 +48,8 @@ def synthetic_pack() -> JointsPack:
     clips.append((PackClip("long", "bandai-namco", "2/walk", "normal", "train", 0, 0), walker(25.0)))
     clips.append((PackClip("wrong", "bandai-namco", "2/wave-left-hand", "normal", "train", 0, 0), walker()))
     clips.append((PackClip("short", "bandai-namco", "2/walk", "normal", "train", 0, 0), walker(0.8)))
-    return JointsPack.of([(clip, joints.astype(np.float32)) for clip, joints in clips])
+    terms = [known_set("bandai-namco").terms]
+    return JointsPack.of([(clip, joints.astype(np.float32)) for clip, joints in clips], terms)
 
 
 @pytest.fixture(scope="module")
@@ -307,7 +309,8 @@ def test_a_folder_with_something_in_it_is_not_written_to(copy):
 
 def test_clips_with_nothing_to_compose_are_prepared_as_they_are(tmp_path):
     clip = PackClip("stroll", "cmu", "walk", "", "train", 0, 0)
-    build([JointsPack.of([(clip, walker(4.0).astype(np.float32))])], tmp_path / "out")
+    terms = [known_set("cmu").terms]
+    build([JointsPack.of([(clip, walker(4.0).astype(np.float32))], terms)], tmp_path / "out")
     assert {c.dataset for c in PreparedData.open(tmp_path / "out").clips} == {"cmu"}
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from marey.core.errors import InvalidFile, NotFound
+from marey.data.dataset import known_set
 from marey.data.pack import JointsPack, PackClip
 from tests.support.bodies import runner, walker
 
@@ -13,7 +14,8 @@ FAR = np.array([40.0, 0.0, -30.0])  # float16 of world positions would be off by
 def pack() -> JointsPack:
     clip = PackClip("a", "bandai-namco", "2/walk", "normal", "train", 0, 0)
     far = runner(8.0) + FAR
-    return JointsPack.of([(clip, walker().astype(np.float32)), (clip, far.astype(np.float32))])
+    clips = [(clip, walker().astype(np.float32)), (clip, far.astype(np.float32))]
+    return JointsPack.of(clips, [known_set("bandai-namco").terms])
 
 
 def test_joints_come_back_to_half_a_millimetre_wherever_the_body_is(tmp_path):

@@ -5,17 +5,21 @@ import pytest
 
 from marey.checks.kinematics import gait
 from marey.core.errors import InvalidFile
+from marey.data.dataset import known_set
+from marey.data.floor import on_floor
 from marey.data.retarget import read_source, resample_points, retarget
-from marey.data.rigs import BANDAI_NAMCO, ICLONE
 from marey.motion.io.bvh import parse_bvh
 from marey.motion.kinematics import bone_lengths
 from marey.motion.skeleton import HUMANML3D
 from tests.support.bodies import LENGTH, Body, bandai_bvh, lift, steady, walker, waver
 
+(BANDAI_NAMCO,) = known_set("bandai-namco").rigs
+(ICLONE,) = known_set("cmu-iclone").rigs
+
 
 def retargeted(joints, **options):
     clip = parse_bvh(bandai_bvh(joints, **options))
-    return retarget(read_source(clip, BANDAI_NAMCO, where="test"), BANDAI_NAMCO)
+    return on_floor(retarget(read_source(clip, BANDAI_NAMCO, where="test"), BANDAI_NAMCO), "feet")
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.8, 1.3])

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from marey.data.dataset import known_set
+from marey.data.floor import on_floor
 from marey.data.retarget import read_source, retarget
-from marey.data.rigs import BANDAI_NAMCO, ICLONE
 from marey.motion.features import HUMANML3D_263
 from marey.motion.feet import skate
 from marey.motion.finish import finish_motion
@@ -20,7 +21,7 @@ from tests.support.archives import first_files
 
 pytestmark = pytest.mark.data
 
-ARCHIVES = {"bandai-namco.tar.xz": (BANDAI_NAMCO, 16), "cmu-iclone.tar.xz": (ICLONE, 6)}
+ARCHIVES = {"bandai-namco.tar.xz": 16, "cmu-iclone.tar.xz": 6}
 
 
 @pytest.fixture(scope="module", params=ARCHIVES)
@@ -30,14 +31,15 @@ def archive(request) -> str:
 
 @pytest.fixture(scope="module")
 def captured(archive) -> dict[str, BvhClip]:
-    return {name: parse_bvh(data, name) for name, data in first_files(archive, ARCHIVES[archive][1]).items()}
+    return {name: parse_bvh(data, name) for name, data in first_files(archive, ARCHIVES[archive]).items()}
 
 
 @pytest.fixture(scope="module")
 def people(archive, captured) -> dict[str, np.ndarray]:
     """Joints (T, 22, 3) at 20 fps on our skeleton, ten seconds at most."""
-    rig = ARCHIVES[archive][0]
-    return {name: retarget(read_source(clip, rig, where=name), rig)[:197] for name, clip in captured.items()}
+    (rig,) = known_set(archive.removesuffix(".tar.xz")).rigs
+    made = {name: retarget(read_source(clip, rig, where=name), rig)[:197] for name, clip in captured.items()}
+    return {name: on_floor(joints, "feet") for name, joints in made.items()}
 
 
 def largest_turn(rotations) -> float:

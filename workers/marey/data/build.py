@@ -16,12 +16,12 @@ from marey.core.hashing import sha256_of
 from marey.data import manifest as names
 from marey.data.captions import captions, phrasings
 from marey.data.compose import COUNTS, compose
-from marey.data.describe import Facts, describe, describe_cmu
+from marey.data.describe import ACTS, Facts, describe, describe_text
+from marey.data.licences import check_mix
 from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from marey.data.soundness import is_broken
-from marey.data.sources import SOURCES
 from marey.motion.features import HUMANML3D_263
 
 Array = NDArray[np.floating]
@@ -65,14 +65,14 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
             whole = pack.joints(clip)
             pieces = windows(len(whole))
             for mirrored in (False, True):
-                content = swap_sides(clip.content) if mirrored and clip.dataset == "bandai-namco" else clip.content
+                content = swap_sides(clip.content) if mirrored else clip.content
                 if mirrored and (content, clip.style) in held_out and clip.split != COMPOSITIONAL_SPLIT:
                     left_out[f"M{clip.id}"] = "its mirror image shows a held-out pair"
                     continue
                 for k, piece in enumerate(pieces):
                     joints = LAYOUT.mirror_joints(whole[piece]) if mirrored else whole[piece]
                     name = ("M" if mirrored else "") + clip.id + (f"@{k}" if len(pieces) > 1 else "")
-                    facts = _facts(clip, content, joints)
+                    facts = _facts(clip, content, joints, mirrored=mirrored)
                     if len(joints) <= MIN_FRAMES:
                         left_out[name] = "shorter than a second"
                     elif is_broken(joints, FPS):
@@ -85,9 +85,11 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
                         yield Part(name, clip, content, mirrored, joints, facts)
 
 
-def _facts(clip: PackClip, content: str, joints: NDArray[np.float32]) -> Facts | None:
-    if clip.dataset == "cmu":
-        return describe_cmu(content, joints, FPS)
+def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
+    """Facts of a clip: captions of its index, or the caption grammar where that knows the action."""
+    if clip.captions or content not in ACTS:
+        said = clip.captions or (f"a person does this: {clip.content}.",)
+        return describe_text(tuple(map(swap_sides, said)) if mirrored else said, joints, FPS)
     return describe(content, clip.style, joints, FPS)
 
 
@@ -220,10 +222,14 @@ class FolderWriter:
         for clip in self.clips:
             whole = int(clip.measured.seconds)
             lengths[clip.split][f"{whole}-{whole + 1}"] += 1
-        used = sorted({clip.dataset for clip in self.clips})
+        sources = Counter(pack.terms_of(clip) for pack in packs for clip in pack.clips if clip.id not in left_out)
         return Manifest(
             format=names.FORMAT,
-            sources=tuple(SourceEntry(**vars(SOURCES[name])) for name in used),
+            sources=tuple(
+                SourceEntry(**vars(terms), clips=count)
+                for terms, count in sorted(sources.items(), key=lambda entry: (entry[0].name, entry[0].licence))
+            ),
+            tier=check_mix(sources),
             layout=LAYOUT.name,
             facing_sigma=LAYOUT.facing_sigma,
             fps=FPS,
@@ -268,9 +274,10 @@ def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None =
 
     Raises:
         Conflict: the folder is not empty.
-        InvalidInput: no training clip is left.
+        InvalidInput: no training clip is left, or the licences of the packs exclude each other.
     """
-    left_out: dict[str, str] = {}
+    check_mix({pack.terms_of(clip) for pack in packs for clip in pack.clips})
+    left_out = {name: why for pack in packs for name, why in pack.left_out.items()}
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
     total = 2 * sum(len(pack.clips) for pack in packs) + sum(sum(vars(counts).values()) for counts in COUNTS.values())
     with FolderWriter(out) as writer:

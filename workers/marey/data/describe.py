@@ -127,32 +127,11 @@ def active_hands(hands: tuple[Hand, Hand], duration: float) -> str:
     return "both" if all(up) else "left" if up[LEFT] else "right" if up[RIGHT] else ""
 
 
-_CMU_TEXT: dict[str, tuple[str, ...]] = {
-    "walk": ("a person walks", "A person walks forward.", "someone is walking"),
-    "slow walk": ("a person walks slowly", "A person walks forward slowly.", "someone is walking at a slow pace"),
-    "brisk walk": ("a person walks briskly", "A person walks forward fast.", "someone is walking at a brisk pace"),
-    "swordplay": ("a person fights with a sword", "someone practices swordplay", "A person swings a sword around."),
-    "punch/strike": ("a person punches", "Someone throws punches and strikes.", "a person is punching and striking"),
-    "wash self": ("a person washes himself", "Someone is taking a hand shower.", "a person is washing the body"),
-}
+FREE_TEXT = "cmu"
+"""Action of a clip whose captions are its own, and not of the caption grammar."""
 
 
-def describe_cmu(content: str, joints: NDArray[np.floating], fps: float) -> Facts | None:
-    """Facts of a CMU trial: its captions follow CMU's own description, in a few plain sentences."""
+def describe_text(captions: tuple[str, ...], joints: NDArray[np.floating], fps: float) -> Facts:
+    """Facts of a clip that has captions of its own."""
     walked, hands, bend = measure(joints, fps)
-    kind, _, rest = content.partition(" - ")
-    if content in _CMU_TEXT:
-        text = _CMU_TEXT[content]
-    elif kind == "dance":
-        text = ("a person dances", f"A person dances ballet, with {rest}.", "someone is dancing gracefully")
-    elif kind == "basketball":
-        text = ("a person plays basketball", f"A person plays basketball: {rest}.", "someone is dribbling a basketball")
-    elif kind == "walk on uneven terrain":
-        text = (
-            "a person walks on uneven ground",
-            "Someone walks over rough terrain.",
-            "a person is walking over obstacles",
-        )
-    else:
-        text = (f"a person does this: {content}.",)
-    return Facts("cmu", "normal", "", walked, hands, bend, text=text)
+    return Facts(FREE_TEXT, "normal", "", walked, hands, bend, text=captions)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
-FORMAT = "marey-prepared-1"
+from marey.data.licences import Tier
+
+FORMAT = "marey-prepared-2"
 FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS, MANIFEST, TEXTS = (
     "features.npy",
     "joints.npy",
@@ -27,7 +29,7 @@ class FileEntry(BaseModel):
 
 
 class SourceEntry(BaseModel):
-    """One archive that the data came from, with its terms."""
+    """One set that the data came from, or the clips of it that have terms of their own."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -36,6 +38,9 @@ class SourceEntry(BaseModel):
     licence: str
     credit: str
     url: str
+    tier: Tier
+    clips: int
+    """Captured clips and segments, before mirroring and splicing."""
 
 
 class Manifest(BaseModel):
@@ -45,6 +50,8 @@ class Manifest(BaseModel):
 
     format: str
     sources: tuple[SourceEntry, ...]
+    tier: Tier
+    """Of weights trained on it: the strictest of the sources."""
     layout: str
     facing_sigma: float
     fps: float

@@ -7,7 +7,8 @@ every time. Joints are stored relative to the root, where float16 is off by at m
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,24 +17,28 @@ from pydantic import TypeAdapter, ValidationError
 
 from marey.core.arrays import check_array, read_npz, text_of
 from marey.core.documents import parse_json
-from marey.core.errors import InvalidFile, NotFound
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
+from marey.data.licences import Terms
 
 MAX_BYTES = 8 * 2**30
 """A day of motion takes 1.5 GB."""
-FORMAT = "marey-joints-pack-1"
+FORMAT = "marey-joints-pack-2"
 SPLITS = ("train", "val", "test", "compositional")
 
 
 @dataclass(frozen=True)
 class PackClip:
-    """One captured clip.
+    """One captured clip, or a segment of a long one.
 
     Attributes:
-        id: its name in the archive.
-        dataset: `bandai-namco` or `cmu`.
-        content, style: the archive's labels; an empty style where there is none.
-        split: train, val, test or compositional.
+        id: its name, unique within the data set.
+        dataset: name of the set.
+        content, style: action and style of the index; an empty style where there is none.
+        split: train, val, test or compositional; empty: made by source when the data are built.
         start, frames: its rows in the pack.
+        source: the independent capture that it comes from.
+        captions, side, in_place, facts: see `marey.data.index.Row`.
+        tier, licence, credit: its own terms; empty where they are those of the set.
     """
 
     id: str
@@ -43,6 +48,14 @@ class PackClip:
     split: str
     start: int
     frames: int
+    source: str = ""
+    captions: tuple[str, ...] = ()
+    side: str = ""
+    in_place: bool = False
+    facts: tuple[str, ...] = ()
+    tier: str = ""
+    licence: str = ""
+    credit: str = ""
 
 
 @dataclass(frozen=True)
@@ -51,6 +64,8 @@ class JointsPack:
 
     Attributes:
         clips: in the order of the rows.
+        terms: of each set that they come from.
+        left_out: clips of the index that are not here, each with the reason.
         local: (N, 21, 3) float16, joints 1 to 21 relative to the root, metres.
         root: (N, 3) float32 metres.
     """
@@ -58,25 +73,46 @@ class JointsPack:
     clips: tuple[PackClip, ...]
     local: NDArray[np.float16]
     root: NDArray[np.float32]
+    terms: tuple[Terms, ...] = ()
+    left_out: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def joints(self, clip: PackClip) -> NDArray[np.float32]:
         """(T, 22, 3) metres."""
         rows = slice(clip.start, clip.start + clip.frames)
         return join(self.local[rows], self.root[rows])
 
+    def terms_of(self, clip: PackClip) -> Terms:
+        """Terms of a clip: those of its set, but where it has its own.
+
+        Raises:
+            InvalidInput: the pack has no terms of the clip's set.
+        """
+        for terms in self.terms:
+            if terms.name == clip.dataset:
+                own = {"tier": clip.tier, "licence": clip.licence, "credit": clip.credit}
+                return replace(terms, **{name: value for name, value in own.items() if value})
+        raise InvalidInput(f"the pack has no terms of the set {clip.dataset!r}", where=clip.id)
+
     @classmethod
-    def of(cls, clips: list[tuple[PackClip, NDArray[np.float32]]]) -> JointsPack:
+    def of(
+        cls,
+        clips: list[tuple[PackClip, NDArray[np.float32]]],
+        terms: Sequence[Terms] = (),
+        left_out: Mapping[str, str] | None = None,
+    ) -> JointsPack:
         """Pack clips with their joints (T, 22, 3); `start` and `frames` are set here."""
         table, start = [], 0
         for clip, joints in clips:
             table.append(PackClip(**{**asdict(clip), "start": start, "frames": len(joints)}))
             start += len(joints)
         halves = [split_root(joints) for _, joints in clips]
-        return cls(tuple(table), np.concatenate([h[0] for h in halves]), np.concatenate([h[1] for h in halves]))
+        local, root = np.concatenate([h[0] for h in halves]), np.concatenate([h[1] for h in halves])
+        return cls(tuple(table), local, root, tuple(terms), dict(left_out or {}))
 
     def save(self, path: Path) -> None:
         """Write one compressed npz, complete or not at all."""
-        table = json.dumps({"format": FORMAT, "clips": [asdict(clip) for clip in self.clips]})
+        terms, clips = ([asdict(entry) for entry in entries] for entries in (self.terms, self.clips))
+        table = json.dumps({"format": FORMAT, "terms": terms, "left_out": self.left_out, "clips": clips})
         temporary = path.with_name(path.name + ".part")
         with temporary.open("wb") as file:
             np.savez_compressed(file, local=self.local, root=self.root, table=np.array(table))
@@ -100,16 +136,18 @@ class JointsPack:
             raise InvalidFile(f"not a joints pack of format {FORMAT}", where=where)
         try:
             clips = TypeAdapter(tuple[PackClip, ...]).validate_python(table.get("clips"))
+            terms = TypeAdapter(tuple[Terms, ...]).validate_python(table.get("terms"))
+            left_out = TypeAdapter(dict[str, str]).validate_python(table.get("left_out"))
         except ValidationError as error:
             raise InvalidFile(f"not a joints pack: {error.errors()[0]['msg']}", where=where) from error
         rows = 0
         for clip in clips:
-            if clip.start != rows or clip.frames < 1 or clip.split not in SPLITS:
+            if clip.start != rows or clip.frames < 1 or clip.split not in ("", *SPLITS):
                 raise InvalidFile(f"the clip {clip.id!r} does not follow the one before it", where=where)
             rows += clip.frames
         local = check_array(arrays["local"], "local", where, kinds="float16", shape=(rows, 21, 3))
         root = check_array(arrays["root"], "root", where, kinds="float32", shape=(rows, 3))
-        return cls(clips, local, root)
+        return cls(clips, local, root, terms, left_out)
 
 
 def split_root(joints: NDArray[np.floating]) -> tuple[NDArray[np.float16], NDArray[np.float32]]:

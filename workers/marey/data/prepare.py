@@ -1,154 +1,159 @@
-"""Stage 1 of preparing data: an archive of BVH files as it is published, to a joints pack."""
+"""Stage 1 of preparing data: a set of BVH files with its `dataset.toml` and `index.csv`, to a joints pack."""
 
 from __future__ import annotations
 
 import os
-import re
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
 
-from marey.core.documents import read_json
-from marey.core.errors import InvalidFile, NotFound
+from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.archive import bvh_files
+from marey.data.dataset import DATASET, INDEX, SETS, Dataset, known_set, read_dataset
+from marey.data.floor import on_floor
+from marey.data.index import Row, read_index
 from marey.data.pack import JointsPack, PackClip
-from marey.data.retarget import read_source, retarget
-from marey.data.rigs import BANDAI_NAMCO, ICLONE, RIGS, Rig
-from marey.data.sources import cmu_split
+from marey.data.retarget import FPS, read_source, retarget
 from marey.motion.io.bvh import parse_bvh
 
 Progress = Callable[[int, int | None], None]
-"""Called with how many clips are done, and how many there are, when that is known."""
+"""Called with how many files are done, and how many there are, when that is known."""
+LEAST_FRAMES = 4
 
-_NAME = re.compile(r"dataset-(?P<set>[12])_(?P<content>[a-z-]+)_(?P<style>[a-z-]+)_(?P<take>\d+)")
 
+@dataclass(frozen=True)
+class CaptureSet:
+    """A set of captures that is described: where it is, what it is, and what each clip shows."""
 
-class Splits(BaseModel):
-    """`bandai-namco-splits.json`: clip names by split; pairs that occur in `compositional` only."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    compositional_pairs: list[tuple[str, str, str]]
-    train: list[str]
-    val: list[str]
-    test: list[str]
-    compositional: list[str]
+    path: Path
+    dataset: Dataset
+    rows: tuple[Row, ...]
 
     @classmethod
-    def load(cls, path: Path) -> Splits:
-        """Read the file.
+    def known(cls, name: str, path: Path) -> CaptureSet:
+        """A known set, in an archive or folder; its index is the one described here, or the folder's own.
 
         Raises:
-            NotFound: no such file.
-            InvalidFile: another shape, or a clip in two splits.
+            NotFound, InvalidFile: no such set, or no index.
         """
-        try:
-            splits = cls.model_validate(read_json(path))
-        except NotFound:
+        dataset = known_set(name)
+        own = SETS / name / INDEX
+        if own.is_file():
+            return cls(path, dataset, read_index(own, dataset.model_copy(update={"columns": {}})))
+        return cls(path, dataset, read_index(path / INDEX, dataset))
+
+    @classmethod
+    def own(cls, folder: Path) -> CaptureSet:
+        """A folder with its own `dataset.toml` and `index.csv`.
+
+        Raises:
+            NotFound, InvalidFile: one of them is missing or broken.
+        """
+        if not (folder / DATASET).is_file():
             raise NotFound(
-                "no split file", where=str(path), hint="Give it with --splits, or put it next to the archive."
-            ) from None
-        except ValidationError as error:
-            raise InvalidFile(f"not a split file: {error.errors()[0]['msg']}", where=str(path)) from error
-        if len(splits.by_clip()) != sum(map(len, (splits.train, splits.val, splits.test, splits.compositional))):
-            raise InvalidFile("a clip is listed in two splits", where=str(path))
-        return splits
-
-    def by_clip(self) -> dict[str, str]:
-        """Split of each clip."""
-        return {name: split for split in ("train", "val", "test", "compositional") for name in getattr(self, split)}
+                f"there is no {DATASET} in this folder",
+                where=str(folder),
+                hint=f"`marey data inspect {folder}` proposes one.",
+            )
+        dataset = read_dataset(folder / DATASET)
+        return cls(folder, dataset, read_index(folder / INDEX, dataset))
 
 
-def pack_bandai_namco(
-    source: Path, *, splits: Path | None = None, processes: int = 2, progress: Progress | None = None
-) -> JointsPack:
-    """Retarget the Bandai-Namco Research Motion Dataset (`.tar.xz` or unpacked).
+def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | None = None) -> JointsPack:
+    """Retarget every clip of a set.
 
     Args:
-        source: archive or folder.
-        splits: split file; by default `bandai-namco-splits.json` beside the source.
+        captures: what to read.
         processes: how many retarget at once.
-        progress: called for each clip.
+        progress: called for each file.
 
     Raises:
-        NotFound, InvalidFile, TooLarge: what is wrong with the source or the splits, with the clip's name.
+        NotFound, InvalidFile, TooLarge: what is wrong with the source, with the file's name.
+        InvalidInput: no clip is left.
     """
-    split_of = Splits.load(splits or source.parent / "bandai-namco-splits.json").by_clip()
-
-    def label(name: str) -> PackClip:
-        match = _NAME.fullmatch(name)
-        if match is None:
-            raise InvalidFile("the name has not the form dataset-N_CONTENT_STYLE_TAKE", where=name)
-        if name not in split_of:
-            raise InvalidFile("is in no split", where=name, hint="The split file belongs to another release.")
-        content = f"{match['set']}/{match['content']}"
-        return PackClip(name, "bandai-namco", content, match["style"], split_of[name], 0, 0)
-
-    return _pack(source, BANDAI_NAMCO, label, processes, progress)
-
-
-def pack_cmu(
-    source: Path, *, captions: Path | None = None, processes: int = 2, progress: Progress | None = None
-) -> JointsPack:
-    """Retarget the CMU trials on the iClone rig; contents are CMU's own descriptions, splits are made by name hash.
-
-    Args:
-        source: archive or folder.
-        captions: by default `cmu-captions.json` beside the source.
-
-    Raises:
-        NotFound, InvalidFile, TooLarge: what is wrong, with the trial's name.
-    """
-    path = captions or source.parent / "cmu-captions.json"
-    try:
-        table = {name: str(row["description"]) for name, row in read_json(path).items()}
-    except NotFound:
-        raise NotFound(
-            "no caption file", where=str(path), hint="Give it with --captions, or put it next to the archive."
-        ) from None
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InvalidFile("not a table of trials with descriptions", where=str(path)) from error
-
-    def label(name: str) -> PackClip:
-        if name not in table:
-            raise InvalidFile("the trial has no description", where=name)
-        return PackClip(f"cmu_{name}", "cmu", table[name], "", cmu_split(name), 0, 0)
-
-    return _pack(source, ICLONE, label, processes, progress)
-
-
-def _pack(
-    source: Path, rig: Rig, label: Callable[[str], PackClip], processes: int, progress: Progress | None
-) -> JointsPack:
+    dataset, rows, left_out = captures.dataset, defaultdict[str, list[Row]](list), dict[str, str]()
+    for row in captures.rows:
+        if row.error_cm > dataset.largest_error_cm:
+            left_out[row.id] = f"off what was captured by more than {dataset.largest_error_cm:g} cm"
+        elif "drop" in row.facts:
+            left_out[row.id] = "marked in the index: drop"
+        else:
+            rows[row.stem].append(row)
     clips: list[tuple[PackClip, NDArray[np.float32]]] = []
-    for name, joints in _retarget_all(bvh_files(source), rig, processes):
-        clips.append((label(name), joints))
+    done = set[str]()
+    files = ((name, data) for name, data in bvh_files(captures.path) if name in rows)
+    for name, joints in _retarget_all(files, dataset, processes):
+        done.add(name)
+        for row in rows[name]:
+            piece = _segment(joints, row)
+            if len(piece) < LEAST_FRAMES:
+                left_out[row.id] = f"fewer than {LEAST_FRAMES} frames"
+            else:
+                clips.append((_clip(row, dataset), piece))
         if progress:
-            progress(len(clips), None)
-    return JointsPack.of(sorted(clips, key=lambda pair: pair[0].id))
+            progress(len(done), len(rows))
+    if missing := sorted(rows.keys() - done):
+        raise InvalidFile(
+            f"holds no {missing[0]}.bvh, which the index lists" + (f" ({len(missing)} missing)" if missing[1:] else ""),
+            where=str(captures.path),
+        )
+    if not clips:
+        raise InvalidInput("no clip is left", where=str(captures.path))
+    return JointsPack.of(sorted(clips, key=lambda pair: pair[0].id), [dataset.terms], left_out)
+
+
+def _clip(row: Row, dataset: Dataset) -> PackClip:
+    return PackClip(
+        id=row.id,
+        dataset=dataset.name,
+        content=row.action,
+        style=row.style,
+        split=row.split,
+        start=0,
+        frames=0,
+        source=row.source,
+        captions=row.captions,
+        side=row.side,
+        in_place=row.in_place,
+        facts=row.facts,
+        tier=row.tier or "",
+        licence=row.licence,
+        credit=row.credit,
+    )
+
+
+def _segment(joints: NDArray[np.float32], row: Row) -> NDArray[np.float32]:
+    """The frames of a row, on the floor of the whole take."""
+    first = 0 if row.start is None else round(row.start * FPS)
+    last = len(joints) if row.end is None else round(row.end * FPS) + 1
+    return joints[first:last]
 
 
 def _retarget_all(
-    files: Iterable[tuple[str, bytes]], rig: Rig, processes: int
+    files: Iterable[tuple[str, bytes]], dataset: Dataset, processes: int
 ) -> Iterator[tuple[str, NDArray[np.float32]]]:
-    """Retarget in worker processes, a bounded number of files in flight (the archive unpacks to 548 MB)."""
+    """Retarget in worker processes, a bounded number of files in flight (an archive unpacks to 548 MB)."""
     files = iter(files)
     if processes <= 1:
-        yield from (_retarget_file(name, data, rig.name) for name, data in files)
+        yield from (retarget_file(name, data, dataset) for name, data in files)
         return
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     with ProcessPoolExecutor(processes) as pool:
         while batch := list(islice(files, 64)):
             names, contents = zip(*batch, strict=True)
-            yield from pool.map(_retarget_file, names, contents, [rig.name] * len(batch), chunksize=8)
+            yield from pool.map(retarget_file, names, contents, [dataset] * len(batch), chunksize=8)
 
 
-def _retarget_file(name: str, data: bytes, rig_name: str) -> tuple[str, NDArray[np.float32]]:
-    rig = RIGS[rig_name]
-    clip = parse_bvh(data, where=f"{name}.bvh")
-    return name, retarget(read_source(clip, rig, where=f"{name}.bvh"), rig).astype(np.float32)
+def retarget_file(name: str, data: bytes, dataset: Dataset) -> tuple[str, NDArray[np.float32]]:
+    """Name and joints (T, 22, 3) of a BVH file of a set, on its floor."""
+    where = f"{name}.bvh"
+    clip = parse_bvh(data, where=where, unit=dataset.unit, up=dataset.up)
+    rig = dataset.rig_of(clip.skeleton.joint_names, where)
+    joints = retarget(read_source(clip, rig, where=where, unit=dataset.unit), rig, unit=dataset.unit)
+    return name, on_floor(joints, dataset.floor).astype(np.float32)

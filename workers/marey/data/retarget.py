@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from marey.core.errors import InvalidFile
 from marey.data.rigs import Rig
+from marey.motion.filters import smooth
 from marey.motion.io.bvh import BvhClip
 from marey.motion.kinematics import global_rotations
 from marey.motion.rotations import cross, normalize, rotate
 from marey.motion.skeleton import HUMANML3D
+from marey.motion.units import METRES, Unit
 
 Array = NDArray[np.floating]
 FPS = 20.0
@@ -28,24 +30,31 @@ _LENGTH: Array = np.linalg.norm(_REST, axis=1)
 _LEGS = ((1, 4, 7, 10), (2, 5, 8, 11))
 _ARMS = ((13, 16, 18, 20), (14, 17, 19, 21))
 _KNEE_PRIOR = 0.03  # metres of "forward" added to the source's knee direction: decides for a stretched leg only
+_SAME_WIDTH = 0.03  # metres: half hips of people differ by so much
+_SWAY = 0.25  # seconds
 _MAX_REACH = 0.9995  # a fully stretched leg has no knee plane
 
 
 @dataclass(frozen=True)
 class SourceMotion:
-    """The joints of a rig that retargeting reads, at the rig's proportions.
+    """Points and directions of a rig in motion, at the rig's proportions.
 
     Attributes:
-        joints: (T, 22, 3) metres in the order of `Rig.joint_names`.
+        joints: (T, 22, 3) metres in the order of `Rig.points`.
         lateral: (T, 2, 3) unit vectors to the body's left, rigid with the left and the right foot.
+        sole_pitch: degrees, see `Rig.sole_pitch`.
+        trunk: (T, 7, 3, 3) orientations of the joints of `Rig.turning`, columns left, up, forward; identity in a body
+            that stands upright and faces +Z.
     """
 
     joints: Array
     lateral: Array
+    sole_pitch: float
+    trunk: Array
 
 
-def read_source(clip: BvhClip, rig: Rig, *, where: str) -> SourceMotion:
-    """Take what retargeting needs from a clip: named joints, resampled to 20 fps.
+def read_source(clip: BvhClip, rig: Rig, *, where: str, unit: Unit = "cm") -> SourceMotion:
+    """Take what retargeting needs from a clip: the rig's points, resampled to 20 fps.
 
     `marey.motion.io.bvh` has left out a T-pose first frame already.
 
@@ -56,13 +65,51 @@ def read_source(clip: BvhClip, rig: Rig, *, where: str) -> SourceMotion:
     missing = [name for name in rig.joint_names if name not in names]
     if missing:
         raise InvalidFile(f"no joint {missing[0]!r}: this is not the {rig.name} rig", where=where)
-    joints = np.asarray(clip.joints(), np.float64)[:, [names[n] for n in rig.joint_names]]
+    if len(clip.rotations) < 4:
+        raise InvalidFile(f"only {len(clip.rotations)} frames", where=where)
     world = global_rotations(clip.skeleton, clip.rotations)
-    feet = [names[leg.joints[2]] for leg in rig.legs]
-    lateral = rotate(world[:, feet], np.array([leg.foot_lateral for leg in rig.legs]))
-    if len(joints) < 4:
-        raise InvalidFile(f"only {len(joints)} frames", where=where)
-    return SourceMotion(resample_points(joints, clip.fps, FPS), normalize(resample_points(lateral, clip.fps, FPS)))
+    index = [names[name] for name in rig.joint_names]
+    offsets = _offsets(clip, rig, index, where, METRES[unit])
+    joints = clip.joints()[:, index] + rotate(world[:, index], offsets)
+    feet = [names[leg[2].joint] for leg in (rig.left_leg, rig.right_leg)]
+    flat, pitch = _flat_feet(clip, rig, index, offsets)
+    lateral = rotate(world[:, feet], flat)
+    left, up = np.array(rig.rest_left, np.float64), np.array(rig.rest_up, np.float64)
+    turning = world[:, [names[name] for name in rig.turning]]
+    axes = np.stack([rotate(turning, v) for v in normalize(np.stack([left, up]))], axis=-1)
+    axes = resample_points(axes, clip.fps, FPS)
+    return SourceMotion(
+        resample_points(joints, clip.fps, FPS),
+        normalize(resample_points(lateral, clip.fps, FPS)),
+        pitch,
+        _frame(axes[..., 1], axes[..., 0]),
+    )
+
+
+def _offsets(clip: BvhClip, rig: Rig, index: list[int], where: str, unit: float) -> Array:
+    """(22, 3) metres of the rig's points from their joints."""
+    out = np.zeros((len(index), 3))
+    for k, (point, j) in enumerate(zip(rig.points, index, strict=True)):
+        out[k] = np.array(point.offset) * unit
+        if point.end:
+            if np.isnan(clip.ends[j]).any():
+                raise InvalidFile(f"{point.joint!r} has no End Site, which the {rig.name} rig needs", where=where)
+            out[k] += clip.ends[j]
+    return out
+
+
+def _flat_feet(clip: BvhClip, rig: Rig, index: list[int], offsets: Array) -> tuple[Array, float]:
+    """Directions (2, 3) to the body's left in the frames of both ankles, and the pitch of the foot's bone, of a flat
+    foot: as the rig says, or as the rest pose shows."""
+    places = clip.skeleton.rest[index] + offsets
+    up = np.array(rig.rest_up)
+    bones = normalize(places[[9, 13]] - places[[8, 12]])
+    left = normalize(cross(up, bones))
+    for side, given in enumerate((rig.left_foot, rig.right_foot)):
+        if given is not None:
+            left[side] = given
+    pitch = float(np.degrees(-np.arcsin(np.clip(bones @ up, -1, 1))).mean())
+    return left, pitch if rig.sole_pitch is None else rig.sole_pitch
 
 
 def resample_points(points: Array, fps: float, target: float) -> Array:
@@ -82,44 +129,95 @@ def resample_points(points: Array, fps: float, target: float) -> Array:
     return p1 + 0.5 * t * (c + t * (a + t * b))
 
 
-def retarget(source: SourceMotion, rig: Rig) -> Array:
-    """Joints (T, 22, 3) of HumanML3D in metres: bones of exactly its lengths, facing +Z in frame 0 over the origin."""
+def retarget(source: SourceMotion, rig: Rig, *, unit: Unit = "cm") -> Array:
+    """Joints (T, 22, 3) of HumanML3D in metres: bones of exactly its lengths, at the height that the file has, facing
+    +Z in frame 0 over the origin. The floor is found by `floor.on_floor`."""
     s = source.joints
-    pelvis, spine, middle, chest, neck, head = (s[:, j] for j in range(6))
+    pelvis, spine = s[:, 0], s[:, 1]
     legs, arms = (s[:, 6:10], s[:, 10:14]), (s[:, 14:18], s[:, 18:22])
-    scale = (_LENGTH[4] + _LENGTH[7]) / np.mean([_bone(leg, 0, 1) + _bone(leg, 1, 2) for leg in legs])
-
+    turned = rig.trunk == "rotations"
+    scale = leg_scale(legs, source.sole_pitch, whole=turned)
     out = np.empty((len(s), 22, 3))
-    hips = _frame(spine - pelvis, legs[0][:, 0] - legs[1][:, 0])
-    ankle_shift = _ankle_shift(legs, rig, scale)
-    forward = normalize(cross(legs[0][:, 0] - legs[1][:, 0], np.broadcast_to(_UP, pelvis.shape)))
+    hips = source.trunk[:, 0] if turned else _frame(spine - pelvis, legs[0][:, 0] - legs[1][:, 0])
+    forward, back, up = _standing_axes(hips, legs, turned=turned)
+    ankle_shift = _ankle_shift(legs, source.sole_pitch, scale)
     mid_hip = scale * (legs[0][:, 0] + legs[1][:, 0]) / 2
-    mid_hip = mid_hip + ankle_shift[1] * _UP + ankle_shift[0] * forward
+    mid_hip = mid_hip + ankle_shift[1] * up + ankle_shift[0] * back
     out[:, 0] = mid_hip - _turn(hips, (_REST[1] + _REST[2]) / 2)
+    inwards = _narrower(legs, hips, scale)
     for target, leg, lateral in zip(_LEGS, legs, (0, 1), strict=True):
         hip, knee, ankle, toe = target
         out[:, hip] = out[:, 0] + _turn(hips, _REST[hip])
-        out[:, toe] = scale * leg[:, 3]
-        out[:, ankle] = out[:, toe] - _turn(_sole(leg, source.lateral[:, lateral], rig), _REST[toe])
+        out[:, toe] = scale * leg[:, 3] + inwards * (2 * lateral - 1)
+        out[:, ankle] = out[:, toe] - _turn(_sole(leg, source.lateral[:, lateral], source.sole_pitch), _REST[toe])
         out[:, knee], reached = two_bones(
             out[:, hip], out[:, ankle], _knee_pole(leg, forward), (_LENGTH[knee], _LENGTH[ankle])
         )
         out[:, toe] += reached - out[:, ankle]
         out[:, ankle] = reached
+    out[..., 1] -= scale * METRES[unit] * rig.toe_height
+    if turned:
+        _turn_trunk(out, source.trunk)
+    else:
+        _point_trunk(out, s)
+    for target, arm in zip(_ARMS, arms, strict=True):
+        for k in range(1, 3) if turned else range(3):
+            bone = normalize(arm[:, k + 1] - arm[:, k])
+            out[:, target[k + 1]] = out[:, target[k]] + _LENGTH[target[k + 1]] * bone
+    return canonical(out)
 
-    ribs = _frame(neck - chest, arms[0][:, 0] - arms[1][:, 0])
+
+def leg_scale(legs: tuple[Array, Array], sole_pitch: float, *, whole: bool) -> float:
+    """Length of the target's legs over the source's, from hip to ankle, or the `whole` from hip to the toe of a flat
+    foot: the feet of some bodies are a third of the leg."""
+    lengths = np.mean([_bone(leg, 0, 1) + _bone(leg, 1, 2) for leg in legs])
+    if not whole:
+        return float((_LENGTH[4] + _LENGTH[7]) / lengths)
+    drop = np.mean([_bone(leg, 2, 3) for leg in legs]) * np.sin(np.radians(sole_pitch))
+    return float((_LENGTH[4] + _LENGTH[7] - _REST[10, 1]) / (lengths + drop))
+
+
+def _standing_axes(hips: Array, legs: tuple[Array, Array], *, turned: bool) -> tuple[Array, Array, Array]:
+    """Where knees point, where hips move on the target's feet (both (T, 3)), and what is up for them: of the body
+    where its orientation is known, as in one that lies; else of the floor."""
+    if turned:
+        return hips[..., 2], hips[..., 2], hips[..., 1]
+    across = legs[0][:, 0] - legs[1][:, 0]
+    forward = normalize(cross(across, np.broadcast_to(_UP, across.shape)))
+    return forward, forward, np.broadcast_to(_UP, across.shape)
+
+
+def _narrower(legs: tuple[Array, Array], hips: Array, scale: float) -> Array:
+    """(T, 3) by which the right foot moves to the left, and the left one to the right, on hips that are narrower than
+    the source's: without it bodies with short legs stand with their legs apart. It follows the hips slowly, so that
+    standing feet do not slide with every sway; hips of much the same width move nothing."""
+    wider = scale * float(np.linalg.norm(legs[0][:, 0] - legs[1][:, 0], axis=-1).mean()) / 2 - _REST[1, 0]
+    if abs(wider) < _SAME_WIDTH:
+        return np.zeros((len(hips), 3))
+    return wider * normalize(smooth(hips[..., 0], _SWAY * FPS))
+
+
+def _turn_trunk(out: Array, trunk: Array) -> None:
+    """Place trunk and shoulders by the rotations of the source's joints."""
+    parts = {3: 0, 6: 1, 9: 2, 12: 3, 13: 3, 14: 3, 15: 4, 16: 5, 17: 6}  # joint: what turns the bone to it
+    for joint, turn in parts.items():
+        out[:, joint] = out[:, HUMANML3D.parents[joint]] + _turn(trunk[:, turn], _REST[joint])
+
+
+def _point_trunk(out: Array, s: Array) -> None:
+    """Place trunk and clavicles by the positions of the source's joints."""
+    pelvis, spine, middle, chest, neck, head = (s[:, j] for j in range(6))
+    shoulders = s[:, 14] - s[:, 18]
+    hips = _frame(spine - pelvis, s[:, 6] - s[:, 10])
+    ribs = _frame(neck - chest, shoulders)
     out[:, 3] = out[:, 0] + _turn(hips, _REST[3])
     low = normalize(normalize(spine - pelvis) + normalize(chest - middle))
     out[:, 6] = out[:, 3] + _LENGTH[6] * low
     out[:, 9] = out[:, 6] + _LENGTH[9] * normalize(normalize(chest - middle) + normalize(neck - chest))
     out[:, 12] = out[:, 9] + _turn(ribs, _REST[12])
-    out[:, 15] = out[:, 12] + _turn(_frame(head - neck, arms[0][:, 0] - arms[1][:, 0]), _REST[15])
-    for target, arm in zip(_ARMS, arms, strict=True):
-        out[:, target[0]] = out[:, 9] + _turn(ribs, _REST[target[0]])
-        for k in range(3):
-            bone = normalize(arm[:, k + 1] - arm[:, k])
-            out[:, target[k + 1]] = out[:, target[k]] + _LENGTH[target[k + 1]] * bone
-    return canonical(_on_floor(out))
+    out[:, 15] = out[:, 12] + _turn(_frame(head - neck, shoulders), _REST[15])
+    for collar in (13, 14):
+        out[:, collar] = out[:, 9] + _turn(ribs, _REST[collar])
 
 
 def _bone(limb: Array, a: int, b: int) -> float:
@@ -137,21 +235,21 @@ def _turn(frames: Array, vector: Array) -> Array:
     return frames @ vector
 
 
-def _sole(leg: Array, lateral: Array, rig: Rig) -> Array:
+def _sole(leg: Array, lateral: Array, sole_pitch: float) -> Array:
     """Frames (T, 3, 3) of a foot: identity turned by its heading while the sole is flat on the floor."""
     bone = normalize(leg[:, 3] - leg[:, 2])
     x = normalize(lateral - bone * np.einsum("ti,ti->t", lateral, bone)[:, None])
     up = cross(bone, x)  # square to the bone, in the foot's plane
-    pitch = np.radians(rig.sole_pitch)
+    pitch = np.radians(sole_pitch)
     z = np.cos(pitch) * bone + np.sin(pitch) * up
     return np.stack([x, cross(z, x), z], axis=-1)
 
 
-def _ankle_shift(legs: tuple[Array, Array], rig: Rig, scale: float) -> tuple[float, float]:
+def _ankle_shift(legs: tuple[Array, Array], sole_pitch: float, scale: float) -> tuple[float, float]:
     """Difference of the ankles' position over the flat toe between target and source, forward and up: hips follow
     it."""
     bone = scale * np.mean([_bone(leg, 2, 3) for leg in legs])
-    pitch = np.radians(rig.sole_pitch)
+    pitch = np.radians(sole_pitch)
     return float(bone * np.cos(pitch) - _REST[10, 2]), float(-_REST[10, 1] - bone * np.sin(pitch))
 
 
@@ -173,14 +271,6 @@ def two_bones(hip: Array, ankle: Array, pole: Array, lengths: tuple[float, float
     along = (distance**2 + upper**2 - lower**2) / (2 * distance)
     aside = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     return hip + along * axis + aside * pole, hip + distance * axis
-
-
-def _on_floor(joints: Array) -> Array:
-    """Shift the clip so that standing toes are at height 0: under it lie the lowest 2 % of foot heights."""
-    lowest = joints[:, [7, 8, 10, 11], 1].min(axis=1)
-    out = joints.copy()
-    out[..., 1] -= np.percentile(lowest, 2)
-    return out
 
 
 def canonical(joints: Array) -> Array:

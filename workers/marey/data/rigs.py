@@ -1,97 +1,106 @@
-"""Joint mappings of foreign rigs: all that retargeting needs to know about a rig, as data."""
+"""Rigs as data: all that retargeting needs to know of a rig, as a `[[rig]]` table of `dataset.toml` says it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
+
+Vector = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class Limb:
-    """One leg or arm by joint names, from the trunk outwards: hip knee ankle toe, or clavicle shoulder elbow wrist."""
+class Point(BaseModel):
+    """A point of the rig: a joint, the End Site behind it (`Foot_L:end`), or a place fixed in the joint's frame.
 
-    joints: tuple[str, str, str, str]
-    foot_lateral: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """For a leg: the direction in the ankle joint's frame that points to the body's left while the foot is flat."""
+    Attributes:
+        joint: name of the joint.
+        end: take its End Site.
+        offset: from the joint, in the joint's frame and in the file's unit.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    joint: str
+    end: bool = False
+    offset: Vector = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Rig:
+def _point(value: object) -> object:
+    if isinstance(value, str):
+        joint, _, end = value.partition(":")
+        return {"joint": value} if end != "end" else {"joint": joint, "end": True}
+    return value
+
+
+RigPoint = Annotated[Point, BeforeValidator(_point)]
+Four = tuple[RigPoint, RigPoint, RigPoint, RigPoint]
+
+
+class Rig(BaseModel):
     """A rig that can be retargeted to the 22 joints of HumanML3D.
 
     Attributes:
         name: short name.
         pelvis, spine: the joint that carries the hips, and the first spine joint over it.
-        chest, neck, head: the joint that carries the clavicles, and those above it.
-        middle: the spine joint under the chest; the bone from it to the chest is the target's second spine bone.
-        legs, arms: left, right.
-        sole_pitch: degrees by which the ankle-to-toe bone points down while the sole is flat on the floor.
+        middle: the spine joint under the chest; with `spine` or `chest` again where there is none between.
+        chest, neck, head: the joint that carries the arms, and those above it.
+        left_leg, right_leg: hip, knee, ankle, toe.
+        left_arm, right_arm: clavicle, shoulder, elbow, wrist; the chest again where there is no clavicle.
+        trunk: `rotations`: each part of the trunk turns as its joint turns away from the rest pose, in which the body
+            stands upright; `positions`: it points where the joints' positions point, for a rig whose rest pose is
+            something else.
+        rest_left, rest_up: axes of the rest pose (all rotations zero) that point to the body's left and up.
+        left_foot, right_foot: direction in the ankle's frame that points to the body's left while the foot is flat.
+        sole_pitch: degrees by which the line from ankle to toe points down while the sole is flat on the floor. Where
+            these three are not given, feet are flat in the rest pose.
+        toe_height: of the toe joint over the file's floor while it stands, in the file's unit.
     """
 
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
     name: str
-    pelvis: str
-    spine: str
-    middle: str
-    chest: str
-    neck: str
-    head: str
-    legs: tuple[Limb, Limb]
-    arms: tuple[Limb, Limb]
-    sole_pitch: float
+    pelvis: RigPoint
+    spine: RigPoint
+    middle: RigPoint
+    chest: RigPoint
+    neck: RigPoint
+    head: RigPoint
+    left_leg: Four
+    right_leg: Four
+    left_arm: Four
+    right_arm: Four
+    trunk: Literal["rotations", "positions"] = "rotations"
+    rest_left: Vector = (1.0, 0.0, 0.0)
+    rest_up: Vector = (0.0, 1.0, 0.0)
+    left_foot: Vector | None = None
+    right_foot: Vector | None = None
+    sole_pitch: float | None = None
+    toe_height: float = 0.0
+
+    @model_validator(mode="after")
+    def _square(self) -> Self:
+        if abs(sum(a * b for a, b in zip(self.rest_left, self.rest_up, strict=True))) > 1e-3:
+            raise ValueError("rest_left and rest_up are not perpendicular")
+        return self
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        """All points that are read: trunk, then left leg, right leg, left arm, right arm."""
+        trunk = (self.pelvis, self.spine, self.middle, self.chest, self.neck, self.head)
+        return (*trunk, *self.left_leg, *self.right_leg, *self.left_arm, *self.right_arm)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints of `points`."""
+        return tuple(point.joint for point in self.points)
 
     @property
-    def joint_names(self) -> tuple[str, ...]:
-        """All joints that are read, trunk first, then left leg, right leg, left arm, right arm."""
-        trunk = (self.pelvis, self.spine, self.middle, self.chest, self.neck, self.head)
-        return trunk + tuple(name for limb in (*self.legs, *self.arms) for name in limb.joints)
+    def turning(self) -> tuple[str, ...]:
+        """Joints whose rotations turn the trunk: pelvis, three of the spine, neck, clavicles."""
+        clavicles = (self.left_arm[0], self.right_arm[0])
+        return tuple(p.joint for p in (self.pelvis, self.spine, self.middle, self.chest, self.neck, *clavicles))
 
-
-def _bandai_limb(side: str, parts: str, lateral: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Limb:
-    a, b, c, d = (f"{part}_{side}" for part in parts.split())
-    return Limb((a, b, c, d), lateral)
-
-
-def _iclone_limb(side: str, parts: str, lateral: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Limb:
-    a, b, c, d = (f"CC_Base_{side}_{part}" for part in parts.split())
-    return Limb((a, b, c, d), lateral)
-
-
-# Axes and angles measured on standing frames of the archives (flat soles).
-BANDAI_NAMCO = Rig(
-    name="bandai-namco",
-    pelvis="Hips",
-    spine="Spine",
-    middle="Spine",
-    chest="Chest",
-    neck="Neck",
-    head="Head",
-    legs=(
-        _bandai_limb("L", "UpperLeg LowerLeg Foot Toes", (0.0, 1.0, 0.0)),
-        _bandai_limb("R", "UpperLeg LowerLeg Foot Toes", (0.0, 1.0, 0.0)),
-    ),
-    arms=(
-        _bandai_limb("L", "Shoulder UpperArm LowerArm Hand"),
-        _bandai_limb("R", "Shoulder UpperArm LowerArm Hand"),
-    ),
-    sole_pitch=39.6,
-)
-
-ICLONE = Rig(
-    name="iclone",
-    pelvis="CC_Base_Pelvis",
-    spine="CC_Base_Waist",
-    middle="CC_Base_Spine01",
-    chest="CC_Base_Spine02",
-    neck="CC_Base_NeckTwist01",
-    head="CC_Base_Head",
-    legs=(
-        _iclone_limb("L", "Thigh Calf Foot ToeBase", (-0.997, -0.016, 0.077)),
-        _iclone_limb("R", "Thigh Calf Foot ToeBase", (-0.996, 0.012, -0.090)),
-    ),
-    arms=(
-        _iclone_limb("L", "Clavicle Upperarm Forearm Hand"),
-        _iclone_limb("R", "Clavicle Upperarm Forearm Hand"),
-    ),
-    sole_pitch=11.5,
-)
-
-RIGS: dict[str, Rig] = {rig.name: rig for rig in (BANDAI_NAMCO, ICLONE)}
+    def fits(self, names: frozenset[str]) -> bool:
+        """Return True if a skeleton with joints of these names is of this rig."""
+        return names.issuperset(self.joint_names)

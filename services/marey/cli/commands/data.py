@@ -20,13 +20,11 @@ Prepared = Annotated[Path, typer.Argument(metavar="DIR", help="A folder that `ma
 Sources = Annotated[
     list[str],
     typer.Argument(
-        metavar="SOURCE PATH …", help="bandai-namco or cmu with its archive or folder; pack with a file of `pack`."
+        metavar="SOURCE PATH …",
+        help="A known set (an unknown name lists them) with its archive or folder; own with a folder that has "
+        "dataset.toml and index.csv; pack with a file of `pack`.",
     ),
 ]
-Splits = Annotated[
-    Path | None, typer.Option("--splits", help="Of bandai-namco; else bandai-namco-splits.json beside it.")
-]
-Captions = Annotated[Path | None, typer.Option("--captions", help="Of cmu; else cmu-captions.json beside it.")]
 Processes = Annotated[int, typer.Option("--processes", min=1, help="Number of processes that retarget.")]
 
 
@@ -34,14 +32,12 @@ Processes = Annotated[int, typer.Option("--processes", min=1, help="Number of pr
 def pack(
     pairs: Sources,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for SOURCE.pack.npz.")],
-    splits: Splits = None,
-    captions: Captions = None,
     processes: Processes = 2,
 ) -> None:
     """Retarget archives only: small files to carry to the machine that prepares and trains."""
     from marey.cli.roles import data
 
-    sources = data.CaptureSources(_named(pairs), splits, captions, processes)
+    sources = data.CaptureSources(_named(pairs), processes)
     with _progress() as progress:
         paths = data.pack_data(sources, output, progress)
     for path in paths:
@@ -52,14 +48,12 @@ def pack(
 def prepare(
     pairs: Sources,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to; must be empty or new.")],
-    splits: Splits = None,
-    captions: Captions = None,
     processes: Processes = 2,
 ) -> None:
     """Retarget archives to the 22-joint skeleton, mirror, splice, caption, and write arrays with a manifest."""
     from marey.cli.roles import data
 
-    sources = data.CaptureSources(_named(pairs), splits, captions, processes)
+    sources = data.CaptureSources(_named(pairs), processes)
     with _progress() as progress:
         manifest = data.prepare_data(sources, output, progress)
     console.say(f"{output}: {manifest}")

@@ -16,20 +16,19 @@ if TYPE_CHECKING:
     from marey.data.pack import JointsPack
 
 
+OWN, PACK = "own", "pack"
+
+
 @dataclass(frozen=True)
 class CaptureSources:
     """What `marey data pack` and `prepare` read.
 
     Attributes:
-        named: source (`bandai-namco`, `cmu` or `pack`) and its archive, folder or file.
-        splits: of bandai-namco; None = beside the archive.
-        captions: of cmu; None = beside the archive.
+        named: source and its archive, folder or file: a known set, `own` (a folder that describes itself) or `pack`.
         processes: how many retarget at once.
     """
 
     named: Sequence[tuple[str, Path]]
-    splits: Path | None = None
-    captions: Path | None = None
     processes: int = 2
 
 
@@ -41,22 +40,24 @@ def read_captures(sources: CaptureSources, progress: Callable[[str, int, int | N
         NotFound, InvalidFile, TooLarge: from reading.
     """
     try:
+        from marey.data.dataset import known_sets
         from marey.data.pack import JointsPack
-        from marey.data.prepare import pack_bandai_namco, pack_cmu
+        from marey.data.prepare import CaptureSet, pack_set
     except ImportError as error:
         raise needs_extra("worker", error) from error
-    options = {"processes": sources.processes}
-    readers: dict[str, Callable[[Path], JointsPack]] = {
-        "bandai-namco": lambda path: pack_bandai_namco(
-            path, splits=sources.splits, progress=partial(progress, "bandai-namco"), **options
-        ),
-        "cmu": lambda path: pack_cmu(path, captions=sources.captions, progress=partial(progress, "cmu"), **options),
-        "pack": JointsPack.load,
-    }
+    known = known_sets()
     for name, _ in sources.named:
-        if name not in readers:
-            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join(readers)}.")
-    return [readers[name](path) for name, path in sources.named]
+        if name not in (*known, OWN, PACK):
+            raise InvalidInput(f"there is no source {name!r}", hint=f"Known: {', '.join((*known, OWN, PACK))}.")
+    packs: list[JointsPack] = []
+    for name, path in sources.named:
+        if name == PACK:
+            packs.append(JointsPack.load(path))
+        else:
+            captures = CaptureSet.own(path) if name == OWN else CaptureSet.known(name, path)
+            report = partial(progress, captures.dataset.name)
+            packs.append(pack_set(captures, processes=sources.processes, progress=report))
+    return packs
 
 
 def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, int, int | None], None]) -> list[Path]:
@@ -66,9 +67,10 @@ def pack_data(sources: CaptureSources, output: Path, progress: Callable[[str, in
         InvalidInput, NotFound, InvalidFile, TooLarge: see `read_captures`.
     """
     output.mkdir(parents=True, exist_ok=True)
-    paths = [output / f"{name}.pack.npz" for name, _ in sources.named]
-    for path, pack in zip(paths, read_captures(sources, progress), strict=True):
-        pack.save(path)
+    paths: list[Path] = []
+    for pack in read_captures(sources, progress):
+        paths.append(output / f"{pack.clips[0].dataset}.pack.npz")
+        pack.save(paths[-1])
     return paths
 
 

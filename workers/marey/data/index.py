@@ -1,0 +1,140 @@
+"""`index.csv`: one line a clip, or a segment of a long one."""
+
+from __future__ import annotations
+
+import csv
+import io
+import string
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from marey.core.documents import read_bytes
+from marey.core.errors import InvalidFile
+from marey.data.dataset import Dataset
+from marey.data.licences import Tier
+
+MAX_BYTES = 64 * 2**20
+SEPARATOR = "|"
+"""Between several captions or facts in one cell."""
+
+
+class Row(BaseModel):
+    """One line.
+
+    Attributes:
+        file: name of the file, with or without folder and ending.
+        id: name of the clip; the file's, with `@` and the start for a segment.
+        action: what is done, an id of the vocabulary where it has one.
+        style: how it is done.
+        captions: true sentences about it.
+        source: the independent capture that it comes from; clips of one source are never in two splits.
+        licence, credit, tier: its terms where they are not those of the set.
+        in_place: a gait on the spot, whose travel is made from the standing foot or which is said to be in place.
+        side: left, right, both or empty.
+        split: given by the set, or empty: then splits are made by source.
+        start, end: seconds of the file; None is its start or end.
+        error_cm: how far the file's joints are off what was captured, where its maker measured that.
+        facts: words such as `loop`, `one-shot`, `lying`, `drop`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: str = Field(min_length=1)
+    id: str = ""
+    action: str = ""
+    style: str = ""
+    captions: tuple[str, ...] = ()
+    source: str = ""
+    licence: str = ""
+    credit: str = ""
+    tier: Tier | None = None
+    in_place: bool = False
+    side: Literal["", "left", "right", "both"] = ""
+    split: Literal["", "train", "val", "test", "compositional"] = ""
+    start: float | None = Field(default=None, ge=0)
+    end: float | None = Field(default=None, gt=0)
+    error_cm: float = 0.0
+    facts: tuple[str, ...] = ()
+
+    @field_validator("captions", "facts", mode="before")
+    @classmethod
+    def _several(cls, value: object) -> object:
+        return tuple(v for part in value.split(SEPARATOR) if (v := part.strip())) if isinstance(value, str) else value
+
+    @field_validator("in_place", "error_cm", mode="before")
+    @classmethod
+    def _no(cls, value: object) -> object:
+        return 0 if value == "" else value
+
+    @field_validator("start", "end", "tier", mode="before")
+    @classmethod
+    def _none(cls, value: object) -> object:
+        return None if value == "" else value
+
+    @property
+    def stem(self) -> str:
+        """Name of the file without folder and ending."""
+        return stem_of(self.file)
+
+
+def stem_of(name: str) -> str:
+    """Name of a file without folder and ending (`.bvh` alone: clips may have dots in their names)."""
+    name = name.replace("\\", "/").rsplit("/", 1)[-1]
+    return name[:-4] if name.lower().endswith(".bvh") else name
+
+
+def read_index(path: Path, dataset: Dataset) -> tuple[Row, ...]:
+    """Read an index by the columns of its set.
+
+    Raises:
+        NotFound: no such file.
+        InvalidFile: no CSV with a header, an unknown column in a template, or a bad cell, with its line.
+    """
+    where = str(path)
+    try:
+        text = read_bytes(path, limit=MAX_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidFile(f"is not UTF-8: {error.reason}", where=where) from None
+    return parse_index(text, dataset.columns, where)
+
+
+def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row, ...]:
+    """Rows of an index's text; `columns` as in `Dataset.columns`."""
+    reader = csv.DictReader(io.StringIO(text, newline=""))
+    header = tuple(reader.fieldnames or ())
+    templates = {name: f"{{{name}}}" for name in Row.model_fields if name in header}
+    templates.update(columns)
+    if "file" not in templates:
+        raise InvalidFile("has no column `file`", where=where, hint="Name it under [columns] of dataset.toml.")
+    for ours, template in templates.items():
+        for _, field, _, _ in string.Formatter().parse(template):
+            if field is not None and field not in header:
+                raise InvalidFile(f"has no column {field!r}, of which `{ours}` is made", where=where)
+    rows, seen = [], set[str]()
+    for cells in reader:
+        place = f"{where}, line {reader.line_num}"
+        if None in cells or None in cells.values():
+            raise InvalidFile("has not as many cells as the header", where=place)
+        made = {ours: template.format_map(cells).strip() for ours, template in templates.items()}
+        try:
+            row = Row.model_validate(made)
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise InvalidFile(f"`{'.'.join(map(str, first['loc']))}`: {first['msg']}", where=place) from None
+        row = _named(row)
+        if row.start is not None and row.end is not None and row.end <= row.start:
+            raise InvalidFile("ends before it starts", where=place)
+        if row.id in seen:
+            raise InvalidFile(f"there are two clips {row.id!r}", where=place)
+        seen.add(row.id)
+        rows.append(row)
+    return tuple(rows)
+
+
+def _named(row: Row) -> Row:
+    """The row with id and source, where it has none."""
+    part = "" if row.start is None and row.end is None else f"@{row.start or 0:g}"
+    return row.model_copy(update={"id": row.id or row.stem + part, "source": row.source or row.stem})
