@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +113,8 @@ class HeadingLayout:
         facing_start: which facing is +Z in frame 0. The published vectors take the measured one and then call the
             smoothed one of frame 0 zero too, which leaves a jump of the heading after frame 0 (12 degrees in clip
             012314); with `smoothed` there is none.
+        facing_held: hold the facing where the body has none, as on its side or in the middle of a cartwheel; see
+            `held_across`. The published vectors do not.
         unit: metres in one unit of the features (KIT-ML counts millimetres).
     """
 
@@ -124,6 +126,7 @@ class HeadingLayout:
     facing_sigma: float = 20.0
     facing_hips: float = 1.0
     facing_start: Literal["measured", "smoothed"] = "measured"
+    facing_held: bool = False
     unit: float = 1.0
 
     @property
@@ -148,10 +151,15 @@ class HeadingLayout:
         return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
     def with_facing(
-        self, *, sigma: float, hips: float = 1.0, start: Literal["measured", "smoothed"] = "smoothed"
+        self,
+        *,
+        sigma: float,
+        hips: float = 1.0,
+        start: Literal["measured", "smoothed"] = "smoothed",
+        held: bool = False,
     ) -> HeadingLayout:
         """The same layout with the heading found in another way; decoding is the same."""
-        return replace(self, facing_sigma=sigma, facing_hips=hips, facing_start=start)
+        return replace(self, facing_sigma=sigma, facing_hips=hips, facing_start=start, facing_held=held)
 
     def canonicalize(self, joints: Array) -> Array:
         """The motion (T, J, 3) in the place that `encode` gives it: see `canonicalize` and `facing_start`."""
@@ -162,6 +170,8 @@ class HeadingLayout:
         zero in frame 0."""
         places = canonicalize(joints, self.skeleton)
         right = across(places, self.skeleton, hips=self.facing_hips)
+        if self.facing_held:
+            right = held_across(right, places, self.skeleton)
         right = smooth(right[:, [0, 2]], self.facing_sigma, cut=4.0)  # a shorter vector in the plane weighs less
         half_yaw = -0.5 * np.unwrap(np.arctan2(right[:, 1], -right[:, 0]))  # forward = up x right
         if self.facing_start == "smoothed":
@@ -270,6 +280,29 @@ class HeadingLayout:
     def mirror_joints(self, joints: Array) -> Array:
         """See `mirror_joints`."""
         return mirror_joints(joints, self.skeleton)
+
+
+LEAST_ACROSS = 0.5  # of the line from left to right that lies in the floor plane
+LEAST_UP = -0.3  # of the trunk's direction; an upside-down body may have its left on either side
+
+
+def held_across(right: Array, joints: Array, skeleton: Skeleton) -> Array:
+    """Lines from left to right (T, 3), replaced where they tell no heading: in a body on its side the line is upright,
+    and in a cartwheel it comes out of that reversed.
+
+    There the heading is held: it goes the shorter way round from the last frame that has one to the next. Where all
+    frames have one, or none, nothing changes.
+    """
+    r_hip, l_hip, r_shoulder, l_shoulder = skeleton.facing
+    trunk = joints[:, [r_shoulder, l_shoulder]].mean(axis=1) - joints[:, [r_hip, l_hip]].mean(axis=1)
+    clear = (np.hypot(right[:, 0], right[:, 2]) > LEAST_ACROSS) & (normalize(trunk)[:, 1] > LEAST_UP)
+    if clear.all() or not clear.any():
+        return right
+    known = np.flatnonzero(clear)
+    turns = np.unwrap(np.arctan2(right[known, 2], right[known, 0]))
+    angles = cast("Array", np.interp(np.arange(len(right)), known, turns))
+    held = np.stack([np.cos(angles), np.zeros(len(right)), np.sin(angles)], axis=-1)
+    return np.where(clear[:, None], right, held)
 
 
 def to_world(half_yaw: Array, flat: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -22,12 +23,13 @@ from marey.data.manifest import Clip, FileEntry, Manifest, Measured, SourceEntry
 from marey.data.pack import SPLITS, JointsPack, PackClip, split_root
 from marey.data.part import FPS, MAX_FRAMES, MIN_FRAMES, Part
 from marey.data.soundness import is_broken
+from marey.data.splits import Sourced, actions_of, splits_by_source
 from marey.motion.features import HUMANML3D_263
 
 Array = NDArray[np.floating]
 # Heading: smoothed over half a second, which keeps the sway of a gait (1 Hz) out of it and follows a turn; hips and
-# shoulders count alike; frame 0 has no jump. Decoding is that of HumanML3D.
-LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed")
+# shoulders count alike; frame 0 has no jump; it is held where a body has none. Decoding is that of HumanML3D.
+LAYOUT = HUMANML3D_263.with_facing(sigma=10.0, hips=1.0, start="smoothed", held=True)
 COMPOSITIONAL_SPLIT = "compositional"
 
 Progress = Callable[[int, int], None]
@@ -54,6 +56,29 @@ def windows(frames: int) -> list[slice]:
 def held_out_pairs(packs: Sequence[JointsPack]) -> frozenset[tuple[str, str]]:
     """(content, style) pairs of the compositional split: nothing else may show them, mirrored clips included."""
     return frozenset((c.content, c.style) for pack in packs for c in pack.clips if c.split == COMPOSITIONAL_SPLIT)
+
+
+def with_splits(packs: Sequence[JointsPack], left_out: dict[str, str]) -> list[JointsPack]:
+    """The packs with a split for every clip, by source where the index gives none. A source that stands in two sets,
+    such as a trial on two rigs, is taken from the first of them alone."""
+    set_of: dict[str, str] = {}
+    free: list[Sourced] = []
+    kept: list[list[PackClip]] = []
+    for pack in packs:
+        kept.append([])
+        for clip in pack.clips:
+            source = clip.source or clip.id
+            if set_of.setdefault(source, clip.dataset) != clip.dataset:
+                left_out[f"{clip.dataset}/{clip.id}"] = f"its source {source!r} is taken from {set_of[source]}"
+                continue
+            kept[-1].append(clip)
+            if not clip.split:
+                free.append(Sourced(source, actions_of(clip.content), pack.terms_of(clip).tier))
+    split = splits_by_source(free)
+    return [
+        replace(pack, clips=tuple(replace(c, split=c.split or split[c.source or c.id]) for c in clips))
+        for pack, clips in zip(packs, kept, strict=True)
+    ]
 
 
 def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[Part]:
@@ -88,7 +113,8 @@ def parts_of(packs: Sequence[JointsPack], left_out: dict[str, str]) -> Iterator[
 def _facts(clip: PackClip, content: str, joints: NDArray[np.float32], *, mirrored: bool) -> Facts | None:
     """Facts of a clip: captions of its index, or the caption grammar where that knows the action."""
     if clip.captions or content not in ACTS:
-        said = clip.captions or (f"a person does this: {clip.content}.",)
+        seen = f"a person {clip.facts}." if clip.facts else f"a person does this: {clip.content}."
+        said = clip.captions or (seen,)
         return describe_text(tuple(map(swap_sides, said)) if mirrored else said, joints, FPS)
     return describe(content, clip.style, joints, FPS)
 
@@ -278,6 +304,7 @@ def build(packs: Sequence[JointsPack], out: Path, *, progress: Progress | None =
     """
     check_mix({pack.terms_of(clip) for pack in packs for clip in pack.clips})
     left_out = {name: why for pack in packs for name, why in pack.left_out.items()}
+    packs = with_splits(packs, left_out)
     by_split: dict[str, list[Part]] = {split: [] for split in SPLITS}
     total = 2 * sum(len(pack.clips) for pack in packs) + sum(sum(vars(counts).values()) for counts in COUNTS.values())
     with FolderWriter(out) as writer:

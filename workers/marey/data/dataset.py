@@ -35,6 +35,7 @@ class Dataset(BaseModel):
         floor: where a clip's floor is: `support`: under whatever part of the body supports it; `feet`: under the feet;
             `file`: at height 0 of the file.
         largest_error_cm: clips with a larger `error_cm` are left out.
+        index_fps: frames a second at which the index counts `start` and `end`; 1 counts seconds.
         columns: how each of our columns is made of those of the index: a template such as `{actor} {class}`.
         rigs: one a kind of skeleton; the first that fits a file is taken.
     """
@@ -51,6 +52,7 @@ class Dataset(BaseModel):
     up: Up = "y"
     floor: Literal["support", "feet", "file"] = "support"
     largest_error_cm: float = 2.0
+    index_fps: float = Field(default=30.0, gt=0)
     columns: Mapping[str, str] = {}
     rigs: tuple[Rig, ...] = Field(alias="rig", min_length=1)
 

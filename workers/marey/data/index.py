@@ -18,7 +18,9 @@ from marey.data.licences import Tier
 
 MAX_BYTES = 64 * 2**20
 SEPARATOR = "|"
-"""Between several captions or facts in one cell."""
+"""Between several captions in one cell."""
+UNUSED = "none"
+"""Action of a row that is not to be used: a T-pose, a broken or doubled take."""
 
 
 class Row(BaseModel):
@@ -27,7 +29,7 @@ class Row(BaseModel):
     Attributes:
         file: name of the file, with or without folder and ending.
         id: name of the clip; the file's, with `@` and the start for a segment.
-        action: what is done, an id of the vocabulary where it has one.
+        action: what is done, an id of the vocabulary where it has one; several joined by `; `; `none`: leave it out.
         style: how it is done.
         captions: true sentences about it.
         source: the independent capture that it comes from; clips of one source are never in two splits.
@@ -35,9 +37,9 @@ class Row(BaseModel):
         in_place: a gait on the spot, whose travel is made from the standing foot or which is said to be in place.
         side: left, right, both or empty.
         split: given by the set, or empty: then splits are made by source.
-        start, end: seconds of the file; None is its start or end.
+        start, end: first frame and the one after the last, counted at `Dataset.index_fps`; None: the file's own.
         error_cm: how far the file's joints are off what was captured, where its maker measured that.
-        facts: words such as `loop`, `one-shot`, `lying`, `drop`.
+        facts: what can be seen in it, for those who write captions.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -57,9 +59,9 @@ class Row(BaseModel):
     start: float | None = Field(default=None, ge=0)
     end: float | None = Field(default=None, gt=0)
     error_cm: float = 0.0
-    facts: tuple[str, ...] = ()
+    facts: str = ""
 
-    @field_validator("captions", "facts", mode="before")
+    @field_validator("captions", mode="before")
     @classmethod
     def _several(cls, value: object) -> object:
         return tuple(v for part in value.split(SEPARATOR) if (v := part.strip())) if isinstance(value, str) else value

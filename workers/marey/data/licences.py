@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -28,6 +29,13 @@ class Terms:
     credit: str
     url: str
     tier: Tier
+
+
+def tier_of(licence: str) -> Tier:
+    """Tier of a licence by its name, for records that do not state one."""
+    if re.search(r"\bNC\b|non-?commercial|research only", licence, re.IGNORECASE):
+        return "non-commercial"
+    return "sharealike" if re.search(r"\bSA\b|share-?alike", licence, re.IGNORECASE) else "commercial"
 
 
 def check_mix(terms: Iterable[Terms], *, where: str | None = None) -> Tier:

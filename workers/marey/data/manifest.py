@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
-from marey.data.licences import Tier
+from marey.data.licences import Terms, Tier
 
 FORMAT = "marey-prepared-2"
 FEATURES, JOINTS, ROOTS, CLIPS, STATISTICS, MANIFEST, TEXTS = (
@@ -69,6 +69,11 @@ class Manifest(BaseModel):
     """Captured clips that are not used, each with the reason."""
     compositional_pairs: tuple[tuple[str, str], ...]
     files: dict[str, FileEntry]
+
+    @property
+    def terms(self) -> tuple[Terms, ...]:
+        """Terms of the sources."""
+        return tuple(Terms(s.name, s.title, s.licence, s.credit, s.url, s.tier) for s in self.sources)
 
 
 class Measured(BaseModel):

@@ -52,7 +52,7 @@ class PackClip:
     captions: tuple[str, ...] = ()
     side: str = ""
     in_place: bool = False
-    facts: tuple[str, ...] = ()
+    facts: str = ""
     tier: str = ""
     licence: str = ""
     credit: str = ""

@@ -17,7 +17,7 @@ from marey.core.errors import InvalidFile, InvalidInput, NotFound
 from marey.data.archive import bvh_files
 from marey.data.dataset import DATASET, INDEX, SETS, Dataset, known_set, read_dataset
 from marey.data.floor import on_floor
-from marey.data.index import Row, read_index
+from marey.data.index import UNUSED, Row, read_index
 from marey.data.pack import JointsPack, PackClip
 from marey.data.retarget import FPS, read_source, retarget
 from marey.motion.io.bvh import parse_bvh
@@ -81,8 +81,8 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
     for row in captures.rows:
         if row.error_cm > dataset.largest_error_cm:
             left_out[row.id] = f"off what was captured by more than {dataset.largest_error_cm:g} cm"
-        elif "drop" in row.facts:
-            left_out[row.id] = "marked in the index: drop"
+        elif row.action == UNUSED:
+            left_out[row.id] = f"not to be used: {row.facts}" if row.facts else "not to be used"
         else:
             rows[row.stem].append(row)
     clips: list[tuple[PackClip, NDArray[np.float32]]] = []
@@ -91,7 +91,7 @@ def pack_set(captures: CaptureSet, *, processes: int = 2, progress: Progress | N
     for name, joints in _retarget_all(files, dataset, processes):
         done.add(name)
         for row in rows[name]:
-            piece = _segment(joints, row)
+            piece = _segment(joints, row, dataset.index_fps)
             if len(piece) < LEAST_FRAMES:
                 left_out[row.id] = f"fewer than {LEAST_FRAMES} frames"
             else:
@@ -128,10 +128,10 @@ def _clip(row: Row, dataset: Dataset) -> PackClip:
     )
 
 
-def _segment(joints: NDArray[np.float32], row: Row) -> NDArray[np.float32]:
+def _segment(joints: NDArray[np.float32], row: Row, fps: float) -> NDArray[np.float32]:
     """The frames of a row, on the floor of the whole take."""
-    first = 0 if row.start is None else round(row.start * FPS)
-    last = len(joints) if row.end is None else round(row.end * FPS) + 1
+    first = 0 if row.start is None else round(row.start * FPS / fps)
+    last = len(joints) if row.end is None else round((row.end - 1) * FPS / fps) + 1
     return joints[first:last]
 
 

@@ -13,6 +13,7 @@ from torch import Tensor
 from marey.bundles import Bundle, DataSource, TextSpec
 from marey.core.checkout import checkout
 from marey.core.errors import InvalidInput
+from marey.data.licences import Terms, check_mix, tier_of
 from marey.data.prepared import PreparedData
 from marey.training.parts import Part, save_part
 from marey.training.staging import ModelConfig, Recipe
@@ -39,11 +40,16 @@ def gather(prepared: Path, run: Path, recipe: Recipe[C], config: C) -> Gathered:
     """
     data = PreparedData.open(prepared)
     parts = {name: recipe.part(name, config, run) for name in recipe.stages}
-    sources = data.manifest.sources
     sha256 = data.manifest.files["features.npy"].sha256
+    sources = {(terms.name, terms.licence): terms for terms in data.manifest.terms}
+    for part in parts.values():
+        for terms in part.sources:
+            sources.setdefault((terms.name, terms.licence), terms)
     manifest = {
-        "licence": _terms(sorted({source.licence for source in sources})),
-        "data": tuple(DataSource(name=s.name, licence=s.licence, credit=s.credit, sha256=sha256) for s in sources),
+        "licence": _terms(tuple(sources.values())),
+        "data": tuple(
+            DataSource(name=s.name, licence=s.licence, credit=s.credit, sha256=sha256) for s in sources.values()
+        ),
         "metrics": {f"{stage}/{k}": v for stage, part in parts.items() for k, v in part.metrics.items()},
         "training": {"commit": _commit(), "budgets": {name: part.budget for name, part in parts.items()}},
     }
@@ -67,18 +73,23 @@ def scatter(
         )
     manifest = bundle.manifest
     data_sha256 = (manifest.data[0].sha256 or "") if manifest.data else ""
+    sources = tuple(Terms(d.name, d.name, d.licence, d.credit, "", tier_of(d.licence)) for d in manifest.data)
     for name, state in states.items():
         state = dict(state)
         if "quantizer.sums" in state:
             state["quantizer.sums"] = state["quantizer.codebooks"] * state["quantizer.counts"][..., None]
         metrics = {k.removeprefix(f"{name}/"): v for k, v in manifest.metrics.items() if k.startswith(f"{name}/")}
-        part = Part(state, config.to_dict(), metrics, data_sha256, {"bundle": bundle.reference})
+        part = Part(state, config.to_dict(), metrics, data_sha256, {"bundle": bundle.reference}, sources)
         save_part(run / name / "part", part)
 
 
-def _terms(licences: Sequence[str]) -> str:
-    """The strictest terms of the sources, as an SPDX name."""
-    return "CC-BY-NC-4.0" if any("NC" in licence for licence in licences) else licences[0]
+def _terms(sources: Sequence[Terms]) -> str:
+    """Terms of weights trained on all of these, as an SPDX name: the strictest. Of several that ask for credit at most
+    it is CC BY, so that the credit goes along."""
+    tier, licences = check_mix(sources), {terms.licence for terms in sources}
+    if tier == "commercial" and len(licences) == 1:
+        return licences.pop()
+    return {"commercial": "CC-BY-4.0", "sharealike": "CC-BY-SA-4.0", "non-commercial": "CC-BY-NC-4.0"}[tier]
 
 
 def _commit() -> str | None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from marey.core.documents import read_json
 from marey.core.errors import InvalidFile, NotFound
+from marey.data.licences import Terms
+
+_TERMS = TypeAdapter(tuple[Terms, ...])
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,8 @@ class Part:
     metrics: dict[str, float]
     data_sha256: str
     budget: dict[str, Any]
+    sources: tuple[Terms, ...] = ()
+    """Data sets that it was trained on, and those of every part that it began from or was trained upon."""
 
 
 def save_part(folder: Path, part: Part) -> None:
@@ -33,7 +39,20 @@ def save_part(folder: Path, part: Part) -> None:
     weights = {k: v.detach().cpu().contiguous().clone() for k, v in part.state.items()}
     save_file(weights, folder / "weights.safetensors")
     values = {name: value for name, value in vars(part).items() if name != "state"}
+    values["sources"] = [asdict(source) for source in part.sources]
     (folder / "part.json").write_text(json.dumps(values, indent=1), encoding="utf-8")
+
+
+def load_sources(file: Path) -> tuple[Terms, ...]:
+    """Data sets behind a part, by its `part.json`.
+
+    Raises:
+        InvalidFile: damaged.
+    """
+    try:
+        return _TERMS.validate_python(read_json(file, allow_nan=True).get("sources", ()))
+    except (AttributeError, TypeError, ValueError) as error:
+        raise InvalidFile(f"is not a trained part: {error}", where=str(file)) from error
 
 
 def load_part(folder: Path) -> Part:
@@ -51,6 +70,9 @@ def load_part(folder: Path) -> Part:
         ) from None
     try:
         state = load_file(folder / "weights.safetensors")
-        return Part(state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}))
-    except (AttributeError, KeyError, TypeError, SafetensorError, OSError) as error:
+        sources = _TERMS.validate_python(values.get("sources", ()))
+        return Part(
+            state, values["config"], values["metrics"], values["data_sha256"], values.get("budget", {}), sources
+        )
+    except (AttributeError, KeyError, TypeError, ValueError, SafetensorError, OSError) as error:
         raise InvalidFile(f"is not a trained part: {error}", where=str(folder)) from error

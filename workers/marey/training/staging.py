@@ -17,10 +17,12 @@ import torch
 from torch import nn
 
 from marey.core.errors import InvalidInput
+from marey.data.licences import Terms, check_mix
+from marey.data.prepared import read_manifest
 from marey.nn import distributed
 from marey.training.budget import Budget
 from marey.training.loop import RunOptions, Stage, train
-from marey.training.parts import Part, load_part, save_part
+from marey.training.parts import Part, load_part, load_sources, save_part
 
 
 class ModelConfig(Protocol):
@@ -103,17 +105,39 @@ class Recipe(Generic[C]):
         return part
 
     def train(self, stage: Stage, options: TrainOptions[C]) -> dict[str, float]:
-        """Train one stage; with `warm` from its finished part. See `part` for what is raised then."""
+        """Train one stage; with `warm` from its finished part. See `part` for what is raised then.
+
+        Raises:
+            InvalidInput: the licences of the data and of what it is trained upon exclude each other.
+        """
+        ancestors(options, stage.name)
         if options.warm:
             stage.module.load_state_dict(self.part(stage.name, options.config, options.run).state)
         return train(stage, options.options(stage.name), options.config.to_dict())
+
+
+def ancestors(options: TrainOptions[Any], name: str) -> tuple[Terms, ...]:
+    """Terms of the data behind a stage: of the prepared folder, and of the parts in the run. Its own finished part
+    counts with `warm` alone; else it is replaced.
+
+    Raises:
+        InvalidInput: their licences exclude each other.
+    """
+    found = {(terms.name, terms.licence): terms for terms in read_manifest(options.prepared).terms}
+    for file in sorted(options.run.glob("*/part/part.json")):
+        if file.parent.parent.name != name or options.warm:
+            for terms in load_sources(file):
+                found.setdefault((terms.name, terms.licence), terms)
+    check_mix(found.values(), where=str(options.run))
+    return tuple(found.values())
 
 
 def finish(module: nn.Module, options: TrainOptions[Any], name: str, metrics: dict[str, float], sha256: str) -> None:
     """Write a stage's part: averaged weights, configuration, metrics, and the hash of the data."""
     if distributed.rank() == 0:
         budget = {"steps": options.budget.steps, "minutes": options.budget.minutes, "seed": options.seed}
-        part = Part(module.state_dict(), options.config.to_dict(), metrics, sha256, budget)
+        sources = ancestors(options, name)
+        part = Part(module.state_dict(), options.config.to_dict(), metrics, sha256, budget, sources)
         save_part(options.run / name / "part", part)
 
 
