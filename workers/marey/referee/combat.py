@@ -1,0 +1,245 @@
+"""Rules of combat: strikes, weapons, hits and falls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marey.referee.aerial import OTHER
+from marey.referee.body import HIPS, SIDES, Body, Floats, Mask, runs, swings
+from marey.referee.gaits import gait, travel
+from marey.referee.rules import rule
+
+
+def _reach(body: Body, side: str) -> Floats:
+    """Distance of a wrist from its shoulder."""
+    return np.linalg.norm(body.own(f"{side}_wrist", f"{side}_shoulder"), axis=-1)
+
+
+def _standing(body: Body, share: float = 0.6) -> bool:
+    return body.most((body.height("pelvis") > 0.5 * HIPS) & (body.lean < 70), share)
+
+
+def _guard(body: Body) -> Mask:
+    hands = []
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist")
+        hands.append((hand[:, 1] > 0.05) & (hand[:, 1] < 0.72) & (hand[:, 2] > 0.1) & (body.bend(side, "elbow") > 40))
+    stance = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1) > 0.25
+    knees = np.maximum(body.bend("L", "knee"), body.bend("R", "knee")) > 20
+    return hands[0] & hands[1] & (stance | knees)
+
+
+@rule("fight-stance")
+def fight_stance(body: Body) -> bool:
+    strikes = np.maximum(*(np.linalg.norm(body.own_velocity(f"{s}_wrist"), axis=-1) for s in SIDES))
+    return _standing(body) and body.most(_guard(body)) and float(np.percentile(strikes, 95)) < 2.0
+
+
+def _strikes(body: Body, side: str) -> int:
+    """Count the movements of a fist away from its shoulder or past the face at 2 m/s or more."""
+    velocity = body.own_velocity(f"{side}_wrist", window=0.06)
+    speed = np.linalg.norm(velocity, axis=-1)
+    reach, elbow = _reach(body, side), body.bend(side, "elbow")
+    hand = body.own(f"{side}_wrist", "neck")
+    found = 0
+    for begin, end in runs(speed >= 2.0):
+        last = min(len(body), end + body.frames(0.12))
+        part = slice(max(0, begin - body.frames(0.12)), last)
+        out = reach[part].argmax() > reach[part].argmin() and float(np.ptp(reach[part])) >= 0.12
+        ahead = velocity[begin:end, 2].max() > 1.2 or velocity[begin:end, 1].max() > 1.5
+        straight = out and elbow[part].min() < 50 and hand[part][:, 2].max() > 0.25
+        past_face = (
+            (hand[part][:, 1].max() > -0.15) and hand[part][:, 2].max() > 0.2 and float(np.ptp(hand[part][:, 0])) > 0.2
+        )
+        if ahead and (straight or past_face):
+            found += 1
+    return found
+
+
+@rule("punch")
+def punch(body: Body) -> bool:
+    return _standing(body) and travel(body) < 3.0 and any(_strikes(body, side) for side in SIDES)
+
+
+def _kicks(body: Body, speed: float, height: float) -> int:
+    found = 0
+    for side in SIDES:
+        fast = np.linalg.norm(body.own_velocity(f"{side}_ankle", window=0.06), axis=-1) >= speed
+        toe = np.maximum(body.height(f"{side}_ankle"), body.height(f"{side}_foot"))
+        out = np.linalg.norm((body.at(f"{side}_ankle") - body.at("pelvis"))[:, [0, 2]], axis=-1)
+        for begin, end in runs(fast):
+            part = slice(begin, min(len(body), end + body.frames(0.15)))
+            if (toe[part] >= height).any() and out[part][toe[part] >= height].max() >= 0.35:
+                found += 1
+    return found
+
+
+@rule("kick")
+def kick(body: Body) -> bool:
+    return _standing(body, 0.5) and _kicks(body, 2.0, 0.45) > 0
+
+
+@rule("kick-ball")
+def kick_ball(body: Body) -> bool:
+    for side in SIDES:
+        velocity = body.own_velocity(f"{side}_foot", window=0.06)
+        foot = body.own(f"{side}_foot")
+        swing = (velocity[:, 2] >= 3.0) & (body.height(f"{side}_foot") < 0.5)
+        for begin, end in runs(swing):
+            part = slice(max(0, begin - body.frames(0.2)), min(len(body), end + body.frames(0.25)))
+            stands = (body.lift(OTHER[side])[begin:end] < 0.1).all()
+            if foot[part][:, 2].min() < -0.1 and foot[part][:, 2].max() > 0.3 and stands:
+                return True
+    return False
+
+
+def _sweeps(body: Body) -> int:
+    """Count arcs of a hand of 0.6 m and more at 2 m/s and more that are not thrusts along one line."""
+    found = 0
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist", "spine3")
+        speed = np.linalg.norm(body.own_velocity(f"{side}_wrist", "spine3"), axis=-1)
+        for begin, end in runs(speed >= 1.2):
+            part = hand[max(0, begin - 1) : end + 1]
+            path = float(np.linalg.norm(np.diff(part, axis=0), axis=-1).sum())
+            extent = np.ptp(part, axis=0)
+            if speed[begin:end].max() >= 2.0 and path >= 0.6 and max(extent[0], extent[1]) >= 0.35:
+                found += 1
+    return found
+
+
+@rule("slash")
+def slash(body: Body) -> bool:
+    return _standing(body, 0.5) and _sweeps(body) > 0
+
+
+@rule("stab")
+def stab(body: Body) -> bool:
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist", "spine3")
+        velocity = body.own_velocity(f"{side}_wrist", "spine3")
+        for begin, end in runs(velocity[:, 2] > 0.4):
+            part = hand[max(0, begin - 1) : end + 1]
+            ahead = part[-1] - part[0]
+            if velocity[begin:end, 2].max() >= 1.5 and ahead[2] >= 0.25 and np.abs(ahead[:2]).max() < 1.2 * ahead[2]:
+                return _standing(body, 0.5)
+    return False
+
+
+@rule("block")
+def block(body: Body) -> bool:
+    for side in SIDES:
+        hand, elbow = body.own(f"{side}_wrist"), body.bend(side, "elbow")
+        up = (hand[:, 1] > 0.22) & (hand[:, 2] > 0.08) & (elbow > 35)
+        calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 1.0
+        for begin, end in runs(up & calm):
+            before = slice(max(0, begin - body.frames(0.5)), begin + 1)
+            risen = float(np.linalg.norm(hand[begin] - hand[before], axis=-1).max()) > 0.15
+            if (end - begin) / body.fps >= 0.2 and (risen or begin == 0):
+                return _standing(body, 0.5)
+    return False
+
+
+def _aiming(body: Body) -> Mask:
+    held = np.zeros(len(body), np.bool_)
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist", "spine3")
+        still = np.linalg.norm(body.smooth(body.own_velocity(f"{side}_wrist", "spine3"), 0.3), axis=-1) < 0.3
+        held |= (hand[:, 2] >= 0.33) & (hand[:, 1] > -0.1) & (hand[:, 1] < 0.45) & still
+    return held
+
+
+@rule("aim")
+def aim(body: Body) -> bool:
+    return body.longest(_aiming(body)) >= 1.0
+
+
+@rule("shoot")
+def shoot(body: Body) -> bool:
+    """Aims; the hands jerk back by 0.02 m and more within 0.15 s."""
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist", "spine3")
+        ahead = (hand[:, 2] > 0.28) & (hand[:, 1] > -0.2)
+        distance = np.linalg.norm(hand, axis=-1)
+        step = body.frames(0.15)
+        if len(body) <= step or body.seconds(ahead) < 0.3:
+            continue
+        window = np.lib.stride_tricks.sliding_window_view(distance, step + 1)
+        jerk = window[:, 0] - window.min(axis=1)
+        if ((jerk >= 0.015) & ahead[: len(jerk)]).any():
+            return _standing(body, 0.5)
+    return False
+
+
+@rule("draw-bow")
+def draw_bow(body: Body) -> bool:
+    for side in SIDES:
+        bow, string = body.own(f"{side}_wrist", f"{side}_shoulder"), f"{OTHER[side]}_wrist"
+        out = (_reach(body, side) > 0.4) & (np.abs(bow[:, 1]) < 0.25) & (body.bend(side, "elbow") < 55)
+        face = np.minimum(
+            np.linalg.norm(body.own(string, "head"), axis=-1),
+            np.linalg.norm(body.own(string, f"{OTHER[side]}_shoulder"), axis=-1),
+        )
+        elbow_up = body.height(f"{OTHER[side]}_elbow") > body.height(f"{OTHER[side]}_shoulder") - 0.25
+        if body.seconds(out & (face < 0.3) & elbow_up & (body.hand_apart() > 0.35)) >= 0.2:
+            return True
+    return False
+
+
+@rule("cast-spell")
+def cast_spell(body: Body) -> bool:
+    for side in SIDES:
+        reach = body.smooth(_reach(body, side), 0.1)
+        height = body.height(f"{side}_wrist")
+        calm = np.linalg.norm(body.own_velocity(f"{side}_wrist"), axis=-1) < 0.6
+        hand = body.own(f"{side}_wrist", "spine3")
+        away = ((hand[:, 2] > 0.25) & (hand[:, 1] > -0.2)) | (height > body.height("head"))
+        way = body.within(hand, 0.8)
+        for begin, end in runs(away & calm):
+            before = slice(max(0, begin - body.frames(0.8)), begin + 1)
+            if (end - begin) / body.fps >= 0.15 and way[before].max() >= 0.3 and reach[begin:end].max() > 0.35:
+                return _standing(body, 0.5)
+    return False
+
+
+@rule("throw")
+def throw(body: Body) -> bool:
+    for side in SIDES:
+        hand = body.own(f"{side}_wrist", "spine3")
+        velocity = body.own_velocity(f"{side}_wrist", "spine3", window=0.06)
+        for begin, end in runs(velocity[:, 2] > 0.8):
+            peak = np.linalg.norm(velocity[begin:end], axis=-1).max()
+            before = slice(max(0, begin - body.frames(0.6)), begin + 1)
+            below = hand[begin:end, 1].mean() < 0
+            wound_up = hand[before][:, 2].min() < 0.15
+            last = hand[min(end, len(body) - 1), 2]
+            if peak >= (2.5 if below else 3.0) and wound_up and last > 0.15 and last - hand[before][:, 2].min() > 0.3:
+                return _standing(body, 0.5)
+    return False
+
+
+@rule("flinch")
+def flinch(body: Body) -> bool:
+    chest = body.within(body.own("spine3"), 0.3)
+    head = body.within(body.own("head"), 0.3)
+    world = np.minimum(body.within(body.at("head"), 0.3), body.within(body.at("spine3"), 0.3))
+    jerk = np.maximum(np.minimum(chest, head), world)
+    stays = bool(body.height("pelvis").min() > 0.5 * HIPS and body.standing[-body.frames(0.2) :].any())
+    return bool(jerk.max() >= 0.08) and stays and travel(body) < 1.5 and gait(body).steps < 6
+
+
+@rule("die")
+def die(body: Body) -> bool:
+    last = slice(-body.frames(0.2), None)
+    down = max(float(body.height(joint)[last].max()) for joint in ("pelvis", "spine3", "head"))
+    first = body.height("pelvis")[: body.frames(1.0)].max()
+    return down < 0.45 and first > 0.6 * HIPS
+
+
+@rule("karate")
+def karate(body: Body) -> bool:
+    blows = sum(_strikes(body, side) for side in SIDES) + _kicks(body, 2.0, 0.45) + _sweeps(body)
+    feet = np.linalg.norm((body.at("L_ankle") - body.at("R_ankle"))[:, [0, 2]], axis=-1)
+    wide = float(np.percentile(feet, 75)) > 0.45 or float(np.percentile(body.height("pelvis"), 25)) < 0.92 * HIPS
+    moves = len(swings(body.smooth(body.yaw, 0.2), 30)) + len(swings(feet, 0.25))
+    return blows >= 3 and wide and moves >= 1 and _standing(body)
