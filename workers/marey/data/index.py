@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import string
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -28,7 +28,7 @@ class Row(BaseModel):
 
     Attributes:
         file: name of the file, with or without folder and ending.
-        id: name of the clip; the file's, with `@` and the start for a segment.
+        id: name of the clip; the file's, with `@` and the start for a segment, and the end where two begin at one.
         action: what is done, an id of the vocabulary where it has one; several joined by `; `; `none`: leave it out.
         style: how it is done.
         captions: true sentences about it.
@@ -126,7 +126,7 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
         except ValidationError as error:
             first = error.errors()[0]
             raise InvalidFile(f"`{'.'.join(map(str, first['loc']))}`: {first['msg']}", where=place) from None
-        row = _named(row)
+        row = _named(row, seen)
         if row.start is not None and row.end is not None and row.end <= row.start:
             raise InvalidFile("ends before it starts", where=place)
         if row.id in seen:
@@ -136,7 +136,11 @@ def parse_index(text: str, columns: Mapping[str, str], where: str) -> tuple[Row,
     return tuple(rows)
 
 
-def _named(row: Row) -> Row:
-    """The row with id and source, where it has none."""
-    part = "" if row.start is None and row.end is None else f"@{row.start or 0:g}"
-    return row.model_copy(update={"id": row.id or row.stem + part, "source": row.source or row.stem})
+def _named(row: Row, taken: Container[str]) -> Row:
+    """The row with id and source, where it has none. Segments with one start are told apart by their ends."""
+    name = row.id or row.stem
+    if not row.id and not (row.start is None and row.end is None):
+        name += f"@{row.start or 0:g}"
+        if name in taken and row.end is not None:
+            name += f"-{row.end:g}"
+    return row.model_copy(update={"id": name, "source": row.source or row.stem})
